@@ -12,3 +12,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 Floats = NDArray[np.float64]
 """An array of float64."""
+
+Ints = NDArray[np.integer[Any]]
+"""An array of whole numbers of any type."""

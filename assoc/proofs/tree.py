@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.branching.pairs import Trials, answer, any_open_pair, decide, doubtful_pairs, new_trials
 from assoc.packing.branching.root import root_with_cuts
 from assoc.packing.packing import Packing
@@ -188,7 +188,7 @@ class _Search:
 
 @njit
 def _pair(
-    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any, effort: Effort
+    program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, counts: Ints, effort: Effort
 ) -> Any:
     """The pair that branch and bound would choose, or any open one; -1, -1 if there is none."""
     count = doubtful_pairs(cols, basis, trials)

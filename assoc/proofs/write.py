@@ -123,7 +123,7 @@ def _proved(
     prepared = prepare(problem)
     offsets = np.cumsum([0, *problem.sizes.tolist()])
     alone = prepared.single_cost if problem.dummy else np.zeros(offsets[-1])
-    # whole-numbered weights allow trees a tolerance: not if costs are finer than the weights, as where all weights are 0
+    # whole-numbered weights allow trees a tolerance: not if costs are finer, as where all weights are 0
     granularity = prepared.packing.granularity if exact.unit >= _ONE else 0.0
     columns, packing = exact.columns, replace(prepared.packing, granularity=granularity)
     stages: list[list[list[float]]] = []

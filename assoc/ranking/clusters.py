@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Ints
 from assoc.packing.kernels.sorting import ascending_whole
 from assoc.packing.packing import find
 from assoc.problem import AssignmentProblem
@@ -49,7 +50,7 @@ def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.i
 
 
 @njit
-def _largest(tuples: Any) -> Any:
+def _largest(tuples: Ints) -> Any:
     """Each sensor's largest measurement number."""
     num, num_sensors = tuples.shape
     largest = np.zeros(num_sensors, np.int64)
@@ -60,7 +61,7 @@ def _largest(tuples: Any) -> Any:
 
 
 @njit
-def _as_numbers(tuples: Any, sides: Any) -> Any:
+def _as_numbers(tuples: Ints, sides: Ints) -> Any:
     """Numbers that order the tuples lexicographically."""
     num, num_sensors = tuples.shape
     numbers = np.zeros(num, np.int64)
@@ -71,7 +72,7 @@ def _as_numbers(tuples: Any, sides: Any) -> Any:
 
 
 @njit
-def _places(tuples: Any, order: Any) -> Any:
+def _places(tuples: Ints, order: Ints) -> Any:
     """Mask of the sorted tuples that differ from the one before, and each tuple's index among the distinct ones."""
     num, num_sensors = tuples.shape
     new = np.ones(num, np.bool_)
@@ -92,7 +93,7 @@ def _places(tuples: Any, order: Any) -> Any:
 
 
 @njit
-def _clusters(tuples: Any, offsets: Any, total: int) -> Any:
+def _clusters(tuples: Ints, offsets: Ints, total: int) -> Any:
     """Rows of tuples by cluster, and where each cluster begins."""
     num, num_sensors = tuples.shape
     parent = np.arange(total).astype(np.int32)

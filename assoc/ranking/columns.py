@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.bounds.dual_ascent import dual_bound, hard_pass
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, assemble
@@ -151,7 +151,7 @@ def priced(
 
 
 @njit
-def _reduced(rows: Any, weights: Floats, duals: Floats) -> Any:
+def _reduced(rows: Ints, weights: Floats, duals: Floats) -> Any:
     """Reduced costs, with negative ones set to 0, and the least before that."""
     reduced = np.empty(weights.size)
     least = 0.0
@@ -166,7 +166,7 @@ def _reduced(rows: Any, weights: Floats, duals: Floats) -> Any:
 
 
 @njit
-def _distinct_columns(tuples: Any, costs: Floats, offsets: Any, single_cost: Floats, dummy: bool) -> Any:
+def _distinct_columns(tuples: Ints, costs: Floats, offsets: Ints, single_cost: Floats, dummy: bool) -> Any:
     """Distinct columns of two or more measurements (without dummies: all), each at its smallest cost."""
     num, num_sensors = tuples.shape
     size = 16

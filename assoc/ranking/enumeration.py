@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.kernels.sorting import order_of
@@ -120,7 +120,7 @@ def _mark(column: int) -> np.uint64:
 
 
 @inner_njit
-def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: bool) -> Store:
+def _keep(store: Store, k: int, weight: float, columns: Ints, count: int, check: bool) -> Store:
     """Add a solution; if there are k, it replaces the heaviest. With ``check`` only if it is new."""
     mark = np.uint64(0)
     for t in range(count):
@@ -266,7 +266,7 @@ def enumerate_solutions(
 
 
 @inner_njit
-def _sort_row(reduced: Floats, own: Any) -> None:
+def _sort_row(reduced: Floats, own: Ints) -> None:
     """Sort columns by reduced cost, in place; stable."""
     ordered = True
     for x in range(1, own.size):
@@ -278,7 +278,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
 
 
 @inner_njit
-def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float) -> Any:
+def _next_row(priced: PricedColumns, top: int, end: int, done: NDArray[np.bool_], room: float) -> Any:
     """Return the row with the fewest choices left (-1: all are decided), and their number."""
     _, _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     row, least = -1, 1 << 60
@@ -300,7 +300,7 @@ def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float)
 
 
 @inner_njit
-def _decide(priced: PricedColumns, top: int, row: int, taken: int, done: Any, do: bool) -> int:
+def _decide(priced: PricedColumns, top: int, row: int, taken: int, done: NDArray[np.bool_], do: bool) -> int:
     """Take a column or leave a row uncovered, or undo that; the number of columns changed."""
     cols, row_ptr, row_cols, blocked = priced.cols, priced.row_ptr, priced.row_cols, priced.blocked
     step = 1 if do else -1

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Array, Floats, Ints
 from assoc.packing.kernels.heap import pop, push
 
 
 @njit
-def merge(start: Any, weights: Floats, k: int) -> Any:
+def merge(start: Ints, weights: Floats, k: int) -> Any:
     """Combine the ranked lists of independent components into the k lightest choices of one of each.
 
     Parameters
@@ -87,7 +87,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
 
 
 @inner_njit
-def _wider(array: Any, columns: int) -> Any:
+def _wider(array: Array, columns: int) -> Any:
     result = np.empty((array.shape[0], columns), np.int32)
     for i in range(array.shape[0]):
         for k in range(array.shape[1]):

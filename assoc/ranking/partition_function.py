@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, search_njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.packing import Packing
@@ -210,7 +210,7 @@ def _added(largest: float, total: float, term: float) -> Any:
 
 
 @inner_njit
-def _is_open(cols: Any, done: Any, j: int) -> bool:
+def _is_open(cols: Ints, done: NDArray[np.bool_], j: int) -> bool:
     """Whether none of a column's rows is decided."""
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0 and done[cols[j, s]]:
@@ -219,7 +219,7 @@ def _is_open(cols: Any, done: Any, j: int) -> bool:
 
 
 @inner_njit
-def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
+def _log_product(terms: Terms, done: NDArray[np.bool_], factor: Floats, reach: NDArray[np.bool_]) -> float:
     """Return the least logarithm of the product (see the module) over the cyclic orders of the sensors."""
     cols, weights, alone = terms.cols, terms.weights, terms.alone
     num, num_sensors = cols.shape
@@ -255,7 +255,7 @@ def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
 
 
 @inner_njit
-def _log_row(terms: Terms, done: Any, row: int, first: int) -> float:
+def _log_row(terms: Terms, done: NDArray[np.bool_], row: int, first: int) -> float:
     """Logarithm of a row's sum where it underflows: over the columns that begin in it, and leaving it uncovered."""
     cols, num_sensors = terms.cols, terms.cols.shape[1]
     largest, total = _added(-np.inf, 0.0, terms.log_alone[row])

@@ -15,13 +15,13 @@ over-relaxed, and one pass with the hard minimum makes the result feasible.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import Run
@@ -62,9 +62,9 @@ class SmoothPoint(NamedTuple):
 class _Near(NamedTuple):
     """The columns of small reduced cost: numbered by ``place`` (-1: not near), and listed by row."""
 
-    place: Any
-    row_ptr: Any
-    cols: Any
+    place: Ints
+    row_ptr: Ints
+    cols: Ints
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
@@ -209,7 +209,7 @@ def hard_sweeps(packing: PackingArrays, duals: Floats, updated: Floats, sweeps: 
 
 
 @inner_njit
-def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
+def _gathered_sum(values: Floats, places: Ints, first: int, end: int) -> float:
     """Sum of ``values[places[first:end]]`` in four independent partial sums, which processors overlap."""
     a = b = c = d = 0.0
     k = first

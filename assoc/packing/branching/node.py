@@ -77,7 +77,7 @@ def work_memory(rows: float, columns: int, sensors: int) -> float:
     return 34.0 * rows * rows + kept_memory(rows) + (200.0 + 12.0 * max(sensors - 8, 0)) * columns
 
 
-def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
+def new_work(packing: PackingArrays, program: Program, slack: NDArray[np.bool_]) -> Work:
     """Allocate the search of a program whose first rows are those of the packing."""
     num_rows = packing.slack.size
     return Work(
@@ -152,7 +152,7 @@ def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
 
 
 @inner_njit
-def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
+def keep_side(work: Work, num: int, pair: tuple[int, int], joined: bool) -> int:
     """Replace the current node by its only remaining side; return its number of columns."""
     side, node = work.trials.side, work.node
     num = answer(work.cols, allowed_at(work, num), pair, joined, side)
@@ -163,7 +163,7 @@ def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
 
 
 @inner_njit
-def branch(work: Work, stack: Stack, top: int, num: int, pair: Any, likely: bool, lower: float) -> int:
+def branch(work: Work, stack: Stack, top: int, num: int, pair: tuple[int, int], likely: bool, lower: float) -> int:
     """Push both sides of the current node, the likelier last, to be searched first; return the number of open nodes."""
     side = work.trials.side
     keep_basis(work.kept, work.basis)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, bound_of
@@ -84,7 +84,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
 
 
 @inner_njit
-def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
+def is_dropped(cols: Ints, j: int, one: int, two: int, joined: bool) -> bool:
     """Whether column j is forbidden where two rows are together (no column has only one) or apart (none has both)."""
     uses = 0
     for s in range(cols.shape[1]):
@@ -94,7 +94,7 @@ def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
 
 
 @njit
-def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
+def answer(cols: Ints, allowed: Allowed, pair: tuple[int, int], joined: bool, side: Allowed) -> int:
     """Fill ``side`` with what is allowed where the pair is together or apart; the number of columns allowed."""
     active, columns, slack = side.active, side.columns, side.slack
     columns[:] = False
@@ -113,7 +113,7 @@ def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) 
 
 
 @inner_njit
-def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
+def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
     """Find the most fractional pairs of rows of the LP's solution; return their number."""
     mass, pairs, values = trials.mass, trials.pairs, trials.values
     num, num_sensors = cols.shape
@@ -157,7 +157,13 @@ def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
 
 @inner_njit
 def _try(
-    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, which: Any, effort: Effort
+    program: Program,
+    cols: Ints,
+    allowed: Allowed,
+    basis: Basis,
+    trials: Trials,
+    which: tuple[Any, bool],
+    effort: Effort,
 ) -> Any:
     """Try one side of a pair; how it ended, and the bound from the multipliers (but for rounding)."""
     pair, joined = which
@@ -174,7 +180,7 @@ def _try(
 
 @inner_njit
 def decide(
-    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
+    program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
     """Choose one of the fractional pairs.
 
@@ -218,7 +224,7 @@ def decide(
 
 
 @inner_njit
-def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
+def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> Any:
     """Return two rows that some columns have together and others do not; -1, -1 if there are none.
 
     Without such a pair columns that share a row are equal, and the lightest of each kind can be taken.
@@ -242,7 +248,7 @@ def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
 
 
 @inner_njit
-def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any) -> int:
+def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, counts: Ints) -> int:
     """Find pairs that the whole-numbered LP solution has together, those in most other columns; return their number."""
     pairs, values = trials.pairs, trials.values
     num, num_sensors = cols.shape
@@ -285,7 +291,7 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
 
 @inner_njit
 def part_certain(
-    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
+    program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
     """Choose the certain pair that costs the most to have apart; return as `decide`.
 

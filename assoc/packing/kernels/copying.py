@@ -6,13 +6,12 @@ longer than compiling most kernels.
 
 from __future__ import annotations
 
-from typing import Any
-
 from assoc._system.compiled import inner_njit
+from assoc._types import Array
 
 
 @inner_njit
-def copy_to(target: Any, source: Any) -> None:
+def copy_to(target: Array, source: Array) -> None:
     """Copy an array to another one of the same length."""
     for i in range(target.size):
         target[i] = source[i]

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import inner_njit
+from assoc._types import Array, Floats, Ints
 
 
 @inner_njit
-def doubled(array: Any) -> Any:
+def doubled(array: Array) -> Any:
     """Return a copy of twice the size."""
     larger = np.empty(2 * array.size, array.dtype)
     for i in range(array.size):
@@ -19,7 +20,7 @@ def doubled(array: Any) -> Any:
 
 
 @inner_njit
-def doubled_rows(table: Any) -> Any:
+def doubled_rows(table: Array) -> Any:
     """Return a copy of a table with twice as many rows."""
     num, width = table.shape
     larger = np.empty((2 * num, width), table.dtype)
@@ -30,7 +31,7 @@ def doubled_rows(table: Any) -> Any:
 
 
 @inner_njit
-def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
+def push(key: Floats, item: Ints, size: int, value: float, thing: int) -> None:
     """Add an item under a key; ``size`` is the number of items before."""
     place = size
     while place > 0:
@@ -45,7 +46,7 @@ def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
 
 
 @inner_njit
-def pop(key: Any, item: Any, size: int) -> None:
+def pop(key: Floats, item: Ints, size: int) -> None:
     """Remove the root; ``size`` is the number of items left."""
     value = key[size]
     thing = item[size]

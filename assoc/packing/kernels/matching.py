@@ -19,13 +19,13 @@ References
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.errors import InfeasibleError
 from assoc.packing.kernels.heap import doubled, pop, push
 
@@ -52,8 +52,8 @@ class Matching(NamedTuple):
 class _Costs(NamedTuple):
     """The problem as the kernels below take it; see `match`."""
 
-    indptr: Any
-    indices: Any
+    indptr: Ints
+    indices: Ints
     costs: Floats
     row_slack: Floats
     base: Floats
@@ -63,12 +63,12 @@ class _Costs(NamedTuple):
 class _State(NamedTuple):
     """A partial matching and its duals; a column's dual is ``base + v``."""
 
-    row_edge: Any
-    u: Any
-    v: Any
-    owner: Any
+    row_edge: Ints
+    u: Floats
+    v: Floats
+    owner: Ints
     """Row that each column is matched to, or -1."""
-    pending: Any
+    pending: Ints
     """Rows that are not matched yet; their number is kept separately."""
 
 
@@ -115,7 +115,8 @@ def match(
 
 @njit
 def match_sparse(
-    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, column_slack: Floats, row_edge: Any, u: Any, v: Any
+    indptr: Ints, indices: Ints, costs: Floats, row_slack: Floats, column_slack: Floats,
+    row_edge: Ints, u: Floats, v: Floats,
 ) -> float:  # fmt: skip
     """Fill ``row_edge``, ``u`` and ``v``; return the total cost, ``inf`` where there is no matching."""
     n, m = row_slack.size, column_slack.size

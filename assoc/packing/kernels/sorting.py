@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
+from assoc._types import Array, Floats
 
 # bits of a digit; for fewer numbers radix sort does not pay
 _BITS = 11
@@ -39,12 +39,12 @@ def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
     return order
 
 
-def _order_by_numpy(values: Any) -> Any:
+def _order_by_numpy(values: Array) -> Any:
     return np.argsort(values, kind="stable")
 
 
 @partial(njit, stand_in=_order_by_numpy)
-def order_of(values: Any) -> Any:
+def order_of(values: Array) -> Any:
     """Return a stable argsort, for kernels."""
     num = values.size
     order, other = np.empty(num, np.int64), np.empty(num, np.int64)
@@ -76,7 +76,7 @@ def order_of(values: Any) -> Any:
 
 
 @njit
-def _by_digits(bits: Any) -> Any:
+def _by_digits(bits: Array) -> Any:
     """Radix sort of floats by their bits, eleven at a time from the lowest; digits equal in all are skipped."""
     num = bits.size
     digits = 6

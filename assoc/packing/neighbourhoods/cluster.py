@@ -18,10 +18,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit, search_njit
+from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
 from assoc.packing.kernels.columns import first_row
@@ -88,7 +90,7 @@ class ClusterSearch:
         packing: Packing,
         owner: NDArray[np.int32],
         weight: float,
-        rng: np.random.Generator,
+        rng: Generator,
         tries: int,
         deadline: float = np.inf,
     ) -> float:
@@ -104,7 +106,7 @@ class ClusterSearch:
         self,
         packing: PackingArrays,
         owner: NDArray[np.int32],
-        rng: np.random.Generator,
+        rng: Generator,
         tries: int,
         deadline: float = np.inf,
         nodes: int = _NODES,
@@ -138,7 +140,7 @@ class ClusterSearch:
 
 
 @njit
-def _by_row(cols: Any, row_ptr: Any, order: Any) -> Any:
+def _by_row(cols: Ints, row_ptr: Ints, order: Ints) -> Any:
     """The columns of each row, in the order given."""
     place = row_ptr[:-1].copy()
     result = np.empty(row_ptr[-1], np.int32)
@@ -152,7 +154,7 @@ def _by_row(cols: Any, row_ptr: Any, order: Any) -> Any:
 
 
 @inner_njit
-def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int:
+def _take(cols: Ints, owner: Ints, r: int, local: Ints, rows: Ints, num: int) -> int:
     """Add a row and all rows of its owner to the cluster."""
     if local[r] >= 0:
         return num
@@ -172,7 +174,14 @@ def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int
 
 @inner_njit
 def _grow(
-    packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, size: int, local: Any, rows: Any
+    packing: PackingArrays,
+    by_row: Ints,
+    prices: Prices,
+    owner: Ints,
+    rng: Generator,
+    size: int,
+    local: Ints,
+    rows: Ints,
 ) -> int:
     """Fill ``rows`` with a cluster and ``local`` with its numbering; starts at a row with a possible gain."""
     cols, row_ptr = packing.cols, packing.row_ptr
@@ -204,7 +213,7 @@ def _grow(
 
 @search_njit
 def _search_clusters(
-    packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, effort: _Effort, deadline: float
+    packing: PackingArrays, by_row: Ints, prices: Prices, owner: Ints, rng: Generator, effort: _Effort, deadline: float
 ) -> Any:
     """Try clusters; return the change of weight, and the number not searched to the end."""
     cols = packing.cols

@@ -10,9 +10,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.bounds.priced import Prices
 from assoc.packing.packing import PackingArrays
 
@@ -23,18 +24,18 @@ _SWEEPS = 8
 class ClusterColumns(NamedTuple):
     """Buffers for the columns of a cluster: places, costs, and columns of the packing (-1: stays uncovered)."""
 
-    place: Any
-    cost: Any
-    origin: Any
+    place: Ints
+    cost: Floats
+    origin: Ints
 
 
 class Sweep(NamedTuple):
     """Buffers for the ascent on a cluster: its columns by place, its multipliers, smoothed primal values."""
 
-    pointer: Any
-    by_place: Any
-    duals: Any
-    primal: Any
+    pointer: Ints
+    by_place: Ints
+    duals: Floats
+    primal: Floats
 
 
 class Limits(NamedTuple):
@@ -48,7 +49,7 @@ class Limits(NamedTuple):
 
 @inner_njit
 def collect(
-    packing: PackingArrays, by_row: Any, prices: Prices, rows: Any, local: Any, limit: float, found: ClusterColumns
+    packing: PackingArrays, by_row: Ints, prices: Prices, rows: Ints, local: Ints, limit: float, found: ClusterColumns
 ) -> int:
     """List the columns within the cluster of reduced cost up to ``limit``; -1 if they are too many."""
     cols, slack, row_ptr = packing.cols, packing.slack, packing.row_ptr
@@ -98,7 +99,7 @@ def collect(
 
 
 @inner_njit
-def _index(place: Any, count: int, num: int, pointer: Any, by_place: Any) -> None:
+def _index(place: Ints, count: int, num: int, pointer: Ints, by_place: Ints) -> None:
     """Index the columns by the cluster's rows."""
     num_sensors = place.shape[1]
     for i in range(num + 1):
@@ -176,7 +177,9 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
 
 
 @inner_njit
-def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits, lists: Any, best: Any) -> Any:
+def depth_first(
+    place: Ints, cost: Floats, current: NDArray[np.bool_], num: int, limits: Limits, lists: Ints, best: Ints
+) -> Any:
     """Choose columns that cover each of ``num`` places once, of total cost up to ``budget``.
 
     ``lists[0]`` has the columns in order of cost. A choice equal to the present one is skipped; after
@@ -290,7 +293,7 @@ def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits
 
 
 @inner_njit
-def _sensor_of(cols: Any, row_ptr: Any, by_row: Any, r: int) -> int:
+def _sensor_of(cols: Ints, row_ptr: Ints, by_row: Ints, r: int) -> int:
     if row_ptr[r] < row_ptr[r + 1]:
         for s in range(cols.shape[1]):
             if cols[by_row[row_ptr[r]], s] == r:

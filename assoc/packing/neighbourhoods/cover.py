@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._types import Ints
 from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
 from assoc.packing.packing import Packing
@@ -102,7 +103,7 @@ def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:
 
 
 @inner_njit
-def own(cols: Any, j: int, owner: Any) -> None:
+def own(cols: Ints, j: int, owner: Ints) -> None:
     """Choose column j: make it the owner of its rows."""
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0:
@@ -110,14 +111,14 @@ def own(cols: Any, j: int, owner: Any) -> None:
 
 
 @njit
-def own_all(cols: Any, columns: Any, owner: Any) -> None:
+def own_all(cols: Ints, columns: Ints, owner: Ints) -> None:
     """Choose columns: make them the owners of their rows."""
     for j in columns:
         own(cols, j, owner)
 
 
 @njit
-def chosen_columns(cols: Any, owner: Any) -> Any:
+def chosen_columns(cols: Ints, owner: Ints) -> Any:
     """The chosen columns, ascending, of the dtype of ``owner``."""
     chosen = np.zeros(cols.shape[0], np.bool_)
     count = 0

@@ -13,13 +13,12 @@ of Heuristics 17, 201-249 (2011).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.matching import match_sparse
@@ -58,7 +57,7 @@ def splits(num_sensors: int) -> NDArray[np.int64]:
 
 
 @njit
-def _improve(packing: PackingArrays, owner: Any, masks: Any, deadline: float) -> float:
+def _improve(packing: PackingArrays, owner: Ints, masks: Ints, deadline: float) -> float:
     """Re-match by one split after the other; return the change of weight."""
     cols, slack, row_ptr, row_cols = packing.cols, packing.slack, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
@@ -89,7 +88,7 @@ def _improve(packing: PackingArrays, owner: Any, masks: Any, deadline: float) ->
 
 
 @inner_njit
-def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any, size: Any, first: Any) -> int:
+def _halves(cols: Ints, owner: Ints, sensor: Ints, mask: int, side: int, half: Ints, size: Ints, first: Ints) -> int:
     """Number the halves on one side (1: sensors in ``mask``): each row's half, sizes, and a row of each."""
     count = 0
     num_sensors = cols.shape[1]
@@ -123,7 +122,7 @@ def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any,
 
 
 @inner_njit
-def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> int:
+def _match_of(cols: Ints, j: int, mask: int, side: int, half: Ints, size: Ints) -> int:
     """The half that is column j's part on a side; -1 if it has no rows there, -2 if its part is not one whole half."""
     found = -1
     members = 0
@@ -141,7 +140,7 @@ def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> 
 
 
 @inner_njit
-def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> float:
+def _rematch(packing: PackingArrays, owner: Ints, sensor: Ints, mask: int) -> float:
     """Re-match the halves of one split; return the change of weight (0: nothing better)."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     row_ptr, row_cols = packing.row_ptr, packing.row_cols
@@ -232,7 +231,7 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
 
 
 @inner_njit
-def _weight(cols: Any, weights: Any, owner: Any) -> float:
+def _weight(cols: Ints, weights: Floats, owner: Ints) -> float:
     total = 0.0
     for r in range(owner.size):
         k = owner[r]

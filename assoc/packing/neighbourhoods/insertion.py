@@ -10,13 +10,11 @@ column for every such row, so that covering comes before cost.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.packing import Packing, PackingArrays
 
 # columns tried between two checks of the clock: about a millisecond
@@ -46,7 +44,7 @@ def penalised(packing: PackingArrays) -> Floats:
 
 
 @njit
-def add_greedily(packing: PackingArrays, order: Any, owner: Any) -> None:
+def add_greedily(packing: PackingArrays, order: Ints, owner: Ints) -> None:
     """Add columns in the given order while they fit; columns of rows that all have slack only at negative weight."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     num_sensors = cols.shape[1]
@@ -67,7 +65,7 @@ def add_greedily(packing: PackingArrays, order: Any, owner: Any) -> None:
 
 
 @inner_njit
-def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
+def insertion_gain(cols: Ints, weights: Floats, owner: Ints, j: int) -> float:
     """Weight of column j less that of the columns it would eject; negative is good."""
     num_sensors = cols.shape[1]
     change = weights[j]
@@ -86,7 +84,7 @@ def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
 
 
 @inner_njit
-def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int:
+def insert(cols: Ints, owner: Ints, j: int, changed: Ints, num_changed: int) -> int:
     """Eject the owners of column j's rows and insert it; append rows that lost their owner to ``changed``."""
     num_sensors = cols.shape[1]
     for s in range(num_sensors):
@@ -108,7 +106,7 @@ def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int
 
 
 @njit
-def insert_and_eject(packing: PackingArrays, owner: Any, rows: Any, deadline: float) -> float:
+def insert_and_eject(packing: PackingArrays, owner: Ints, rows: Ints, deadline: float) -> float:
     """Insert with ejection at ``rows`` and all rows that change, until time is over; return the sum of the gains."""
     cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]

@@ -14,10 +14,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.bounds.priced import Prices
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.kernels.copying import copy_to
@@ -51,7 +52,7 @@ class Trail(NamedTuple):
 
 
 @inner_njit
-def _first_fitting(packing: PackingArrays, owner: Any, r: int) -> int:
+def _first_fitting(packing: PackingArrays, owner: Ints, r: int) -> int:
     """The first column of a row that fits; -1 if none does."""
     for k in range(packing.row_ptr[r], packing.row_ptr[r + 1]):
         if fits(packing.cols, owner, packing.row_cols[k]):
@@ -61,7 +62,7 @@ def _first_fitting(packing: PackingArrays, owner: Any, r: int) -> int:
 
 @njit
 def walk(
-    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
+    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Generator, deadline: float
 ) -> Any:
     """Let all ants build a cover, until time is over; return the best one and its weight.
 

@@ -24,9 +24,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Program
@@ -40,7 +41,7 @@ _COMMON = 0.7
 
 
 @njit
-def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
+def odd_sets(cols: Ints, basis: Basis, num_rows: int) -> Any:
     """Odd sets of rows whose cuts the program's solution violates, the most violated first.
 
     Parameters
@@ -141,7 +142,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
 
 
 @inner_njit
-def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
+def _keep(sets: NDArray[np.bool_], scores: Floats, kept: int, new: NDArray[np.bool_], score: float) -> int:
     """Insert a set in order of f, unless it shares too many rows with a better one; return the number kept."""
     place = kept
     for i in range(kept):
@@ -162,7 +163,7 @@ def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
 
 
 @inner_njit
-def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
+def _keep_at(sets: NDArray[np.bool_], scores: Floats, kept: int, new: NDArray[np.bool_], score: float) -> int:
     place = kept
     if kept == scores.size:
         if score >= scores[kept - 1]:
@@ -179,14 +180,14 @@ def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> in
     return kept
 
 
-def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
+def with_cuts(cols: Ints, weights: Floats, num_rows: int, sets: NDArray[np.bool_]) -> Program:
     """The linear program of columns over rows, with a further row for the cut of each set."""
     start, rows, sides = _entries(cols, num_rows, sets)
     return Program(weights, start, rows, sides, cols.shape[1])
 
 
 @njit
-def _entries(cols: Any, num_rows: int, sets: Any) -> Any:
+def _entries(cols: Ints, num_rows: int, sets: NDArray[np.bool_]) -> Any:
     """Start of each column's rows, the rows, and the right-hand sides.
 
     A plain tuple: when Ctrl-C interrupts the conversion of a record, numba calls its class without having found it.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._types import Ints
 
 ALONE = -1
 
@@ -123,7 +124,7 @@ def twice(array: NDArray[Any]) -> NDArray[Any]:
 
 
 @njit
-def index_edges(rows: Any, columns: Any, num_rows: int, num_columns: int, keep: Any) -> Any:
+def index_edges(rows: Ints, columns: Ints, num_rows: int, num_columns: int, keep: Ints) -> Any:
     """List the edges ``keep`` by row and by column."""
     row_ptr = np.zeros(num_rows + 1, np.int64)
     column_ptr = np.zeros(num_columns + 1, np.int64)

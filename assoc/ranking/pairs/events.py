@@ -19,12 +19,13 @@ IEEE J. Oceanic Engineering 8, 1983.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Array, Floats
+from assoc._types import Array, Floats, Ints
 from assoc.packing.kernels.matching import match
 from assoc.ranking.pairs.graph import PairGraph, pair_graph
 from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
@@ -96,14 +97,14 @@ def pair_probabilities(
 
 
 class _Plan(NamedTuple):
-    kept: Any
+    kept: NDArray[np.bool_]
     """Edges that are summed, bool (K,)."""
-    steps: Any
+    steps: Ints
     """Of the sweep over all clusters."""
-    label: Any
+    label: Ints
     """Cluster of each vertex, (V,)."""
-    log_lower: Any
-    log_upper: Any
+    log_lower: Floats
+    log_upper: Floats
     """Bounds on each edge's probability, (K,); -inf and 0 if none is left out."""
 
 
@@ -140,7 +141,7 @@ def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
 
 
 @njit
-def _cluster(graph: PairGraph, kept: Any, start: int, number: int, label: Any, members: Any) -> int:
+def _cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int, label: Ints, members: Ints) -> int:
     """Label the cluster of a vertex and list its members; return how many."""
     members[0], label[start] = start, number
     size = 1

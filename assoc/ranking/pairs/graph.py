@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from assoc._types import Array
+from assoc._types import Array, Ints
 
 
 class PairGraph(NamedTuple):
@@ -24,10 +24,10 @@ class PairGraph(NamedTuple):
         Index of the edge's other end.
     """
 
-    ends: Any
-    ptr: Any
-    edge: Any
-    mate: Any
+    ends: Ints
+    ptr: Ints
+    edge: Ints
+    mate: Ints
 
 
 def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph:

@@ -22,12 +22,11 @@ Aerospace and Electronic Systems 50, 2014.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
-from assoc._types import Array, Floats
+from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.graph import PairGraph
 
 _ROUNDS, _SETTLED = 200, 1e-10
@@ -44,7 +43,9 @@ def next_round(graph: PairGraph, log_weight: Floats, incoming: Floats, outgoing:
 
 
 @njit
-def _log_one_and(first: int, last: int, but: int, edge: Any, mate: Any, log_weight: Floats, incoming: Floats) -> float:
+def _log_one_and(
+    first: int, last: int, but: int, edge: Ints, mate: Ints, log_weight: Floats, incoming: Floats
+) -> float:
     """ln(1 + sum of weight times incoming message) over a vertex' edges except ``but``."""
     top = 0.0
     for y in range(first, last):

@@ -12,12 +12,13 @@ of any event at most 1, so that whatever underflows is negligible.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit, search_njit
-from assoc._types import Floats
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.ranking.pairs.graph import PairGraph
 
@@ -31,11 +32,11 @@ _LARGE = 1e150
 class Work(NamedTuple):
     """Buffers for planning a sweep, one number for each vertex."""
 
-    left: Any
+    left: Ints
     """Edges not processed yet."""
-    place: Any
+    place: Ints
     """1 + the bit of an open vertex in the table's index; 0 before it is opened, DONE after it is closed."""
-    near: Any
+    near: Ints
     """Whether the vertex or a neighbour is open."""
 
 
@@ -46,7 +47,7 @@ def new_work(vertices: int) -> Work:
 
 
 @njit
-def planned(graph: PairGraph, kept: Any, members: Any, most: int, steps: Any, work: Work) -> int:
+def planned(graph: PairGraph, kept: NDArray[np.bool_], members: Ints, most: int, steps: Ints, work: Work) -> int:
     """Plan the sweep over a cluster: fill steps (kind, vertex or edge, bit, second bit), return how many.
 
     -1 where more than `most` vertices would be open at a time.
@@ -92,7 +93,7 @@ def planned(graph: PairGraph, kept: Any, members: Any, most: int, steps: Any, wo
 
 
 @njit
-def _next_vertex(graph: PairGraph, kept: Any, members: Any, work: Work) -> int:
+def _next_vertex(graph: PairGraph, kept: NDArray[np.bool_], members: Ints, work: Work) -> int:
     """The vertex that leaves the fewest vertices open, preferably next to an open one; -1 if none is left."""
     left, place, near = work
     best, least = -1, np.iinfo(np.int64).max
@@ -118,7 +119,7 @@ def _next_vertex(graph: PairGraph, kept: Any, members: Any, work: Work) -> int:
 
 
 @njit
-def _opened(graph: PairGraph, v: int, width: int, steps: Any, count: int, work: Work) -> int:
+def _opened(graph: PairGraph, v: int, width: int, steps: Ints, count: int, work: Work) -> int:
     work.place[v] = width
     work.near[v] = 1
     for x in range(graph.ptr[v], graph.ptr[v + 1]):
@@ -129,7 +130,7 @@ def _opened(graph: PairGraph, v: int, width: int, steps: Any, count: int, work: 
 
 
 @njit
-def _closed(members: Any, v: int, steps: Any, count: int, work: Work) -> int:
+def _closed(members: Ints, v: int, steps: Ints, count: int, work: Work) -> int:
     bit = work.place[v]
     for u in members:
         if work.place[u] > bit:
@@ -140,7 +141,7 @@ def _closed(members: Any, v: int, steps: Any, count: int, work: Work) -> int:
 
 
 @search_njit
-def swept(steps: Any, weights: Floats, free: Floats, probability: Floats) -> None:
+def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats) -> None:
     """Do a planned sweep forwards and backwards: fill in the probabilities of its edges.
 
     Parameters
