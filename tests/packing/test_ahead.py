@@ -1,4 +1,4 @@
-"""Kernels compiled ahead: all that the search of a hard problem needs, by another process."""
+"""Kernels that another process compiles ahead: all that the search of a hard problem needs."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
 
 
 def test_what_is_compiled_is_looked_for_once(monkeypatch):
-    """To look takes longer than to solve most problems."""
+    """Searching the cache takes longer than solving most problems."""
     looked = []
     monkeypatch.setattr(ahead.interpreted, "may_use_processes", lambda: True)
     monkeypatch.setattr(ahead, "is_kept", lambda kernel: looked.append(kernel) or True)

@@ -77,7 +77,7 @@ def test_thousands_of_random_problems(number, with_dummies):
         for duals in (good, poor, arbitrary, good + 1e-3 * arbitrary):
             assert certified_bound(packing, duals) + prepared.offset <= optimum + slack
         tight += certified_bound(packing, good) + prepared.offset >= optimum - 1e-6
-    # on problems so small the linear relaxation is most often integral (of 300: 88 % and 74 % by HiGHS)
+    # the linear relaxation of such small problems is mostly integral (of 300: 88 % and 74 % by HiGHS)
     assert tight >= (0.8 if with_dummies else 0.6) * count
 
 
@@ -168,7 +168,7 @@ def test_the_sum_of_many_multipliers_is_a_bound_to_the_last_digit():
 
 
 def test_component_without_cover_is_unbounded():
-    """A measurement that must be used and is in no tuple: the bound says that there is no solution."""
+    """If a measurement that must be used is in no tuple, the bound shows that there is no solution."""
     problem = AssignmentProblem([[1, 1]], [1.0], [2, 2], dummy=False)
     packing = prepare(problem).packing
     assert np.isposinf(component_bounds(packing, np.zeros(packing.num_rows))).any()

@@ -44,7 +44,7 @@ def search_of(packing, incumbent=np.inf):
 
 
 def covers(packing, columns):
-    """Whether the columns are disjoint and cover every row that must be."""
+    """Whether the columns are disjoint and cover every row that must be covered."""
     used = packing.cols[columns]
     count = np.bincount(used[used >= 0], minlength=packing.num_rows)
     return count.max(initial=0) <= 1 and bool((packing.slack | (count == 1)).all())
@@ -111,7 +111,7 @@ def test_without_memory_for_its_tables_a_search_gives_up_its_root():
 
 
 def test_nodes_that_hold_nothing_better_need_no_room():
-    """They are closed where there is no room left for children, too, and not given up."""
+    """Nodes that can be pruned are closed even without room for children, not given up."""
     packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
     root = plain_root(packing, dual_bound(packing))
     stack = OpenNodes(root).arrays
@@ -133,7 +133,7 @@ def test_a_bound_that_is_no_number_drops_no_column():
 
 @pytest.mark.parametrize("granularity", [0.0, 1.0])
 def test_where_nothing_is_left_to_cover_nothing_is_chosen(granularity):
-    """Dives can end so: with whole-numbered weights they ended in a division by no rows."""
+    """Dives can end with such a packing; whole-numbered weights then caused a division by zero."""
     none = np.empty((0, 3), dtype=np.int32)
     packing = assemble(none, np.empty(0), np.ones(4, dtype=np.bool_), np.empty(0, dtype=np.int32), granularity)
     assert packing.num_rows == 0
@@ -145,7 +145,7 @@ def test_where_nothing_is_left_to_cover_nothing_is_chosen(granularity):
 
 @pytest.mark.slow
 def test_the_two_children_of_a_node_partition_its_solutions():
-    """Two rows of different sensors are together in one child, apart in the other: no solution is lost or twice."""
+    """Two rows of different sensors are together in one child, apart in the other: each solution is in one of them."""
     for problem, _ in feasible(30, 75):
         prepared = prepare(problem)
         packing = prepared.packing
@@ -171,7 +171,7 @@ def test_the_two_children_of_a_node_partition_its_solutions():
                 set(solution) <= columns and must_be_covered(packing, stack.slack[t], solution)
                 for t, columns in enumerate(children)
             ]
-            # both alone, or apart in two columns: apart
+            # both uncovered, or in two columns: apart
             assert inside == [not together, together]
 
 
@@ -188,7 +188,7 @@ def relaxed(packing):
 
 
 def test_a_verdict_on_a_pair_is_true():
-    """Pairs are in doubt by the LP's values; where one side is ruled out, no solution below the cutoff is on it."""
+    """Pairs are fractional by the LP's values; an excluded side has no solution below the cutoff."""
     rng = np.random.default_rng(77)
     verdicts, asked = 0, 0
     for _ in range(60):
@@ -277,10 +277,10 @@ def test_first_solution_is_one_or_there_is_none():
 
 
 def test_search_for_a_first_solution_ends(monkeypatch):
-    """Without dummies even a first solution is hard to find: heuristics do not search for ever, and say so."""
+    """Without dummies even a first solution is hard to find: heuristics give up, and say so."""
     rng = np.random.default_rng(1)
     planted = np.stack([rng.permutation(14) + 1 for _ in range(4)], axis=1)
-    # so many that dives in the linear program end without a solution, too
+    # enough tuples that dives in the linear program end without a solution, too
     tuples = np.unique(np.vstack([planted, rng.integers(1, 15, (160, 4))]), axis=0)
     problem = AssignmentProblem(tuples, rng.random(len(tuples)), [14] * 4, dummy=False)
     assert assign(problem, "genetic", iterations=5).cost > 0.0

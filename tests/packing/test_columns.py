@@ -1,4 +1,4 @@
-"""What kernels ask of one column."""
+"""Queries on one column."""
 
 import numpy as np
 

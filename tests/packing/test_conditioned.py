@@ -50,7 +50,7 @@ def test_answers_and_ranks_are_those_of_exact_arithmetic(sizes, dummy, change):
 
 
 def test_ranks_are_optimal_only_where_they_are():
-    """Beside 1e100 a reduced cost of -1 was taken for rounding, and -2, -1, 0 called optimal."""
+    """With a cost of 1e100, a reduced cost of -1 counted as rounding, and costs of -2, -1, 0 as optimal."""
     tuples = [[2, 2, 1], [1, 2, 1], [3, 2, 1], [3, 1, 1], [2, 1, 1], [1, 1, 1]]
     problem = assoc.AssignmentProblem(tuples, [-1.0, -1.0, -2.0, 1.0, 0.0, 1e100], [3, 2, 1], dummy=False)
     # without the conditioning

@@ -1,4 +1,4 @@
-"""The root split on counts: its parts hold all solutions, and their bounds hold."""
+"""The root split on counts: its parts have all solutions, and their bounds are valid."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def solutions(packing):
             choose(row + 1, taken, columns)
         for j in packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]:
             rows = packing.cols[j][packing.cols[j] >= 0]
-            # the rows before are taken or left uncovered
+            # earlier rows are covered or left uncovered
             if (rows >= row).all() and not taken[rows].any():
                 now = taken.copy()
                 now[rows] = True
@@ -54,7 +54,7 @@ def solutions(packing):
 
 
 def inside(leaf, size, used):
-    """Which solutions are of this part; ``used``: what columns each has, shape (solutions, N)."""
+    """Mask of the solutions in this part; ``used``: mask of the columns of each, shape (solutions, N)."""
     program = leaf.root.program
     half = (program.sides.size - size) // 2
     times = np.zeros((used.shape[1], program.sides.size))
@@ -117,7 +117,7 @@ def test_a_search_of_parts_ends_at_the_optimum(always, rigid):
 
 
 def test_bounds_of_parts_hold_and_rise(always):
-    """Looked at after every node, from incumbents near and far, with cuts."""
+    """Checked after every node, from incumbents near and far, with cuts."""
     made = 0
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
@@ -204,7 +204,7 @@ def test_what_a_pass_has_not_searched_yet_bounds_the_whole(always):
 
 
 def test_a_long_first_pass_is_split_before_it_ends(monkeypatch):
-    """From a poor incumbent the first aim is so far off that its pass alone would take hundreds of nodes."""
+    """From a poor incumbent the first aim is so high that its pass alone would take hundreds of nodes."""
     packing, duals, bound = ghosts(20, 4048)
     nodes = []
     for hard in (10**9, search._HARD):

@@ -62,7 +62,7 @@ def test_the_least_bound_of_the_parts_bounds_the_whole(packing):
 
 @pytest.mark.parametrize("packing", [26], indirect=True)
 def test_a_pass_is_split_in_its_middle(packing):
-    """After one node, when others are open; what has been shown of them stays."""
+    """Split after one node, with others open: the bound proved so far stays."""
     one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True)
     one.run(1)
     assert one._open.count and not one._leaves
@@ -97,7 +97,7 @@ def test_time_that_ends_while_parts_are_solved_again_leaves_those_of_before(pack
     part = counts._Counted.part
 
     def spy(self, ranges, start=None):
-        # the first part of a program with the rows of some counts alone
+        # the first part of a program with only some counts
         over.append(start is None and bool(over))
         return part(self, ranges, start)
 

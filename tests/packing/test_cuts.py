@@ -120,7 +120,7 @@ def test_only_better_solutions_are_looked_for_with_cuts():
 
 
 def test_passes_need_no_good_incumbent(monkeypatch):
-    """A search to the end from a poor incumbent does little more than one from the optimum."""
+    """A search to the end from a poor incumbent takes few nodes more than one from the optimum."""
 
     def searched(incumbent):
         search = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)

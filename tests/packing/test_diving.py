@@ -42,7 +42,7 @@ def priced():
 
 @pytest.fixture
 def plain(priced, monkeypatch):
-    """Its diver, without cuts: programs of the packing alone are easily made anew."""
+    """Its diver, without cuts: programs of the packing alone are easily rebuilt."""
     monkeypatch.setattr(diving, "root_with_cuts", lambda packing, duals, *_: plain_root(packing, duals))
     return Diver(priced, NONE, np.inf)
 
@@ -58,11 +58,11 @@ def dive(one, seed=0, *, trail=None, strictness=4.0, cutoff=np.inf):
 
 
 def test_dives_are_near_the_bound(priced):
-    """Alone, without any local search, they leave a fraction of what greedy covers leave."""
+    """Without local search, their gaps are a fraction of those of greedy covers."""
     assert Diver.pays(priced.packing)
     left = [dive(priced, seed)[1] - priced.bound for seed in range(8)]
     assert min(left) >= -1e-9
-    # what is left to branch and bound at first is most of so small a component
+    # the share first left to branch and bound is most of such a small component
     assert Diver(priced, NONE, np.inf).share * priced.packing.num_rows >= 39.0
     rng = np.random.default_rng(0)
     greedy = [priced.weight_of(priced.random_cover(8.0, rng)) - priced.bound for _ in range(20)]
@@ -70,7 +70,7 @@ def test_dives_are_near_the_bound(priced):
 
 
 def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
-    """Column after column: what was drawn stays whole in all programs that follow."""
+    """Drawn columns keep the value 1 in all later programs."""
     diver = plain
     solve, masks = diver._program.solve, []
 
@@ -84,7 +84,7 @@ def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
     assert masks
     core = diver._core
     for columns, slack, relaxed in masks:
-        # rows that may no longer stay uncovered have one column each, and the program takes all of it
+        # rows that may no longer stay uncovered have one column each, at the value 1
         for r in np.flatnonzero(~slack):
             (left,) = [j for j in np.flatnonzero(columns) if r in core.cols[j]]
             if relaxed.status == 0:
@@ -98,7 +98,7 @@ def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     diver = plain
     core, primal = diver._core, diver._relaxed.primal
     open_columns = np.flatnonzero((primal > 1e-6) & (primal < 1.0 - 1e-6))
-    # halves all of them in this program: other values tell more
+    # all values are 1/2 in this program: others test more
     primal[open_columns] = np.linspace(0.1, 0.9, open_columns.size)
     trail = np.random.default_rng(3).uniform(0.05, 1.0, priced.packing.num_columns)
     expected = trail[core.origin[open_columns]] * primal[open_columns] ** 2.0
@@ -124,7 +124,7 @@ def test_pheromone_and_values_decide(priced, plain, monkeypatch):
 
 
 def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
-    """As soon as nothing better can follow; what it has then is a cover still."""
+    """It stops as soon as nothing better can follow, with a valid cover."""
     steps = []
     for cutoff in (np.inf, priced.bound + 1e-6):
         diver = Diver(priced, NONE, np.inf)
@@ -152,7 +152,7 @@ def test_dives_begin_in_a_program_with_cuts(priced, plain):
 
 
 def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced, monkeypatch):
-    """Where it held none, dives would find none."""
+    """If it had none, dives would find none."""
     monkeypatch.setattr(diving, "_CORE", 2)
     owner = priced.random_cover(1.0, np.random.default_rng(0))
     assert priced.is_complete(owner)
@@ -164,7 +164,7 @@ def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced, monkeypa
 
 
 def test_the_core_is_what_the_program_with_cuts_would_take(monkeypatch):
-    """As chosen by the multipliers without cuts it lacks the optimum; in the end no column is missing."""
+    """Chosen by the multipliers without cuts it lacks the optimum; in the end no column is missing."""
     problem, optimum = axial_known_optimum(14, 1)
     one = component(problem, "full")
     one.sharpen(Run(0))
@@ -188,7 +188,7 @@ def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
         diver.share = share
         diver.dive(np.ones(priced.packing.num_columns), 4.0, rng, np.inf, np.inf)
         tried.append(int(known.tried.sum()))
-    # what one has tried often enough no other one tries
+    # a pair tried often enough by one search is not tried by another
     assert 0 < tried[0] <= tried[1] <= tried[-1] and known.tried.max() <= 2
 
 
@@ -206,7 +206,7 @@ def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
 
 
 def test_the_colony_dives(monkeypatch):
-    """So many divers a cycle, of several strictnesses; none where none is asked for."""
+    """The number of divers in a cycle, of several strictnesses; also zero."""
     called = []
     original = Diver.dive
     monkeypatch.setattr(diving, "_LEAST", 5)
@@ -227,7 +227,7 @@ def test_the_colony_dives(monkeypatch):
 
 @pytest.mark.parametrize("searcher", [Breeding, TabuSearch])
 def test_others_dive_once_an_iteration(searcher, monkeypatch):
-    """Beside what a search begins with."""
+    """In addition to the covers with which a search begins."""
     called = []
     monkeypatch.setattr(diving, "_LEAST", 5)
     original = Component.dive
@@ -249,7 +249,7 @@ def test_others_dive_once_an_iteration(searcher, monkeypatch):
 
 
 def test_columns_are_fixed_in_their_order(plain):
-    """Those that fit, until they cover enough rows; the program is then that of what is left."""
+    """Columns that fit are fixed until they cover enough rows; the program is then that of the rest."""
     diver = plain
     root, core = diver._relaxed, diver._core
     drawn = np.random.default_rng(0).permutation(_Descent(core, diver._program, root, np.inf).open_columns())
@@ -273,7 +273,7 @@ def test_columns_are_fixed_in_their_order(plain):
 
 
 def test_what_leaves_nothing_better_is_not_fixed(plain):
-    """Then all is as it was before, the basis too."""
+    """Then everything is restored, including the basis."""
     diver = plain
     root, core = diver._relaxed, diver._core
     fixed = refused = 0
@@ -300,7 +300,7 @@ def test_what_leaves_nothing_better_is_not_fixed(plain):
 
 
 def test_the_rest_is_covered_as_well_as_can_be(priced):
-    """Beside what is fixed: the optimum by scipy's MILP; and nothing more where that is not below the cutoff."""
+    """The completion of the fixed columns is optimal by scipy's MILP; empty if that is not below the cutoff."""
     diver = Diver(priced, NONE, np.inf)
     core = diver._core
     for cutoff in (np.inf, -1.0):
@@ -358,13 +358,13 @@ def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced
             shares.append(diver.share)
         assert (np.diff(shares) >= 0.0).all() if done else (np.diff(shares) <= 0.0).all()
         assert shares[-1] == limit
-    # and it is what is left open
+    # and they are the open rows
     assert max(open_rows) > 0.8 * diver._core.num_rows
     assert np.mean(open_rows[-20:]) < np.mean(open_rows[40:60]) - 5.0
 
 
 def _left(core, j):
-    """Columns that are left when one is fixed."""
+    """Columns that remain when one is fixed."""
     rows = set(core.cols[j][core.cols[j] >= 0].tolist())
     return np.array([k == j or not rows & set(core.cols[k].tolist()) for k in range(core.num_columns)])
 

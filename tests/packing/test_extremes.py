@@ -1,4 +1,4 @@
-"""The smallest and the largest of numbers that are not negative, against numpy."""
+"""The smallest and the largest of non-negative numbers, against numpy."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from assoc.packing.kernels.extremes import place_of_largest, place_of_smallest
 
 @njit
 def both(bits, count):
-    """Inner kernels are called by kernels."""
+    """Only kernels call inner kernels."""
     return place_of_smallest(bits, count), place_of_largest(bits, count)
 
 

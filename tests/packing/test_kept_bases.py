@@ -46,7 +46,7 @@ def test_what_is_taken_back_is_the_basis_that_was_kept():
         keep_basis(kept, basis)
         other = new_basis(program)
         other.variable[:] = basis.variable
-        # with twice as much to cover the values are others, and all else is the same
+        # doubled right-hand sides change the values and nothing else
         for factor in (1.0, 2.0):
             changed = program._replace(sides=factor * program.sides)
             other.inverse[:] = other.norms[:] = other.values[:] = np.nan
@@ -83,7 +83,7 @@ def test_the_oldest_makes_room_and_what_came_later_is_done():
     assert not take_kept(kept, root.program, basis, False)
     basis.variable[:] = np.roll(first, 3)
     assert take_kept(kept, root.program, basis, False)
-    # the next one takes its place, and not that of the oldest
+    # the next one replaces it, and not the oldest
     basis.variable[:] = np.roll(first, -1)
     keep_basis(kept, basis)
     basis.variable[:] = np.roll(first, 1)
@@ -110,7 +110,7 @@ def test_the_other_side_of_a_branching_starts_from_its_basis():
         assert (work.basis.variable != at_first).any()
         work.kept.age[work.kept.latest[0]] = 7
         open_node(work, stack, 0, -1)
-        # computed anew it would be 0
+        # recomputed, it would be 0
         assert work.basis.age[0] == 7
         np.testing.assert_array_equal(work.basis.variable, at_first)
         assert_basis(root.program, work.basis)
@@ -128,7 +128,7 @@ def test_a_search_that_goes_on_at_the_first_side_keeps_the_basis_of_the_other_on
     pairs = [cols[cols >= 0][:2] for cols in packing.cols]
     branch(work, stack, 0, num, tuple(pairs[0]), False, -np.inf)
     work.kept.age[work.kept.latest[0]] = 7
-    # as after a stop: no basis is at work
+    # as after a stop: no basis is loaded
     num = open_node(work, stack, 1, -1)
     assert work.basis.age[0] == 7
     relax(work, num, np.inf, np.inf)
@@ -162,6 +162,6 @@ def test_the_memory_that_is_asked_for_is_enough():
             return sum(one.nbytes if isinstance(one, np.ndarray) else bytes_of(one) for one in record)
 
         taken = sum(bytes_of(record) for record in (work.kept, work.trials, work.basis, work.node))
-        # what grows with the rows alone is not counted, and little
+        # memory that grows only with the rows is small and not counted
         asked = work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
         assert taken <= asked + 1000.0 * packing.num_rows

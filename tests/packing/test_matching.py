@@ -17,7 +17,7 @@ def _sparse(matrix, keep):
 
 
 def _expected(matrix, keep, row_slack, column_slack):
-    """Solve by scipy: every row and column gets a private partner for staying alone."""
+    """Solve by scipy: every row and column gets a private partner for staying unmatched."""
     n, m = matrix.shape
     far = 1e7
     big = np.full((n + m, n + m), far)

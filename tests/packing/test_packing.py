@@ -1,4 +1,4 @@
-"""Packings against a plain reading of the problem: columns, weights, components, and the way back."""
+"""Packings against a plain reading of the problem: columns, weights, components, and converting back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Passes of a branch and bound that is meant to go to the end: what they say of the optimum on the way."""
+"""Passes of a branch and bound to the end: their bounds and incumbents on the way."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def optimum(packing, duals, tolerance):
 
 
 def test_bounds_of_passes_hold_and_rise():
-    """From poor incumbents, looked at after every node: never a bound above the optimum, and never one that falls."""
+    """From poor incumbents, checked after every node: the bound is never above the optimum, and never falls."""
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
         best = optimum(packing, duals, 1e-9 * abs(bound))
@@ -67,7 +67,7 @@ def test_passes_over_whole_numbers_end_at_the_optimum_itself():
 
 
 def test_a_gap_of_few_roundings_is_closed():
-    """A share of it is no step: the next aim is the old one, and the same pass would be made again for ever."""
+    """A share of such a gap rounds to 0: the aim would stay the same, and the same pass be repeated for ever."""
     tuples = [
         [2, 1, 2, 2, 1], [1, 2, 1, 2, 2], [2, 2, 2, 2, 1], [1, 2, 2, 2, 1], [2, 1, 1, 2, 2], [2, 1, 1, 1, 1],
         [2, 1, 1, 2, 1], [2, 1, 2, 1, 1], [1, 1, 2, 2, 1], [1, 1, 2, 1, 2], [1, 1, 2, 1, 1],
@@ -77,7 +77,7 @@ def test_a_gap_of_few_roundings_is_closed():
         0.00021004083834822964, -4.708665738726913e-10, 15277910879.285505, -6.606517070637708e-11, -3378.50670718536,
         -4.4795837356531726e-09,
     ]  # fmt: skip
-    # as it stands in a tensor: the order of columns decides what rounding leaves
+    # in the order of a tensor: the order of columns decides how sums are rounded
     problem = AssignmentProblem.from_dense(
         AssignmentProblem(tuples, costs, [2] * 5, dummy=False).to_dense(), dummy=False
     )

@@ -1,4 +1,4 @@
-"""What is left of a program with columns fixed, against HiGHS on all of it."""
+"""The remainder of a program with columns fixed, against HiGHS on the whole program."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def with_cuts_at_work():
 @pytest.mark.parametrize("cuts", [with_random_cuts, with_cuts_at_work])
 @pytest.mark.parametrize("share", [1.0, 0.7])
 def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
-    """No exchange is made, as the whole was solved for this."""
+    """No pivot is made, as the whole program was solved for these columns."""
     rng, solvable, smaller, taken = np.random.default_rng(17), 0, 0, 0
     for packing, program, basis, allowed in cuts():
         columns = rng.random(packing.num_columns) < share
-        # those that the program takes most of first: they leave a solution
+        # columns of large LP value first: a solution remains
         order = np.argsort(-relaxed_values(program, basis) - rng.random(packing.num_columns))
         fixed, covered = [], np.zeros(packing.num_rows + 1, dtype=bool)
         for j in order[columns[order]]:
@@ -87,7 +87,7 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
         status, exchanges = solve_dual(rest.program, all_of_it, begin, effort)
         assert status == OPTIMAL and exchanges == 0
         assert bound_of(rest.program, begin) + program.weights[fixed].sum() == pytest.approx(least, abs=1e-8)
-        # cuts that still bind, of which fixed columns have taken a part
+        # cuts that still bind, partly used by fixed columns
         cut = rest.rows >= packing.num_rows
         part_taken = rest.program.sides[cut] < program.sides[rest.rows[cut]]
         taken += int((part_taken & (begin.duals[cut] < -1e-6)).sum())
@@ -95,7 +95,7 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
 
 
 def relaxed_values(program, basis):
-    """What a basis takes of each column."""
+    """The value of each column in a basis."""
     values = np.zeros(program.weights.size)
     inside = basis.place >= 0
     values[inside] = basis.values[basis.place[inside]]
@@ -103,7 +103,7 @@ def relaxed_values(program, basis):
 
 
 def test_columns_that_do_not_fit_leave_nothing():
-    """Two columns of one measurement, or one that takes of a row more than it allows."""
+    """Two columns of one measurement, or one that exceeds the right-hand side of a row."""
     none = np.zeros(0, dtype=np.int64)
     for packing in packings(2, 19):
         program = program_with_cuts(packing, np.random.default_rng(0))
@@ -125,7 +125,7 @@ def test_nothing_left_is_a_program_without_rows():
         none = np.zeros(0, dtype=np.int64)
         rest = remainder_of(program, basis, none, none, np.ones_like(allowed.slack))
         assert rest.program.sides.size == rest.variable.size == rest.rows.size == 0
-        # rows that must be covered stay: nothing can
+        # rows that must be covered stay, although no column can cover them
         rest = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
         assert rest.rows.size == program.sides.size and rest.variable.size == rest.rows.size
 
@@ -134,7 +134,7 @@ def test_where_no_variable_of_a_basis_is_left_it_begins_with_anchors():
     for packing in packings(2, 20):
         program = program_with_cuts(packing, np.random.default_rng(0))
         basis, allowed = solved(packing, program)
-        # the first column in every place, and it is not of the rest
+        # the first column at every position, and it is not in the remainder
         alone = basis._replace(variable=np.zeros_like(basis.variable))
         rest = remainder_of(program, alone, np.zeros(0, np.int64), np.arange(1, packing.num_columns), allowed.slack)
         begin = basis_of(rest.program, all_allowed(rest.program, rest.slack), rest.variable, rest.duals)

@@ -1,4 +1,4 @@
-"""What all metaheuristics share: limits, what is kept, and how much is refined."""
+"""Common to all metaheuristics: limits, the best covers, and refinement."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Idle:
 
 @pytest.fixture
 def unproven(monkeypatch):
-    """Nothing is proven by branch and bound: it is not what is tested, and slow without a compiler."""
+    """Without proofs by branch and bound: they are not tested here, and slow without a compiler."""
     monkeypatch.setattr(search, "close", lambda component, run: None)
 
 
@@ -81,7 +81,7 @@ def test_the_best_cover_is_refined_by_refinement_full_alone(unproven):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_branch_and_bound_beside_a_metaheuristic_finds_and_proves(workers, ghosts):
-    """A searcher that does nothing: what is found comes from branch and bound, and is proved to be the best."""
+    """With a searcher that does nothing the solution comes from branch and bound, and is proved optimal."""
     one, optimum = ghosts
     one.refinement = "full"
     assert one.weight > optimum + 0.1 and not one.closed
@@ -113,7 +113,7 @@ def test_what_is_worse_or_incomplete_is_not_kept():
 
 
 def test_a_cover_that_is_kept_weighs_what_its_columns_do():
-    """Whatever moves have made of the weight by adding up what they change."""
+    """Even if moves have accumulated rounding errors in it."""
     one = component(PROBLEM, "none")
     owner = one.random_cover(1.0, np.random.default_rng(0))
     assert one.offer(owner, one.weight_of(owner) + 1e-7) and one.weight == one.weight_of(owner)
@@ -121,7 +121,7 @@ def test_a_cover_that_is_kept_weighs_what_its_columns_do():
 
 @pytest.mark.parametrize("name", ["mixed", "four"])
 def test_how_much_new_covers_are_improved(name):
-    """none: not at all; local: halves are matched anew; full: exact sub-steps, too."""
+    """none: not at all; local: halves are re-matched; full: exact sub-steps, too."""
     weights = {}
     for refinement in ("none", "local", "full"):
         one = component(problems()[name], refinement)
@@ -141,7 +141,7 @@ def test_how_much_new_covers_are_improved(name):
 
 
 class Lucky:
-    """A searcher that offers a cover that is given, once."""
+    """A searcher that offers a given cover, once."""
 
     def __init__(self, cover, worker):
         self.cover, self.worker = cover, worker
@@ -183,7 +183,7 @@ def test_workers_exchange_their_best(lucky):
 
 
 def test_workers_refine_covers_of_their_own():
-    """In place and at the same time: one array for all would be spoiled."""
+    """Covers are refined in place and in parallel: a shared array would be spoiled."""
     one = component(PROBLEM, "full")
     one.offer_greedy()
     seen = []
@@ -201,7 +201,7 @@ def test_workers_refine_covers_of_their_own():
 
 @sample("solver", ["aco", "genetic", "tabu"], every=3)
 def test_the_same_seed_and_workers_give_the_same_search(solver, unproven):
-    """To the last bit, whichever thread was quicker."""
+    """To the last bit, whatever the timing of threads."""
     found = []
     problem = gated_problem(np.random.default_rng(3), (14, 14, 13), 0.3, "mixed")
     for workers in (1, 2, 2, 3):
@@ -214,16 +214,16 @@ def test_the_same_seed_and_workers_give_the_same_search(solver, unproven):
 
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
 def test_small_components_are_bounded_before_they_are_searched(solver):
-    # any two of these share a measurement: the linear program takes half of each, and bounds by 3 where 2 is all
+    # any two of these share a measurement: the linear program takes half of each, with the bound 3 for an optimum of 2
     problem = assoc.AssignmentProblem([[1, 1, 0], [1, 0, 1], [0, 1, 1]], [-2.0, -2.0, -2.0], [1, 1, 1])
     solution = assoc.assign(problem, solver)
     assert (solution.cost, solution.status) == (-2.0, "optimal") and solution.lower_bound == pytest.approx(-2.0)
-    # the first cover and one iteration: without the proof it would search on until its patience is over
+    # the first cover and one iteration: without the proof the search would continue until its patience ends
     assert solution.iterations == 2
 
 
 def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeypatch):
-    """Where its cover is better by less than the tolerance, too: nothing else would ever be found or proved."""
+    """Even if its cover is better by less than the tolerance: no other would ever be found or proved."""
     one, _ = ghosts
     one.refinement = "full"
     weight = one.weight
@@ -248,7 +248,7 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
 
 
 def test_what_is_proved_stays_when_columns_go(ghosts):
-    """Where the component falls apart the best covers of the others tell what is proved of a part."""
+    """If the component splits, the best covers of the other parts give the bound of a part."""
     one, optimum = ghosts
     one.proven = one.bound + 0.5 * (optimum - one.bound)
     (smaller,) = split_component(one, share=1.0)
@@ -269,7 +269,7 @@ def _optimal_columns(one):
 
 @pytest.mark.parametrize("columns, most", [(30, 50), (5_000, 4), (10**6, 1)])
 def test_few_nodes_at_a_time_where_each_takes_long(columns, most, ghosts, monkeypatch):
-    """Kernels do not hear Ctrl-C."""
+    """Ctrl-C does not interrupt kernels."""
     one, _ = ghosts
     asked = []
 
@@ -311,7 +311,7 @@ def test_a_seed_is_not_used_up(solver, unproven):
 
 @pytest.mark.parametrize("refinement", ["none", "full"])
 def test_weights_that_are_all_alike_have_a_size(refinement):
-    """A temperature of next to nothing would leave nothing to pheromone and chance."""
+    """At a temperature near 0, pheromone and chance would have no influence."""
     grid = np.stack(np.meshgrid(*[np.arange(1, 5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     keep = np.random.default_rng(2).random(len(grid)) < 0.3
     one = component(assoc.AssignmentProblem(grid[keep], np.full(keep.sum(), -1e5), [4, 4, 4]), refinement)

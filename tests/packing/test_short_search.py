@@ -62,7 +62,7 @@ def best_of(packing, part):
 
 
 def test_what_is_found_is_the_best_of_its_part():
-    """And nothing, where that is not below the cutoff."""
+    """And empty, if that is not below the cutoff."""
     rng = np.random.default_rng(3)
     feasible = 0
     for packing in packings(12, 41):
@@ -106,7 +106,7 @@ def test_it_searches_what_is_left_alone(monkeypatch):
 
 
 def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
-    """Its root needs no exchange: the bound is that of the whole with what is fixed."""
+    """Its root needs no pivot: its bound plus the fixed columns' weight is the whole program's bound."""
     rng, roots, open_nodes, warm = np.random.default_rng(6), [], short_search.OpenNodes, 0
     monkeypatch.setattr(short_search, "OpenNodes", lambda root: roots.append(root) or open_nodes(root))
     for packing in packings(6, 45):
@@ -125,7 +125,7 @@ def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
 
 
 def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():
-    """By the numbers of the packing's own rows, wherever they are in what is left."""
+    """By the packing's row numbers, not those of the remainder."""
     rng, learnt = np.random.default_rng(7), 0
     for packing in packings(10, 43):
         linear, lessons = begun(packing), no_lessons(packing)
@@ -139,7 +139,7 @@ def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():
         linear.solve(columns=part.columns, slack=part.slack)
         search_shortly(packing, linear, part, np.inf, NO_LIMITS._replace(nodes=0), lessons)
         assert (lessons.gain == gain).all() and (lessons.tried == tried).all()
-        # pairs of rows that are gone stay as they were; others are added to where they belong
+        # pairs of removed rows stay unchanged; others are updated at the packing's row numbers
         fresh = no_lessons(packing)
         search_shortly(packing, linear, part, np.inf, NO_LIMITS, fresh)
         _, first, second = np.nonzero(fresh.tried)

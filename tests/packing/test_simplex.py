@@ -1,4 +1,4 @@
-"""The dual simplex method against HiGHS, and what holds when it is stopped, cut off or started anywhere."""
+"""The dual simplex method against HiGHS; its bounds when it is stopped, cut off or started anywhere."""
 
 import time
 
@@ -90,7 +90,7 @@ def test_the_bound_is_that_of_highs(count):
 
 @few_or_all("count", 20, 150)
 def test_warm_from_the_basis_at_hand(count):
-    """Columns masked and rows made duties, step by step as a dive or a branching does; and back again."""
+    """Columns are masked and rows lose their slack, step by step as in a dive or a branching, and back again."""
     rng = np.random.default_rng(82)
     warm, cold, none = 0, 0, 0
     for number in range(count):
@@ -110,7 +110,7 @@ def test_warm_from_the_basis_at_hand(count):
             cold += LinearProgram(packing).solve(columns=columns, slack=slack).exchanges
             if expected == np.inf:
                 break
-        # what was masked is allowed again: the basis at hand is not optimal, nor are its multipliers feasible
+        # masked columns are allowed again: the basis is no longer optimal, nor are its multipliers feasible
         assert close(packing, program.solve().bound, first.bound)
         program.back()
         again = program.solve()
@@ -119,7 +119,7 @@ def test_warm_from_the_basis_at_hand(count):
 
 
 def test_norms_that_are_no_lengths_hide_nothing():
-    """What rounding could make of the norms costs steps; an optimum that is none it must not give."""
+    """Norms spoilt by rounding may cost steps, but must not lead to a false optimum."""
     rng = np.random.default_rng(85)
     for spoiled in (np.nan, np.inf, 0.0):
         for number in range(10):
@@ -141,7 +141,7 @@ def test_norms_that_are_no_lengths_hide_nothing():
 
 @few_or_all("count", 25, 1000)
 def test_dives_end_nowhere_else_than_at_an_optimum(count):
-    """Chains of hundreds of short calls on one basis: what is called optimal is feasible and as light as its bound."""
+    """Chains of hundreds of short calls on one basis: optimal solutions are feasible and weigh their bound."""
     rng = np.random.default_rng(86)
     solves = 0
     for number in range(count):
@@ -210,7 +210,7 @@ def test_no_solution():
     masked = np.array([True, True, False])
     relaxed = LinearProgram(packing).solve(columns=masked)
     assert relaxed.status == INFEASIBLE and relaxed.bound == np.inf
-    # what the search has is at least what it asked for
+    # the bound is at least the cutoff
     assert LinearProgram(packing).solve(columns=masked, cutoff=100.0).bound >= 100.0
 
 
@@ -251,7 +251,7 @@ def test_a_row_with_a_side_and_a_coefficient_of_two():
 
 
 def test_an_inverse_is_computed_anew():
-    """Rounding that has gathered is gone, and a basis of dependent columns gets anchors in their place."""
+    """It removes accumulated rounding errors, and replaces dependent columns by anchors."""
     rng = np.random.default_rng(86)
     packing = prepare(axial_problem(rng, (9, 9, 9), 1.0, "positive")).packing
     program = program_of(packing.arrays)

@@ -1,4 +1,4 @@
-"""Workers with everything at work: dives, exact sub-steps, and branch and bound beside them."""
+"""Workers with everything switched on: dives, exact sub-steps, and branch and bound."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.sizes import sample
 
 @sample("solver", ["aco", "genetic", "tabu"], every=3)
 def test_the_same_seed_and_workers_give_the_same_search(solver):
-    """To the last bit, whichever thread was quicker."""
+    """To the last bit, whatever the timing of threads."""
     problem = assoc.build_problem(simulate("bearing-only", seed=12, targets=24, scans=1), 0)
     found = []
     for _ in range(2):

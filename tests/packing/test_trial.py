@@ -1,4 +1,4 @@
-"""Trials from a basis that stays as it is, and columns laid out for pricing, against programs solved from scratch."""
+"""Trials from an unchanged basis, and columns laid out for pricing, against programs solved from scratch."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def packings(count, seed):
 
 
 def solved(packing, program):
-    """An optimal basis of the program and what is allowed there."""
+    """An optimal basis of the program, and what it allows."""
     allowed = all_allowed(
         program, np.concatenate([packing.slack, np.ones(program.sides.size - packing.num_rows, bool)])
     )
@@ -108,7 +108,7 @@ def test_a_trial_ends_at_the_optimum_of_what_is_left():
                 assert status == INFEASIBLE and reached >= cutoff - room
             elif end == CUT:
                 assert status == INFEASIBLE or cutoff <= reached <= best + room
-            # whatever the end, its multipliers are feasible
+            # whatever the status, its multipliers are feasible
             found = trial.basis.duals.copy()
             make_feasible(program, side, found)
             assert certified(program, side, found) >= min(reached, limit) - 10 * room
@@ -132,6 +132,6 @@ def test_a_trial_stops_after_its_exchanges():
             end = try_dual(program, side, base, trial, Effort(weight_limit(program), most, np.inf))
             stopped += end == STOPPED
             bounds.append(bound_of(program, trial.basis))
-        # uphill all the way, and no farther than there is room
+        # the bound never falls, and there are no more pivots than the trial has room for
         assert bounds[0] <= bounds[1] + 1e-9 and bounds[1] <= bounds[2] + 1e-9 and bounds[2] == bounds[3]
     assert stopped > 20

@@ -1,4 +1,4 @@
-"""Proofs: what is written proves the optimum, the checker accepts it, and refuses what was spoiled."""
+"""Proofs: they prove the optimum; the checker accepts them and refuses spoiled ones."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def branched() -> assoc.AssignmentProblem:
 
 
 def run_alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """The checker as others use it: the file alone, without the package, isolated from it."""
+    """The checker as others use it: only the file, isolated from the package."""
     command = [sys.executable, "-I", "-S", str(ALONE), *words]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=60)
 
@@ -143,7 +143,7 @@ def test_text_form_keeps_every_cost(tmp_path):
 
 
 def test_the_bound_is_that_of_fractions():
-    """The checker's leaf in other words: multipliers made feasible with fractions give the same bound."""
+    """An independent version of the checker's leaf: multipliers made feasible with fractions give the same bound."""
     problem = odd_cycle()
     packing = prepare(problem).packing
     u = LinearProgram(packing).solve().duals.tolist()
@@ -159,7 +159,7 @@ def test_the_bound_is_that_of_fractions():
 
 @pytest.fixture(scope="module")
 def valid(tmp_path_factory):
-    """A proof with two stages, and a tree with a cut, beside components that need none."""
+    """A proof with two stages, a tree with a cut, and components that need no tree."""
     problem = branched()
     path = tmp_path_factory.mktemp("proof") / "proof.json"
     assert write_proof(path, problem, assoc.assign(problem)) == -20.04 == float(exact_optimum(problem))
@@ -265,7 +265,7 @@ def test_spoiled_proofs_are_refused(valid, how):
 
 
 def test_no_multipliers_prove_more_than_the_optimum(valid):
-    """Nor do wrong targets and cuts: whatever a proof says that the checker accepts is true."""
+    """Nor do wrong targets and cuts: every claim that the checker accepts is true."""
     problem, proof = valid
     rng = np.random.default_rng(0)
     worse = check.number("-19.9")
@@ -283,7 +283,7 @@ def test_no_multipliers_prove_more_than_the_optimum(valid):
             size = rng.choice([1, 3, 5, 7])
             tree["cuts"] = [[tree["rows"][i] for i in rng.permutation(len(tree["rows"]))[:size]]]
         text = json.loads(json.dumps(other), parse_float=str, parse_int=str)
-        # as the proof of a worse solution, whose target leaves it more room
+        # as the proof of a worse solution, with a higher target
         for target in (check.number("-20.04"), worse):
             try:
                 bound = check.proved(problem, text, target)
@@ -323,14 +323,14 @@ def test_problems_that_cannot_be_read(tmp_path, text, reason):
     assert done.stderr.count("\n") <= 1 and "Traceback" not in done.stderr
     if reason:
         assert done.returncode == 2 and done.stderr.startswith("p.txt: ") and reason in done.stderr
-        # singletons that are not listed the package fills in itself
+        # the package adds singletons that are not listed
         if "tuple of its own" not in reason:
             with pytest.raises((InvalidInputError, LimitExceededError)):
                 assoc.AssignmentProblem.load(tmp_path / "p.txt")
 
 
 def test_costs_of_many_decimals(tmp_path):
-    """As many as the checker reads make a proof; more are refused in one line."""
+    """Costs with the most decimals that the checker reads make a proof; more are refused in one line."""
     for cost in (-3e-40, -7e-47, -1e-59):
         problem = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [cost] * 3, [1, 1, 1])
         write_proof(tmp_path / "proof.json", problem, assoc.assign(problem))
@@ -342,13 +342,13 @@ def test_costs_of_many_decimals(tmp_path):
 
 
 def test_chosen_tuples_that_cost_no_less_than_false_alarms(tmp_path):
-    """They are no columns, and their measurements may be in several components, each of which has a proof."""
+    """They are not columns, and their measurements may be in several components, each of which has a proof."""
     pairs = np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
     alone, tie = np.eye(6, dtype=int), [[1, 0, 0, 0, 0, 1]]
     tuples = np.vstack([np.hstack([pairs, 0 * pairs]), np.hstack([0 * pairs, pairs]), alone, tie])
     costs = np.array([7.0, 7.0, 7.5, 7.0, 7.0, 7.5, *[5.0] * 6, 10.0])
     problem = assoc.AssignmentProblem(tuples, costs, [1] * 6)
-    # the same with a tie that is worth its while
+    # the same with a tie
     costs[-1] = 9.9
     solution = assoc.assign(assoc.AssignmentProblem(tuples, costs, [1] * 6))
     assert tie[0] in solution.tuples.tolist()

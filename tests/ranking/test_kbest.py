@@ -1,4 +1,4 @@
-"""The k best against full enumeration, with every road to them taken."""
+"""The k best against full enumeration, by every method."""
 
 import itertools
 import time
@@ -36,7 +36,7 @@ from tests.solvers.test_against_brute_force import blackman_popoli
 
 
 def check(problem, k):
-    """Ranked as by enumeration, each answer a different solution that owes what every Solution does."""
+    """Ranked as by enumeration: distinct solutions, each valid as a Solution."""
     expected = all_solutions(problem, limit=4000)
     if not expected:
         with pytest.raises(InfeasibleError):
@@ -113,7 +113,7 @@ def test_two_sensors_against_permutations():
 
 
 def test_murty_finds_them_in_order():
-    """Not only after sorting: a bound that is too large would be seen here."""
+    """Even before sorting: this reveals a bound that is too large."""
     rng = np.random.default_rng(3)
     for number in range(60):
         shape = (4, 4) if number % 2 else (3, 5)
@@ -146,7 +146,7 @@ def test_textbook():
 @pytest.mark.parametrize("budget", [0, 5])
 @few_or_all("count", 30, 120)
 def test_branching_instead_of_enumeration(count, budget):
-    """The same lists with next to no enumeration: branch and bound down to the leaves."""
+    """The same lists almost without enumeration: branch and bound down to the leaves."""
     branched = 0
     for number, problem in enumerate(small_problems(count, seed=52)):
         packing = price_all_columns(problem, Run(np.random.default_rng(0))).keep(np.inf)
@@ -213,7 +213,7 @@ def test_scenes_full_of_ghosts_in_parts_and_without(monkeypatch, seed):
         assert begun.called == (hard == 1)
     one, two = lists
     assert [solution.cost for solution in one] == pytest.approx([solution.cost for solution in two], abs=1e-11)
-    # of those that cost what the last one costs others may be listed
+    # solutions that tie with the last one may differ
     sure = [[s.indices.tolist() for s in found if s.cost < found[-1].cost - 1e-9] for found in lists]
     assert sure[0] == sure[1] and len(sure[0]) >= 8
 
@@ -232,7 +232,7 @@ def test_components_that_need_branching_within_a_problem(monkeypatch):
 
 
 def test_wide_integrality_gap():
-    """Dense random costs, where the multipliers' bound is far from the optimum: first of the list is exact's."""
+    """Dense random costs, where the multipliers' bound is far from the optimum: the first is that of `exact`."""
     problem = axial_random(8, seed=5)
     found = kbest(problem, 15)
     assert found[0].cost == assign(problem, "exact").cost
@@ -276,7 +276,7 @@ def test_scale_of_costs(scale):
 
 
 def test_large_two_sensors():
-    """Against the S-D road, which shares nothing with Murty's but the final sorting."""
+    """Against the method for more sensors, which shares only the final sorting with Murty's."""
     problem = planar_random(40, seed=9)
     lifted = AssignmentProblem(
         np.concatenate([problem.tuples, problem.tuples[:, :1]], axis=1), problem.costs, [40, 40, 40], dummy=False
@@ -318,7 +318,7 @@ def test_nothing_to_choose():
 
 
 def test_bounds_allow_for_what_weights_have_lost():
-    """Beside false alarms of 1e16 that cancel, a tuple of -0.9 weighs 0, as much as its measurements alone."""
+    """With false alarms of 1e16 that cancel, a tuple of -0.9 weighs 0, as much as its measurements alone."""
     problem = AssignmentProblem([[1, 1, 1], [1, 0, 0], [0, 0, 1]], [-0.9, 1e16, -1e16], [1, 1, 1])
     (solution,) = kbest(problem, 1)
     assert solution.lower_bound <= -0.9
@@ -357,7 +357,7 @@ def test_bad_problem_and_time_limit():
 
 
 def test_ties_in_many_components():
-    """With ties in more than four of them nothing seemed proved, and one solution was returned."""
+    """With ties in more than four of them nothing counted as proved, and only one solution was returned."""
     n = 6
     cycles = np.concatenate(
         [[[2 * i + a, 2 * i + b, 2 * i + c] for a, b, c in itertools.product((1, 2), repeat=3)] for i in range(n)]

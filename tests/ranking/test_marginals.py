@@ -50,7 +50,7 @@ def test_intervals_contain_the_truth(count):
             if problem.dummy or n == problem.sizes.min():
                 for i in range(1, n + 1):
                     assert result.probability[result.tuples[:, s] == i].sum() == pytest.approx(1.0)
-    # the intervals are of use: what 20 solutions leave open is bounded well below 1
+    # the intervals are useful: the weight beyond 20 solutions is bounded well below 1
     assert np.median(widths) < 0.5
 
 
@@ -82,7 +82,7 @@ def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
         try:
             result = marginals(problem, 5, time_limit=1e-9)
         except InfeasibleError:
-            # a dead end of the greedy choice, which takes time to get out of
+            # the greedy choice cannot be completed without a longer search
             assert not problem.dummy
             continue
         for key, p, low, high in zip(
@@ -94,7 +94,7 @@ def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
             if problem.dummy or n == problem.sizes.min():
                 for i in range(1, n + 1):
                     assert result.probability[result.tuples[:, s] == i].sum() == 1.0
-        # where there was something to decide
+        # where a decision was needed
         assert result.unseen == 1.0 or set(truth.values()) <= {1.0}
 
 
@@ -164,12 +164,12 @@ def test_clusters_are_independent():
         moved = np.where(result.tuples > 0, result.tuples + shift, 0).tolist()
         for t, lo, p, hi in zip(moved, result.lower, result.probability, result.upper, strict=True):
             assert found[tuple(t)] == pytest.approx((lo, p, hi), abs=1e-9)
-    # what is listed for both is worth k * k of the whole, and one listing of k could not say as much
+    # k of each stand for k * k of the whole, and give narrower intervals than k of the whole
     assert together.listed >= k
 
 
 def test_large_problem_is_still_valid():
-    """No enumeration here: the intervals of few solutions must contain those of many."""
+    """Without enumeration: the intervals of few solutions must contain those of many."""
     problem = axial_problem(np.random.default_rng(4), (9, 9, 9), 1.0, "mixed")
     few, many = marginals(problem, 3), marginals(problem, 400)
     assert (few.lower <= many.upper + 1e-12).all()
@@ -195,7 +195,7 @@ def test_errors():
 
 
 def test_two_sensors_without_duals_of_the_packing():
-    """Murty's road gives other multipliers; the bound must hold with them too, also below full size."""
+    """Murty's algorithm gives other multipliers; the bound must be valid for them, too, and for fewer solutions."""
     rng = np.random.default_rng(5)
     for number in range(40):
         problem = (

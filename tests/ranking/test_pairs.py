@@ -45,7 +45,7 @@ def enumerated(first, second, log_weight):
 def test_small_problems_are_those_of_all_joint_events(count):
     for seed in range(count):
         rng = np.random.default_rng(seed)
-        # the last are weights that no floating point number holds
+        # the last weights are beyond the range of floats
         first, second, log_weight, sizes = drawn(rng, [0.5, 3.0, 30.0, 700.0][seed % 4], 4)
         expected = enumerated(first, second, log_weight)
         exact = pair_probabilities(first, second, log_weight, sizes, WIDE)
@@ -62,7 +62,7 @@ def test_small_problems_are_those_of_all_joint_events(count):
 
 
 def test_pairs_left_out_are_missed_by_little():
-    """With four states hardly anything is summed exactly: belief propagation has to stand for the rest."""
+    """With four states hardly anything is summed exactly: belief propagation estimates the rest."""
     wrong, alone, widest = [], [], 0.0
     for seed in range(60):
         rng = np.random.default_rng(seed)
@@ -133,7 +133,7 @@ def test_the_ranking_of_solutions_says_the_same(seed):
 
 
 def test_more_states_make_narrower_intervals_that_agree():
-    """A cluster too large to enumerate, and wide for a sweep."""
+    """A cluster too large to enumerate, with many open vertices in a sweep."""
     rng = np.random.default_rng(8)
     first, second = np.nonzero(rng.random((20, 20)) < 0.15)
     log_weight = rng.normal(3.0, 2.0, len(first))

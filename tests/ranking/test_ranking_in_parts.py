@@ -17,7 +17,7 @@ from tests.packing.test_counts import random_packing, solutions
 
 @pytest.fixture
 def parts(monkeypatch):
-    """Every split is made, and at once; how many parts are begun."""
+    """Make every split, at once; count the parts begun."""
     monkeypatch.setattr(counts, "_PAYS", np.inf)
     monkeypatch.setattr(component_ranking, "_HARD", 1)
     begun = Mock(side_effect=begin_leaf)
@@ -52,7 +52,7 @@ def check_list(parts, packing, k, budget):
         known = {frozenset(columns.tolist()) for columns in ranking.solutions()[1]}
         rest = min((weight for one, weight in weight_of.items() if one not in known), default=np.inf)
         assert ranking.proven <= rest + 1e-9
-        # a full list may come nearer; a split takes nothing back
+        # a full list may raise the bound further; a split never lowers it
         assert ranking.proven >= before - 1e-9 or len(known) == k
     weights, chosen = ranking.solutions()
     assert parts.call_count > 1
@@ -98,7 +98,7 @@ def test_a_split_that_time_ends_leaves_a_bound_that_holds(parts, monkeypatch):
     ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
     ranking.run(1)
     before = ranking.proven
-    # time is over as soon as the cuts are looked for
+    # time is over as soon as the search for cuts begins
     ranking._deadline = -1.0
     ranking._split()
     assert before <= ranking.proven <= every[0] + 1e-9

@@ -18,7 +18,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
@@ -90,7 +89,7 @@ class ClusterSearch:
         packing: Packing,
         owner: NDArray[np.int32],
         weight: float,
-        rng: Generator,
+        rng: np.random.Generator,
         tries: int,
         deadline: float = np.inf,
     ) -> float:
@@ -106,7 +105,7 @@ class ClusterSearch:
         self,
         packing: PackingArrays,
         owner: NDArray[np.int32],
-        rng: Generator,
+        rng: np.random.Generator,
         tries: int,
         deadline: float = np.inf,
         nodes: int = _NODES,
@@ -178,7 +177,7 @@ def _grow(
     by_row: Ints,
     prices: Prices,
     owner: Ints,
-    rng: Generator,
+    rng: Any,
     size: int,
     local: Ints,
     rows: Ints,
@@ -213,7 +212,7 @@ def _grow(
 
 @search_njit
 def _search_clusters(
-    packing: PackingArrays, by_row: Ints, prices: Prices, owner: Ints, rng: Generator, effort: _Effort, deadline: float
+    packing: PackingArrays, by_row: Ints, prices: Prices, owner: Ints, rng: Any, effort: _Effort, deadline: float
 ) -> Any:
     """Try clusters; return the change of weight, and the number not searched to the end."""
     cols = packing.cols

@@ -14,7 +14,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
@@ -62,7 +61,7 @@ def _first_fitting(packing: PackingArrays, owner: Ints, r: int) -> int:
 
 @njit
 def walk(
-    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Generator, deadline: float
+    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
 ) -> Any:
     """Let all ants build a cover, until time is over; return the best one and its weight.
 
