@@ -57,7 +57,7 @@ class _Costs(NamedTuple):
     costs: Floats
     row_slack: Floats
     base: Floats
-    """Cost of leaving a column alone; high, but finite, where it must be matched."""
+    """Cost of leaving a column unmatched; high, but finite, where it must be matched."""
 
 
 class _State(NamedTuple):

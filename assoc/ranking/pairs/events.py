@@ -34,7 +34,7 @@ from assoc.ranking.pairs.sweep import new_work, planned, swept
 _NARROWEST = 2
 """Open vertices needed for a star, a vertex and its neighbours."""
 _LEAST, _STEP = math.log(1e-12), math.log(4.0)
-"""Of a cluster with too many open vertices leave out pairs below this probability; then raise it by this factor."""
+"""Where too many vertices would be open, pairs below this probability are left out; then it rises by this factor."""
 _ROUNDING = 1e-12
 
 
@@ -100,7 +100,7 @@ class _Plan(NamedTuple):
     kept: NDArray[np.bool_]
     """Edges that are summed, bool (K,)."""
     steps: Ints
-    """Of the sweep over all clusters."""
+    """Steps of the sweep over all clusters."""
     label: Ints
     """Cluster of each vertex, (V,)."""
     log_lower: Floats
