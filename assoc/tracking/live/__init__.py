@@ -1,1 +1,1 @@
-"""Measurements as they come in: late ones put in their place, and the picture of the moment."""
+"""Live tracking: measurements as they arrive, late ones included, and the current picture."""

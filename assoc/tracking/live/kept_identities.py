@@ -1,4 +1,4 @@
-"""Which tracks kept one identity, told while their plots come; memory does not grow with the number of plots."""
+"""Count tracks that kept one identity, while plots arrive; memory does not grow with the number of plots."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from assoc._types import Array
 from assoc.metrics.plot_identity import MEMORY, majority
 from assoc.tracking.identity_evidence import UNKNOWN
 
-# a plot that has no code, or no address
+# code or address of a plot that has none
 _NOBODY = -1
 
 
 class _Known:
-    """What the plots of one track told, of codes and of addresses."""
+    """Codes and addresses of one track's plots."""
 
     __slots__ = ("had", "last", "plots")
 
     def __init__(self) -> None:
         self.plots: tuple[deque[int], deque[int]] = deque(maxlen=MEMORY), deque(maxlen=MEMORY)
         self.had: tuple[set[int], set[int]] = set(), set()
-        """What the track's identity has been since it was confirmed."""
+        """Identities of the track since it was confirmed: codes, addresses."""
         self.last = 0.0
         """Time of its newest plot, seconds."""
 
     def identities(self) -> set[int]:
-        """The addresses that the track had, or its codes where it had no address."""
+        """Addresses of the track, or its codes if it had no address."""
         codes, addresses = self.had
         return addresses or codes
 
 
 class KeptIdentities:
-    """How many confirmed tracks kept one identity for all their life, as `assoc.metrics.tracks_of_one_identity`.
+    """Count confirmed tracks that kept one identity all their life, like `assoc.metrics.tracks_of_one_identity`.
 
     A track's identity is the majority of its last plots; by addresses where its plots have any, else by Mode 3/A codes.
     """
@@ -41,7 +41,7 @@ class KeptIdentities:
         self._settled = [0, 0]
 
     def take(self, tracks: Array, confirmed: Array, times: Array, identities: Array) -> None:
-        """Take note of plots in their order.
+        """Record plots, in time order.
 
         Parameters
         ----------
@@ -57,19 +57,19 @@ class KeptIdentities:
         if not self._tracks and not identities.any():
             return
         rows = zip(tracks.tolist(), confirmed.tolist(), times.tolist(), identities.tolist(), strict=True)
-        for track, sure, time, told in rows:
+        for track, sure, time, identity in rows:
             if not track:
                 continue
             known = self._tracks.setdefault(track, _Known())
             known.last = max(known.last, time)
-            for plots, had, one in zip(known.plots, known.had, told, strict=True):
-                plots.append(_NOBODY if one == UNKNOWN else one)
-                identity = majority(plots)
-                if sure and identity != _NOBODY:
-                    had.add(identity)
+            for plots, had, number in zip(known.plots, known.had, identity, strict=True):
+                plots.append(_NOBODY if number == UNKNOWN else number)
+                most = majority(plots)
+                if sure and most != _NOBODY:
+                    had.add(most)
 
     def settle(self, living: set[int], before: float) -> None:
-        """Judge the tracks that are gone and had no plot since this time (seconds), and forget them."""
+        """Count and forget the tracks that no longer live and had no plot since `before` (seconds)."""
         gone = [track for track, known in self._tracks.items() if track not in living and known.last < before]
         for track in gone:
             count = len(self._tracks.pop(track).identities())
@@ -77,6 +77,6 @@ class KeptIdentities:
             self._settled[1] += count > 0
 
     def counts(self) -> tuple[int, int]:
-        """Confirmed tracks that kept one identity, and those that had any."""
-        known = [len(one.identities()) for one in self._tracks.values()]
+        """Number of confirmed tracks that kept one identity, and of those that had any."""
+        known = [len(track.identities()) for track in self._tracks.values()]
         return self._settled[0] + sum(n == 1 for n in known), self._settled[1] + sum(n > 0 for n in known)

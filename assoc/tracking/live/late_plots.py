@@ -1,8 +1,8 @@
-"""Measurements that arrive late: the tracker goes back to the scan that they belong to, and comes again.
+"""Late measurements: the tracker goes back to the scan that they belong to and repeats all scans since.
 
-The tracker's state before each of the last scans is kept, and so are the scans. A late measurement is put into its
-scan, and all scans since are taken in anew: the tracks are those of a tracker that got everything in order, with any
-filter and any way to associate. Tracks keep their ids: one that is found anew has the id under which it was known.
+The last scans, and the tracker's state before each of them, are kept. A late measurement is inserted into its scan, and
+all later scans are processed again: the tracks are those of a tracker that got everything in order, with any filter and
+any method of association. Tracks keep their ids through this.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0
-"""Seconds that a measurement may be late where nothing else is said."""
+"""Default limit on how late a measurement may be, seconds."""
 
-# when there are so many names, and then twice as many as are left, those of tracks that are gone are forgotten
+# the names of dead tracks are removed when there are this many names; next time at twice the number left, and so on
 _MANY = 1_000
 
 
 class _Past(NamedTuple):
-    """A scan of the past, the tracker's state before it, and what it said then."""
+    """A past scan, the tracker's state before it, and the tracks of its measurements."""
 
     before: TrackerState
     time: float
@@ -45,28 +45,28 @@ class _Past(NamedTuple):
     assigned: tuple[Array, ...]
 
     def with_late(self, s: int, z: Array, times: Array, codes: Array | None) -> _Past:
-        """The scan with more measurements of sensor s, behind its own."""
-        own, identities = self.times or [np.full(len(one), self.time) for one in self.measurements], self.identities
+        """The scan with late measurements of sensor s appended."""
+        stamps, identities = self.times or [np.full(len(z), self.time) for z in self.measurements], self.identities
         if codes is not None or identities is not None:
             known = identities or no_identities(self.measurements)
             identities = _appended(known, s, np.zeros((len(z), 2), dtype=np.int64) if codes is None else codes)
-        measurements, own = _appended(self.measurements, s, z), _appended(own, s, times)
-        return self._replace(measurements=measurements, times=own, identities=identities)
+        measurements, stamps = _appended(self.measurements, s, z), _appended(stamps, s, times)
+        return self._replace(measurements=measurements, times=stamps, identities=identities)
 
 
 def _appended(arrays: Sequence[Array], s: int, more: Array) -> list[Array]:
-    return [np.concatenate([one, more]) if r == s else one for r, one in enumerate(arrays)]
+    return [np.concatenate([array, more]) if r == s else array for r, array in enumerate(arrays)]
 
 
 class _Move(NamedTuple):
-    """Late measurements of a sensor that were put into a scan of the past."""
+    """Late measurements of a sensor that were inserted into a past scan."""
 
     scan: int
     sensor: int
     rows: Array
-    """Their numbers among those of the sensor that came in."""
-    place: int
-    """Where they stand in the scan."""
+    """Rows among the sensor's measurements in this step."""
+    begin: int
+    """Index of the first of them in the scan."""
 
 
 @doors
@@ -76,18 +76,18 @@ class LatePlots:
     Parameters
     ----------
     tracker : Tracker
-        Of any kind, not begun or begun. It is this object's own from now on.
+        Any tracker, started or not. Do not step it elsewhere afterwards.
     horizon : float
-        Seconds: a measurement that belongs to a scan which ended longer ago is refused, and counted.
+        Seconds: measurements of scans that ended longer ago are refused, and counted.
     first_id : int
-        Of new tracks.
+        Smallest id of new tracks.
 
     Attributes
     ----------
     late, refused : int
-        Measurements so far that were late and taken in, or refused.
+        Late measurements so far that were used, or refused.
     next_id : int
-        Of the next new track.
+        Id of the next new track.
     """
 
     def __init__(self, tracker: Tracker, horizon: float = HORIZON, *, first_id: int = 1, many: int = _MANY) -> None:
@@ -97,10 +97,10 @@ class LatePlots:
         self.late = self.refused = 0
         self._past: list[_Past] = []
         self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
-        """By the tracker's own ids: those under which tracks are known outside."""
+        """From the tracker's internal ids to the ids that are handed out."""
         self.next_id = max(first_id, max(self._names, default=0) + 1)
         self._decided: dict[int, tuple[int, Decision]] = {}
-        """By scan: the scan whose step has decided it, and how."""
+        """By scan: the scan whose step decided it, and the decision."""
         self._many = self._most = many
 
     @property
@@ -126,12 +126,12 @@ class LatePlots:
         return [past.time for past in self._past]
 
     def past_tracks(self, scan: int) -> list[Track]:
-        """The tracks at the end of one of `scans`, as they are by all that has arrived since.
+        """The tracks at the end of one of `scans`, by all measurements that have arrived since.
 
         Parameters
         ----------
         scan : int
-            Number in `scans`; negative from the end.
+            Index in `scans`; negative from the end.
         """
         count = len(self._past)
         if not -count <= scan < count:
@@ -147,21 +147,21 @@ class LatePlots:
         sectors: Array | None = None,
         identities: Sequence[Array] | None = None,
     ) -> Step:
-        """Take one scan in, as `Tracker.step` does; times may lie before the last scan's.
+        """Process one scan, like `Tracker.step`; times may lie before the last scan's.
 
         Parameters
         ----------
         time, measurements, sectors, identities
-            See `Tracker.step`. The sectors are those of the time since the last scan, whatever arrives.
+            See `Tracker.step`. The sectors are those since the last scan, whatever measurements arrive.
         times : sequence over sensors of arrays (n_s,), optional
             Each measurement's own time, not after `time`.
 
         Returns
         -------
         Step
-            `assigned` has the tracks of all that was given, also of the late, 0 for what is refused; `late` and
-            `refused` count them. `final` holds scans that nothing can be late for any more; late measurements
-            stand behind those that came in time.
+            `assigned` has the tracks of all measurements given, late ones included, 0 for refused ones; `late` and
+            `refused` count them. `final` holds scans to which no late measurement can be added any more; late
+            measurements come after those that arrived in time.
 
         Raises
         ------
@@ -176,8 +176,8 @@ class LatePlots:
         if times is None or now is None:
             return self._finish(self._advance(time, checked, times, sectors, codes), 0, 0)
         stamps = checked_times(times, checked, float(time), "times")
-        on_time = [one >= now for one in stamps]
-        if all(one.all() for one in on_time):
+        on_time = [array >= now for array in stamps]
+        if all(mask.all() for mask in on_time):
             return self._finish(self._advance(time, checked, stamps, sectors, codes), 0, 0)
         before = tracker.state, self._past, self._names, self._decided, self.next_id
         self._past, self._names, self._decided = list(self._past), dict(self._names), dict(self._decided)
@@ -186,22 +186,22 @@ class LatePlots:
             moves, refused = self._insert(checked, stamps, codes, on_time)
             if moves:
                 self._again(min(move.scan for move in moves))
-            fresh, own, told = (
-                None if arrays is None else [array[one] for array, one in zip(arrays, on_time, strict=True)]
+            new, new_stamps, new_codes = (
+                None if arrays is None else [array[mask] for array, mask in zip(arrays, on_time, strict=True)]
                 for arrays in (checked, stamps, codes)
             )
-            assert fresh is not None
-            step = self._advance(time, fresh, own, sectors, told)
+            assert new is not None
+            step = self._advance(time, new, new_stamps, sectors, new_codes)
         except BaseException:
             tracker.state, self._past, self._names, self._decided, self.next_id = before
             raise
         assigned = [np.zeros(len(z), dtype=np.int64) for z in checked]
-        for s, one in enumerate(on_time):
-            assigned[s][one] = step.assigned[s]
-        for k, s, rows, place in moves:
-            assigned[s][rows] = self._past[k].assigned[s][place:][: len(rows)]
+        for s, mask in enumerate(on_time):
+            assigned[s][mask] = step.assigned[s]
+        for k, s, rows, begin in moves:
+            assigned[s][rows] = self._past[k].assigned[s][begin:][: len(rows)]
         sure = [track.track_id for track in self.tracks if track.confirmed]
-        known = tuple(np.isin(one, sure) & (one > 0) for one in assigned)
+        known = tuple(np.isin(ids, sure) & (ids > 0) for ids in assigned)
         ended = np.array(sorted(confirmed - {track.track_id for track in self.tracks}), dtype=np.int64)
         done = replace(step, assigned=tuple(assigned), confirmed=known, ended=ended)
         return self._finish(done, sum(len(move.rows) for move in moves), refused)
@@ -209,30 +209,30 @@ class LatePlots:
     def _insert(
         self, measurements: list[Array], stamps: Sequence[Array], codes: list[Array] | None, on_time: list[Array]
     ) -> tuple[list[_Move], int]:
-        """Put late measurements into their scans; also how many are too old."""
+        """Insert late measurements into their scans; also return how many are too old."""
         ends = np.array([past.time for past in self._past])
         first = self._past[0].before.time if self._past else None
         moves, refused = [], 0
         for s, (z, times) in enumerate(zip(measurements, stamps, strict=True)):
             rows = np.flatnonzero(~on_time[s])
-            # a time on the border of two scans belongs to the later one, as it does in time
+            # a time on the border of two scans belongs to the later one, as for measurements in time
             scan = np.searchsorted(ends, times[rows], side="right")
             good = scan < len(ends)
             if first is not None:
                 good &= times[rows] >= first
             refused += int((~good).sum())
             for k in np.unique(scan[good]).tolist():
-                mine = rows[good & (scan == k)]
-                moves.append(_Move(k, s, mine, len(self._past[k].measurements[s])))
-                told = None if codes is None else codes[s][mine]
-                self._past[k] = self._past[k].with_late(s, z[mine], times[mine], told)
+                late = rows[good & (scan == k)]
+                moves.append(_Move(k, s, late, len(self._past[k].measurements[s])))
+                late_codes = None if codes is None else codes[s][late]
+                self._past[k] = self._past[k].with_late(s, z[late], times[late], late_codes)
         return moves, refused
 
     def _again(self, first: int) -> None:
-        """Take the scans from this one on in anew, and find the tracks' ids again."""
+        """Process the scans from index `first` on again, and match the tracks to their ids."""
         tracker = self.tracker
         tracker.state = self._past[first].before
-        # tracks that began since are called otherwise inside now
+        # tracks that began since then have new internal ids
         names = {inner: outer for inner, outer in self._names.items() if inner < tracker.state.next_id}
         votes: Counter[tuple[int, int]] = Counter()
         steps = []
@@ -243,7 +243,7 @@ class LatePlots:
             for new, old in zip(step.assigned, past.assigned, strict=True):
                 votes.update(zip(new[: len(old)].tolist(), old.tolist(), strict=True))
         taken = set(names.values())
-        for (inner, outer), _ in sorted(votes.items(), key=lambda one: (-one[1], one[0])):
+        for (inner, outer), _ in sorted(votes.items(), key=lambda vote: (-vote[1], vote[0])):
             if inner and outer and inner not in names and outer not in taken:
                 names[inner] = outer
                 taken.add(outer)
@@ -256,7 +256,7 @@ class LatePlots:
         self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None, sectors: Array | None,
         codes: Sequence[Array] | None,
     ) -> Step:  # fmt: skip
-        """Take in a scan that is in time."""
+        """Process a scan that is in time order."""
         before = self.tracker.state
         step = self.tracker.step(time, measurements, times, sectors, codes)
         assigned = self._named(step.assigned)
@@ -266,15 +266,15 @@ class LatePlots:
         return replace(step, assigned=assigned, ended=ended)
 
     def _decide(self, step: Step) -> None:
-        for one in step.final:
-            self._decided[one.scan] = step.scan, self._outside(one)
+        for decision in step.final:
+            self._decided[decision.scan] = step.scan, self._outside(decision)
 
     def _finish(self, step: Step, late: int, refused: int) -> Step:
-        """Forget what nothing can be late for any more, and the names of tracks that are gone."""
+        """Forget scans beyond the horizon, and the names of dead tracks."""
         self.late, self.refused = self.late + late, self.refused + refused
         self._past = [past for past in self._past if past.time >= step.time - self.horizon]
         open_scans = step.scan - len(self._past)
-        # what a scan that is kept has decided, it may decide otherwise when it is taken in anew
+        # decisions made by a scan that is still kept may change when it is processed again
         done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
         final = tuple(self._decided.pop(scan)[1] for scan in done)
         if len(self._names) > self._most:
@@ -286,27 +286,28 @@ class LatePlots:
         return replace(step, final=final, late=late, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:
-        """What is said of the scans that are not final yet, oldest first; for the end of a recording."""
+        """Decide the scans that are not final yet, oldest first; for the end of a recording."""
         decided = [self._decided.pop(scan)[1] for scan in sorted(self._decided)]
         return (*decided, *map(self._outside, self.tracker.flush()))
 
     def _name(self, inner: int) -> int:
-        """The id by which a track is known outside."""
+        """The id that is handed out for a track, by its internal id."""
         if inner not in self._names:
             self._names[inner] = self.next_id
             self.next_id += 1
         return self._names[inner]
 
-    def _outside(self, one: Decision) -> Decision:
-        return replace(one, assigned=self._named(one.assigned))
+    def _outside(self, decision: Decision) -> Decision:
+        """The decision with the ids that are handed out."""
+        return replace(decision, assigned=self._named(decision.assigned))
 
     def _named(self, assigned: Sequence[Array]) -> tuple[Array, ...]:
         return tuple(
-            np.array([self._name(i) if i else 0 for i in one.tolist()], dtype=np.int64).reshape(-1) for one in assigned
+            np.array([self._name(i) if i else 0 for i in ids.tolist()], dtype=np.int64).reshape(-1) for ids in assigned
         )
 
 
 def _ids(state: TrackerState) -> set[int]:
     """Ids of the tracks that live, those in the nursery included."""
-    own = set(state.tracks.track_id.tolist())
-    return own if state.nursery is None else own | set(state.nursery.state.tracks.track_id.tolist())
+    ids = set(state.tracks.track_id.tolist())
+    return ids if state.nursery is None else ids | set(state.nursery.state.tracks.track_id.tolist())

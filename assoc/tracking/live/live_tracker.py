@@ -1,4 +1,4 @@
-"""A tracker that takes plots one by one as they come, and goes on whatever comes."""
+"""A tracker that takes plots one by one as they arrive, and survives bad ones."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from assoc.tracking.live.pictures import Antenna, Picture, PlotKey, SoundPlot
 from assoc.tracking.tracker import Tracker
 
 JUMP = 60.0
-"""Seconds ahead of all others from which a plot's time is doubted."""
+"""A plot whose time is this many seconds ahead of all others is doubted."""
 _AGREE = 10
-"""So many doubtful plots in a row, of one time, are believed: the clock has jumped."""
+"""Doubtful plots in a row, close in time, after which the clock is taken to have jumped."""
 SHORTEST = 1e-3
-"""Seconds that an interval has at the least."""
+"""Shortest interval, seconds."""
 _MOST_TIMED = 100_000
 
 
 @dataclass(frozen=True, eq=False)
 class LiveSettings:
-    """What a live tracker is made with; see `LiveTracker`."""
+    """Settings of a live tracker; see `LiveTracker`."""
 
     scene: Scene
     make: Callable[[], Tracker]
@@ -65,40 +65,40 @@ class LiveSettings:
 
 @dataclass
 class LiveState:
-    """What a live tracker knows since its tracks began anew."""
+    """State of a live tracker since its tracks last started anew."""
 
     tracker: LatePlots
     antennas: list[Antenna]
     end: float = math.nan
-    """Of the interval that is open, seconds."""
+    """End of the open interval, seconds."""
     newest: float = -math.inf
     """Time of the newest plot, seconds."""
     pending: list[SoundPlot] = field(default_factory=list)
-    """Plots of the open interval and later ones."""
+    """Plots of the open interval, and later ones."""
     ahead: list[SoundPlot] = field(default_factory=list)
     """Plots whose times are doubted."""
     behind: set[PlotKey] = field(default_factory=set)
-    """Plots in a row that were too old."""
+    """Consecutive plots that were too old."""
     recent: dict[PlotKey, None] = field(default_factory=dict)
-    """Plots that may be repeated."""
+    """Plots so recent that a repetition must be recognised."""
 
 
 @doors
 class LiveTracker:
-    """Plots in, one by one and in nearly any order; pictures out, one for each interval.
+    """Takes plots one by one, in nearly any order; gives a picture for each interval.
 
-    What cannot be used is told in one line, the first of its kind at once, and counted: plots from unknown sensors, of
-    other components, repeated ones, ones that are too old. A plot that is far ahead of all others in time waits until
-    others agree with it. A sensor that sends nothing for long is treated as switched off: its silence is no miss.
+    Plots that cannot be used are counted, and the first of each kind is reported in one line: unknown sensors, wrong
+    components, repeated plots, plots that are too old. A plot far ahead of all others in time waits until others agree
+    with it. A sensor that sends nothing for long is treated as switched off: its silence does not count as misses.
 
     Parameters
     ----------
     scene : Scene
         Sensors and region; its measurements are not used.
     make : callable () -> Tracker
-        A new tracker for them.
+        Makes a new tracker for them.
     interval : float
-        Seconds of plots that are taken in together, at least a millisecond.
+        Seconds of plots that are processed together, at least a millisecond.
     turns : sequence of float, optional
         Seconds for a turn of each sensor's antenna (clockwise), at least `interval`: misses are charged where it
         pointed, by the azimuths and times of its plots. Left out, a sensor looks everywhere in an interval in which it
@@ -106,9 +106,9 @@ class LiveTracker:
     horizon : float
         Seconds that plots may be late; see `LatePlots`.
     wait : float
-        Seconds for which an interval stays open for plots of other sensors: what comes in them is not late.
+        Seconds for which an interval stays open for delayed plots, which then are not late.
     tell : callable (str)
-        Takes the lines.
+        Receives the lines.
     """
 
     def __init__(
@@ -129,18 +129,18 @@ class LiveTracker:
         self._confirmed: set[int] = set()
         self._kept = KeptIdentities()
         self.counts: Counter[str] = Counter()
-        """Plots taken, late, and those that could not be used, by what was wrong."""
+        """Plots used, late plots, and those that could not be used, by reason."""
         self.seconds: deque[float] = deque(maxlen=_MOST_TIMED)
         """Wall time of each of the last steps."""
 
     @property
     def positions(self) -> tuple[int, ...]:
-        """Where x, y (and z) stand in a track's state."""
+        """Indices of x, y (and z) in a track's state."""
         return self.state.tracker.tracker.filter.motion.position
 
     def sensor(self, name: object) -> int | None:
-        """Number of a sensor, by its name or by its number from 1; None if there is none."""
-        names = {one.name: s for s, one in enumerate(self.settings.scene.sensors) if one.name}
+        """Index of a sensor, by its name or by its number from 1; None if there is none."""
+        names = {sensor.name: s for s, sensor in enumerate(self.settings.scene.sensors) if sensor.name}
         if isinstance(name, str) and name in names:
             return names[name]
         text = str(name).strip()
@@ -148,25 +148,25 @@ class LiveTracker:
         return number if 0 <= number < len(self.settings.scene.sensors) else names.get(text)
 
     def leave_out(self, kind: str, line: str) -> None:
-        """Count what cannot be used; the first of its kind is told."""
+        """Count a plot that cannot be used; report the first of its kind."""
         self.counts[kind] += 1
         if self.counts[kind] == 1:
             self.settings.tell(f"{line}; further ones are only counted")
 
     def warm_up(self) -> None:
-        """Have compiled what a first step would wait for."""
-        spare, place = self.settings.make(), self.settings.scene.region.mean(axis=1)[None]
+        """Compile what the first step needs."""
+        spare, centre = self.settings.make(), self.settings.scene.region.mean(axis=1)[None]
         for k in range(3):
             z = [
-                one.measure(place, np.zeros((1, 3))) if one.measures_velocity else one.measure(place)
-                for one in self.settings.scene.sensors
+                sensor.measure(centre, np.zeros((1, 3))) if sensor.measures_velocity else sensor.measure(centre)
+                for sensor in self.settings.scene.sensors
             ]
             spare.step(float(k), z, [np.array([k - 0.5 / (s + 1)]) for s in range(len(z))] if k else None)
 
     def take(
         self, sensor: object, time: float, values: Sequence[float], identity: tuple[int, int] = (0, 0)
     ) -> list[Picture]:
-        """Take in one plot.
+        """Process one plot.
 
         Parameters
         ----------
@@ -177,13 +177,13 @@ class LiveTracker:
         values : sequence of float
             The components of the measurement, metres and radians.
         identity : (int, int)
-            Mode 3/A code and ICAO address, 0 where there is none. A tracker that was made with `identity` associates
-            by them, too; in any case `summary` says how many tracks kept one.
+            Mode 3/A code and ICAO address, 0 where there is none. Trackers made with `identity` also use them to
+            associate; in any case `summary` says how many tracks kept one.
 
         Returns
         -------
         list of Picture
-            Of the intervals that ended with it; mostly none.
+            One for each interval that ended with it; mostly empty.
         """
         s = self.sensor(sensor)
         if s is None:
@@ -202,14 +202,14 @@ class LiveTracker:
             self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds")
             return []
         plot, state = SoundPlot(s, time, z, known), self.state
-        # a plot that is repeated while its time is doubted does not agree with itself
+        # a repetition of a doubted plot does not confirm its time
         if plot.key in state.recent or plot.key in state.behind or plot.key in [one.key for one in state.ahead]:
             self.leave_out("repeated", f"{where} repeats a plot of {time:g} s: left out")
             return []
         return self._timed(plot)
 
     def _timed(self, plot: SoundPlot) -> list[Picture]:
-        """Take in a plot that is sound, if its time is."""
+        """Process a sound plot, unless its time is doubted or too old."""
         time, state, settings = plot.time, self.state, self.settings
         if math.isnan(state.end):
             state.end = settings.interval * (math.floor(time / settings.interval) + 1)
@@ -241,22 +241,22 @@ class LiveTracker:
         return pictures
 
     def finish(self) -> list[Picture]:
-        """Take in what still waits; for the end of the plots."""
+        """Process the plots that still wait; for the end of the plots."""
         self._drop_ahead()
         return self._rest()
 
     def _rest(self) -> list[Picture]:
-        """Take in the plots that are there; an interval that waits for others may have some of later ones."""
+        """Process all pending plots; some may belong to later intervals than the open one."""
         pictures = []
         while self.state.pending:
             pictures.append(self._step())
         return pictures
 
     def _restart(self) -> None:
-        """Begin tracks anew, with ids that were not used."""
+        """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
         late = LatePlots(self.settings.make(), self.settings.horizon, first_id=self.state.tracker.next_id)
-        self.state = LiveState(late, [Antenna(silent=one.silent) for one in self.state.antennas])
+        self.state = LiveState(late, [Antenna(silent=antenna.silent) for antenna in self.state.antennas])
 
     def _drop_ahead(self) -> None:
         for plot in self.state.ahead:
@@ -292,17 +292,17 @@ class LiveTracker:
         sectors = np.zeros((len(sensors), 2))
         z, times, identities = [], [], []
         for s, sensor in enumerate(sensors):
-            now = [one for one in state.pending if one.time <= end and one.sensor == s]
-            z.append(np.reshape(np.array([one.z for one in now]), (-1, sensor.dim)))
-            times.append(np.array([one.time for one in now]))
-            identities.append(np.reshape(np.array([one.identity for one in now], dtype=np.int64), (-1, 2)))
+            now = [plot for plot in state.pending if plot.time <= end and plot.sensor == s]
+            z.append(np.reshape(np.array([plot.z for plot in now]), (-1, sensor.dim)))
+            times.append(np.array([plot.time for plot in now]))
+            identities.append(np.reshape(np.array([plot.identity for plot in now], dtype=np.int64), (-1, 2)))
             antenna, turn = state.antennas[s], settings.turn_of(s)
             if antenna.falls_silent(end, None if settings.turns is None else settings.turns[s]):
                 state.antennas[s] = antenna = antenna._replace(silent=True)
                 where = settings.name_of(s)
                 settings.tell(f"{where} says nothing since {antenna.last:g} s: it is treated as switched off")
             sectors[s] = antenna.sector(end, interval, turn, len(now) > 0)
-        state.pending = [one for one in state.pending if one.time > end]
+        state.pending = [plot for plot in state.pending if plot.time > end]
         begin = clock.perf_counter()
         try:
             step = state.tracker.step(end, z, times, sectors, identities)
@@ -317,28 +317,28 @@ class LiveTracker:
         too_old = end - settings.horizon - interval
         state.recent = {key: None for key in state.recent if key[1] >= too_old}
         living = state.tracker.tracks
-        # what is gone may come back with late plots
+        # late plots may bring tracks back until then
         self._kept.settle({track.track_id for track in living}, too_old)
         tracks = [track for track in living if track.confirmed]
         ids = {track.track_id for track in tracks}
         ended, self._confirmed = sorted(self._confirmed - ids), ids
-        found = [single_positions(settings.scene, s, one)[0] for s, one in enumerate(z)]
-        owner = np.repeat(np.arange(len(sensors)), [len(one) for one in z])
+        found = [single_positions(settings.scene, s, measured)[0] for s, measured in enumerate(z)]
+        owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
         return Picture(end, tracks, ended, np.concatenate(found), owner)
 
     def summary(self) -> str:
-        """One line: plots, steps and their times, what was left out, and how many tracks kept an identity."""
+        """One line: plots, steps and their times, plots left out, and how many tracks kept one identity."""
         steps = np.array(self.seconds) if self.seconds else np.zeros(1)
         middle, high = 1e3 * np.quantile(steps, [0.5, 0.99])
         odd = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count and kind != "plots")
         kept, known = self._kept.counts()
-        told = ""
+        judged = ""
         if known:
-            # what was used says nothing of how good the result is
+            # identities that were used to associate cannot judge the result
             use = self.state.tracker.tracker.settings.identity is not None
             used = " (identities were used to make them)" if use else ""
-            told = f"; {kept} of {known} tracks with an identity kept one{used}"
+            judged = f"; {kept} of {known} tracks with an identity kept one{used}"
         return (
             f"{self.counts['plots']} plots in {len(self.seconds)} steps; a step takes {middle:.3g} ms, "
-            f"p99 {high:.3g} ms{'; ' if odd else ''}{odd}{told}"
+            f"p99 {high:.3g} ms{'; ' if odd else ''}{odd}{judged}"
         )

@@ -1,4 +1,4 @@
-"""What goes into a live tracker, what it knows of the sensors by it, and what comes out."""
+"""Records of a live tracker: plots, antennas, and the picture after a step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from assoc.tracking.track import Track
 
 SILENCE = 15.0
 """Seconds, or three turns, without a plot after which a sensor is treated as switched off."""
-# the antenna's phase is a mean over about this many turns, with this weight for a plot, and known after so many
+# the antenna's phase is a mean over about this many turns, with this weight of a plot, and known after so many plots
 _TURNS_KEPT, _WEIGHT, _KNOWN = 10.0, 0.05, 5
 
 
@@ -21,7 +21,7 @@ PlotKey = tuple[int, float, bytes]
 
 
 class SoundPlot(NamedTuple):
-    """A plot that is sound."""
+    """A plot that passed all checks."""
 
     sensor: int
     time: float
@@ -31,27 +31,27 @@ class SoundPlot(NamedTuple):
 
     @property
     def key(self) -> PlotKey:
-        """What a repeated plot has in common with the first."""
+        """Equal for a plot and its repetitions."""
         return self.sensor, self.time, self.z.tobytes()
 
 
 class Picture(NamedTuple):
-    """What is known at the end of a step."""
+    """The situation at the end of a step."""
 
     time: float
     """Seconds."""
     tracks: list[Track]
-    """Confirmed ones, by their ids."""
+    """Confirmed tracks, sorted by id."""
     ended: list[int]
-    """Confirmed tracks that are no more."""
+    """Ids of confirmed tracks that ended in this step."""
     plots: Array
     """Positions of the plots that came in since the last step, (n, 3), metres."""
     sensors: Array
-    """Sensor of each of these, (n,)."""
+    """Sensor of each plot, (n,)."""
 
 
 class Antenna(NamedTuple):
-    """A sensor by its plots so far."""
+    """An antenna, as estimated from its plots so far."""
 
     last: float = -math.inf
     """Time of the newest plot, seconds."""
@@ -61,7 +61,7 @@ class Antenna(NamedTuple):
     silent: bool = False
 
     def after(self, time: float, azimuth: float, turn: float | None) -> Antenna:
-        """The antenna after a plot; `azimuth` (radians) counts where it turns, in `turn` seconds."""
+        """The antenna after a plot at `azimuth` (radians); `turn`: seconds for a turn, None if it does not turn."""
         phase = self.phase
         if turn is not None:
             elapsed = max(time - self.last, 0.0) if self.plots else 0.0
@@ -70,11 +70,11 @@ class Antenna(NamedTuple):
         return Antenna(max(self.last, time), self.plots + 1, phase)
 
     def falls_silent(self, end: float, turn: float | None) -> bool:
-        """Whether it sends nothing any more at this time, and it was not known."""
+        """Whether it has become silent by the time `end`, and was not known to be."""
         return self.plots > 0 and not self.silent and end - self.last > max(SILENCE, 3.0 * (turn or 0.0))
 
     def sector(self, end: float, interval: float, turn: float | None, sent: bool) -> tuple[float, float]:
-        """Where it looked in an interval (both seconds), in which it has sent plots or not."""
+        """Azimuths swept in the `interval` seconds before `end`; `sent`: whether any plot came from it."""
         if self.silent:
             return 0.0, 0.0
         if turn is None:

@@ -1,11 +1,10 @@
-"""The best global hypothesis by the prices of its trees and measurements: depth first, in one compiled call.
+"""The best global hypothesis: depth-first search bounded by the prices of trees and measurements.
 
-The prices of `assoc.tracking.mht.losses` bound the score of every global hypothesis: it is their sum, less the losses
-of the branches taken, less the prices of trees and measurements that are left over. The trees fall apart into groups
-that share no measurement; in each group the branches are tried tree by tree, the least loss first, and a choice is
-given up when even the branches that still fit cannot reach what has been found. Where prices are good the first
-descent is nearly always the best. Where it takes too long, what has been found may be far from the best: such groups
-are named, for a solver.
+The score of a global hypothesis is the sum of the prices of `assoc.tracking.mht.losses`, less the losses of the
+branches taken and the prices of unused trees and measurements. Trees that share no measurement, not even through
+others, form independent groups. In each group the search tries the branches tree by tree, the least loss first, and
+prunes where even the branches that still fit cannot beat the incumbent. With good prices the first descent is nearly
+always optimal. Groups that exceed their limit of work are returned as doubtful, for a solver.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from assoc.packing.kernels.sorting import order_of
 from assoc.tracking.mht.losses import Priced
 
 VISITS = 20_000
-"""Branches looked at in a group before the best found so far must do; less than a millisecond."""
+"""Limit on branches visited in a group; less than a millisecond."""
 
 
 @search_njit
 def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
-    """Branches of the best global hypothesis.
+    """Find the branches of the best global hypothesis.
 
     Parameters
     ----------
@@ -34,16 +33,16 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
     history : int32 array (B, C)
         Measurements of each branch by column, 1-based, 0: missed.
     known : Priced
-        Of the same branches.
+        Prices and losses of the same branches.
     visits : int
-        Branches that may be looked at in each group.
+        Limit on branches visited in each group.
 
     Returns
     -------
     chosen : bool array (B,)
-        At most one branch of each tree, no measurement twice, and the largest sum of scores.
+        At most one branch of each tree, no measurement twice, with the largest sum of scores found.
     doubtful : bool array (B,)
-        Branches of positive score in groups where the visits did not suffice to prove that; mostly none.
+        Branches of positive score in groups where the limit was reached before optimality was proved; mostly none.
     """
     chosen, doubtful = np.zeros(score.size, np.bool_), np.zeros(score.size, np.bool_)
     good = np.flatnonzero(score > 0.0)
@@ -52,7 +51,7 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
     good = good[order_of(known.loss[good])]
     good = good[order_of(known.number[good])]
     start = np.searchsorted(known.number[good], np.arange(num + 1))
-    # trees that share a measurement are of one group
+    # trees that share a measurement belong to one group
     parent = np.arange(num)
     holder = np.full(known.measurements.size, -1, np.int64)
     for row in good:
@@ -108,7 +107,7 @@ def _mark(history: Any, first: Any, used: Any, row: int, value: bool) -> None:
 
 @njit
 def _left_over(trees: Any, taken: Any, good: Any, start: Any, history: Any, known: Any, used: Any) -> float:
-    """Prices of the group's measurements that a complete choice does not use."""
+    """Sum the prices of the group's measurements that a complete choice does not use."""
     total = 0.0
     for i in range(trees.size):
         for k in range(start[trees[i]], start[trees[i] + 1]):
@@ -128,9 +127,9 @@ def _left_over(trees: Any, taken: Any, good: Any, start: Any, history: Any, know
 
 @search_njit
 def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: Any, left: int, chosen: Any) -> int:
-    """Choose the branches of one group; what is left of the visits, negative when they did not suffice."""
+    """Choose the branches of one group; return the visits left, negative if the limit was exceeded."""
     depth = trees.size
-    # trees of high prices first: without a branch of theirs little is left
+    # trees with high prices first: leaving one of them out costs most
     trees = trees[order_of(-known.trees[trees])]
     place = np.empty(depth + 1, np.int64)
     taken = np.full(depth, -1, np.int64)
@@ -161,7 +160,7 @@ def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: A
         while place[i] < end and not _fits(history, known.first, used, good[place[i]]):
             place[i] += 1
             left -= 1
-        # branches come by rising loss
+        # branches are sorted by loss: the later ones are no better
         if place[i] < end and lost[i] + known.loss[good[place[i]]] >= least - margin:
             place[i] = end
         if place[i] > end or (place[i] == end and lost[i] + known.trees[trees[i]] >= least - margin):

@@ -1,7 +1,7 @@
-"""The tables of a track-oriented tracker after a scan of one sensor, in one compiled call.
+"""Grow and prune the branches of a track-oriented tracker by one sensor's scan, in one compiled call.
 
-The next branches are those before, missed, then the pairs of a branch and a measurement, then the roots of new
-trees; of these the branches are kept that cost the best global hypothesis least.
+The candidates are, in this order: the old branches with a miss, the pairs of a branch and a measurement, and the roots
+of new trees. Those with the least loss (`assoc.tracking.mht.losses`) are kept.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Tables(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """Branches and measurements in their gates: row, 0-based number, gain of the score, seconds; each (K,)."""
+    """Pairs of a branch (row) and a measurement (0-based) in its gate, gain of the score, seconds; each (K,)."""
 
     branch: Array
     measurement: Array
@@ -39,7 +39,7 @@ class Hits(NamedTuple):
 
 
 class Roots(NamedTuple):
-    """New trees: ids (K,), 1-based measurements of the scan's sensors (K, S), seconds and scores to begin with (K,)."""
+    """New trees: ids (K,), 1-based measurements of the scan's sensors (K, S), times (s) and initial scores (K,)."""
 
     ids: Array
     rows: Array
@@ -51,35 +51,35 @@ def extend(
     tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
     solve: Callable[[Array, Array, Array], Array], visits: int = VISITS,
 ) -> tuple[Array, Tables, Array]:  # fmt: skip
-    """Next branches, cut to those that matter to good global hypotheses.
+    """Grow all branches and keep those that matter to good global hypotheses.
 
-    The branches of the best global hypothesis stay whatever prices say of them. Where it is not found quickly a solver
-    is asked: branches cut around a poor hypothesis are lost for good, and the next sensors cannot mend that.
+    The branches of the best global hypothesis are always kept. Where the search does not find it quickly, a solver
+    does: a branch that is cut around a poor hypothesis cannot come back.
 
     Parameters
     ----------
     tables : Tables
-        Before.
+        Before this sensor.
     miss : array (B,)
         What a miss adds to the score of each branch.
     hits, roots
     column : int
-        Of the sensor in the history.
+        Column of the sensor in the history.
     scan : int
-        In which the new trees begin.
+        Number of the scan in which the new trees begin.
     most, drop
         As for `keep_best`.
     solve
-        The best global hypothesis of branches, by their trees, scores and histories, as a mask.
+        Returns the best global hypothesis as a mask, given the branches' trees, scores and histories.
     visits
         As for `choose`.
 
     Returns
     -------
     kept, tables
-        Rows among branches missed, hits and roots, in this order; and what is known of them.
+        Rows of the candidates that are kept, and their tables.
     chosen
-        Which of them are the best global hypothesis found.
+        Which of them form the best global hypothesis found, bool.
     """
     limits = _Limits(most, drop, visits)
     history, doubtful, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
@@ -94,7 +94,7 @@ def extend(
 
 
 class _Grown(NamedTuple):
-    """All next branches before they are cut: tree, score, loss, and whether the best global hypothesis has it; (K,)."""
+    """All candidates: tree, score, loss, and whether the best global hypothesis contains it; each (K,)."""
 
     tree: Any
     score: Any
@@ -103,7 +103,7 @@ class _Grown(NamedTuple):
 
 
 class _Limits(NamedTuple):
-    """Branches of a tree and losses to keep (`keep_best`), and work on the best hypothesis (`choose`)."""
+    """Limits of `keep_best` (most branches of a tree, loss) and of `choose` (visits)."""
 
     most: int
     drop: float
@@ -112,7 +112,7 @@ class _Limits(NamedTuple):
 
 @search_njit
 def _extend(tables: Tables, miss: Any, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
-    """Grow all next branches and cut them; also returns what is needed to cut them anew."""
+    """Grow all branches and prune them; also return what is needed to prune them again."""
     numbers, counts, history, born = tables
     branch, measurement, gain, _ = hits
     ids, rows, _, first = roots
@@ -142,7 +142,7 @@ def _extend(tables: Tables, miss: Any, hits: Hits, roots: Roots, column: int, sc
 
 @njit
 def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, scan: int, limits: _Limits) -> Any:
-    """The branches that stay, and their tables."""
+    """Prune the candidates; return the rows kept and their tables."""
     numbers, counts, history, born = tables
     branch, measurement, _, when = hits
     ids, rows, since, first = roots
@@ -176,9 +176,9 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
 
 @njit
 def count_scan(counts: Any, history: Any, sensors: int, looked: Any) -> None:
-    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history.
+    """Update, in place, the counts of detections and misses by the scan, the first columns of the history.
 
-    The scan counts for branches that a sensor looked at (bool (B,)).
+    The scan counts only for branches that some sensor looked at: `looked`, bool (B,).
     """
     for i in range(counts.shape[0]):
         seen = False

@@ -1,9 +1,10 @@
-"""The m best children of a cluster's hypotheses by one sensor's measurements: Murty's partition, one queue for all.
+"""The m best children of a cluster's hypotheses by one sensor's measurements: Murty's algorithm with one queue.
 
-A child says of each measurement: false alarm, a new target, or one of its parent's tracks, each track at most once.
-That is a two-dimensional assignment problem for each parent. All parents share one queue, so that a parent whose best
-child is not among the m best of all costs no more than its bound (Cox and Miller). A child is split by its measurements
-in turn: those before are fixed, the one in turn may not be what it was; and is solved when it comes first.
+A child assigns each measurement to a false alarm, a new target, or one of its parent's tracks, each track at most once:
+a two-dimensional assignment problem for each parent. All parents share one queue, so that for a parent whose best child
+is not among the m best of all only a bound is computed (Cox and Miller). A solved child is partitioned by its
+measurements: node j keeps the choices of the measurements before j and forbids that of j. A node is solved when it
+reaches the head of the queue.
 
 References
 ----------
@@ -24,48 +25,48 @@ from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.kernels.matching import match_sparse
 
 NEW, FALSE = -1, -2
-"""What a measurement may be besides one of the pairs."""
+"""Choices of a measurement besides the pairs."""
 
 
 class Parents(NamedTuple):
     """Hypotheses before the measurements of a sensor."""
 
     holds: Array
-    """Which tracks each believes in, bool (H, T)."""
+    """Which tracks each contains, bool (H, T)."""
     weight: Array
     """Log-probability of each if all its tracks are missed and all measurements are false alarms, (H,)."""
 
 
 class Meanings(NamedTuple):
-    """What n measurements may mean."""
+    """Possible choices of n measurements."""
 
     first: Array
-    """Pairs ``first[j]:first[j + 1]`` have measurement j, int64 (n + 1,)."""
+    """The pairs of measurement j are ``first[j]:first[j + 1]``, int64 (n + 1,)."""
     track: Array
     """Track of each pair, int64 (K,)."""
     gain: Array
-    """What a pair adds to the log-probability, against the track missed and the measurement a false alarm, (K,)."""
+    """Log-probability of a pair, relative to the track missed and the measurement a false alarm, (K,)."""
     birth: Array
-    """What a new target adds; -inf where there can be none, (n,)."""
+    """The same of a new target; -inf where none is possible, (n,)."""
 
 
 class _Nodes(NamedTuple):
-    """Children in the queue or taken from it, one a row."""
+    """Nodes of the partition, in the queue or taken from it, one a row."""
 
     parent: Any
     above: Any
-    """Node that each was split from, -1: none."""
+    """Node whose partition it is part of, -1: none."""
     turn: Any
-    """Measurement that may not be what it was in that node; those before it are what they were."""
+    """Measurement whose choice in that node is forbidden; those before it keep their choices."""
     choice: Any
     cost: Any
     """Infinite while it is known by a bound alone."""
     rise: Any
-    """What it costs at least to make each measurement something else."""
+    """Lower bound on the cost of changing each measurement's choice."""
 
 
 class _Work(NamedTuple):
-    """Room for one assignment problem; its columns are the tracks, then a new target for each measurement."""
+    """Buffers of one assignment problem; its columns are the tracks, then a new target for each measurement."""
 
     indptr: Any
     columns: Any
@@ -81,21 +82,21 @@ class _Work(NamedTuple):
 
 @search_njit
 def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, most: int, drop: float) -> Any:
-    """The next hypotheses of a cluster, in one compiled call.
+    """Generate the next hypotheses of a cluster, in one compiled call.
 
     Parameters
     ----------
     holds, weight : bool array (H, T), array (H,)
         Hypotheses before the measurements.
     missed : array (T,)
-        What a miss of each track adds to a log-probability.
+        Log-probability that a miss of each track adds.
     meanings, most, drop
         As for `best_children`.
 
     Returns
     -------
     used : int64 array (U,)
-        Which of the tracks missed, the pairs and the new targets, in this order, any hypothesis believes in.
+        Rows, among the missed tracks, the pairs and the new targets in this order, that some hypothesis contains.
     holds, weight : bool array (C, U), array (C,)
         Hypotheses, the best first, with log-probability 0.
     """
@@ -207,7 +208,7 @@ def _room(tracks: int, count: int, pairs: int) -> Any:
 
 @search_njit
 def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
-    """What the best child of a parent costs at least: each measurement is what suits it best."""
+    """Lower bound on the cost of a parent's best child: each measurement takes its best choice."""
     cost = -parents.weight[h]
     for j in range(meanings.birth.size):
         most = max(0.0, meanings.birth[j])
@@ -220,7 +221,7 @@ def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
 
 @search_njit
 def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
-    """Find the best child of a node's kind, and what it costs at least to change it; infinite where there is none."""
+    """Find the best child of a node, and lower bounds on the cost of changing it; infinite where there is none."""
     first, track, gain, birth = meanings
     above, turn = nodes.above[node], nodes.turn[node]
     choice, h = nodes.choice[node], nodes.parent[node]

@@ -1,8 +1,8 @@
 """Reid's clusters: tracks that contend for measurements, with the hypotheses about them.
 
-What is outside of a cluster does not matter to it: the hypotheses about the whole scene are all combinations of one
-hypothesis of each cluster, and their log-probabilities add up. Clusters are merged when a measurement lies in gates of
-several, and fall apart when no two of their branches exclude each other across the parts.
+Clusters are independent: a hypothesis about the whole scene combines one hypothesis of each cluster, and their
+log-probabilities add up. A measurement in the gates of several clusters merges them. A cluster is split into parts when
+no branch of one part excludes a branch of another.
 
 References
 ----------
@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from assoc._types import Array
 
-# the hypotheses about one branch: it is there, or not
+# the hypotheses about one branch: it exists, or not
 _THERE_FIRST, _GONE_FIRST = np.array([[True], [False]]), np.array([[False], [True]])
 
 
@@ -31,7 +31,7 @@ class Cluster(NamedTuple):
     branches: Array
     """Rows of the batch, ascending, each in some hypothesis; int64 (B,)."""
     holds: Array
-    """Which branches each hypothesis believes in, bool (H, B)."""
+    """Which branches each hypothesis contains, bool (H, B)."""
     weight: Array
     """Log-probability of each, that of the best is 0; (H,)."""
 
@@ -42,7 +42,7 @@ class Cluster(NamedTuple):
 
     @property
     def probabilities(self) -> Array:
-        """Of the hypotheses, (H,)."""
+        """Probabilities of the hypotheses, (H,)."""
         p = np.exp(self.weight)
         return np.asarray(p / p.sum())
 
@@ -50,7 +50,7 @@ class Cluster(NamedTuple):
 def cluster(branches: Array, holds: Array, weight: Array, most: int | None = None, drop: float = np.inf) -> Cluster:
     """Make a cluster of hypotheses in any order.
 
-    At most `most` of them stay, none of a log-probability `drop` below the best; branches that none believes in do not.
+    At most the `most` best are kept, none more than `drop` below the best; branches in no hypothesis are removed.
     """
     if (weight[1:] > weight[:-1]).any():
         order = np.argsort(-weight, kind="stable")
@@ -62,12 +62,12 @@ def cluster(branches: Array, holds: Array, weight: Array, most: int | None = Non
     used = holds.any(axis=0)
     if not used.all():
         branches, holds = branches[used], holds[:, used]
-    # in one layout, so that sums are the same to the last bit wherever it comes from
+    # one memory layout: numpy's sums are then bit for bit the same, however the array was made
     return Cluster(branches, np.ascontiguousarray(holds), weight - weight[0])
 
 
 def doubted(branches: Array, odds: Array, most: int, drop: float) -> list[Cluster]:
-    """Clusters of one branch each, which may be or not: logarithms of the odds (N,), infinite where it is certain."""
+    """Clusters of one branch each, which exists or not, by its log odds (N,), infinite if certain."""
     found = []
     drop = drop if most > 1 else 0.0
     for i, value in enumerate(odds.tolist()):
@@ -80,36 +80,36 @@ def doubted(branches: Array, odds: Array, most: int, drop: float) -> list[Cluste
 
 
 def odds_of(one: Cluster) -> float:
-    """Logarithm of the odds of a cluster of one branch, see `doubted`."""
+    """Log odds of a cluster of one branch, see `doubted`."""
     if len(one.weight) == 1:
         return np.inf
     return float(one.weight[0] - one.weight[1]) * (1.0 if one.holds[0, 0] else -1.0)
 
 
 def linked(first: Array, second: Array, count: int) -> Array:
-    """Number of the connected part of each of `count` things, given pairs of them; parts by their first thing."""
+    """Label of the connected part of each of `count` elements, given pairs; parts in order of first elements."""
     links = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def grouped(label: Array, parts: int) -> list[Array]:
-    """Numbers of the things of each of so many parts, ascending."""
+    """Elements of each of `parts` parts, ascending."""
     order = np.argsort(label, kind="stable")
     bounds = np.searchsorted(label[order], np.arange(parts + 1)).tolist()
     return [order[first:last] for first, last in pairwise(bounds)]
 
 
 def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
-    """One cluster with the combinations of the hypotheses of several, clusters that share nothing.
+    """Merge clusters: all combinations of their hypotheses.
 
     Parameters
     ----------
     clusters : sequence of Cluster
         At least one.
     potential : array
-        What the coming measurements add at most to the log-probability for each row of the batch that a hypothesis
-        believes in. Of more than `most` combinations those stay that may become the best: a track in the making is less
-        likely than not until its second detection.
+        For each row of the batch, the most that the coming measurements can add to the log-probability. Of more than
+        `most` combinations those are kept that can still become the best: a new track is unlikely until its second
+        detection.
     most : int
         The most combinations.
     """
@@ -128,11 +128,10 @@ def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
 
 
 def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
-    """The clusters that a cluster falls apart into.
+    """Split a cluster into independent parts.
 
-    A hypothesis' log-probability is, up to a constant, the sum of the scores of its branches, and of what tracks that
-    are deleted have left behind. The parts of the hypotheses that are kept may be combined in more ways than are kept:
-    what was left out for its rank alone comes back.
+    The log-probability of a hypothesis is, up to a constant, the sum of the scores of its branches and a remainder
+    from deleted tracks. Combinations of the parts that had been dropped for their rank alone exist again.
 
     Parameters
     ----------
@@ -154,7 +153,7 @@ def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
 
 
 def without(whole: Cluster, gone: Array) -> Cluster:
-    """A cluster without some of its branches; hypotheses that differed in them alone are one."""
+    """Remove branches from a cluster; hypotheses that differ only in these are merged."""
     if not gone.any():
         return whole
     holds, which = np.unique(whole.holds[:, ~gone], axis=0, return_inverse=True)
@@ -164,13 +163,13 @@ def without(whole: Cluster, gone: Array) -> Cluster:
 
 
 def agreeing(whole: Cluster, owner: Array) -> Cluster:
-    """The hypotheses that say of some measurements what the best one says.
+    """Keep the hypotheses that agree with the best one about some measurements.
 
     Parameters
     ----------
     whole : Cluster
     owner : int array (B, M)
-        What each branch says of M sensors: a number for the track and its measurement, 0: it was missed.
+        For each branch and each of M sensors, a number for track and measurement; 0: missed.
     """
     if len(whole.weight) == 1:
         return whole

@@ -1,4 +1,4 @@
-"""The next hypotheses of all clusters: by one sensor's measurements (Reid's generation), and where bearings cross."""
+"""Generate the next hypotheses of all clusters: by one sensor's measurements (Reid), and by crossing bearings."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def generated(
     Parameters
     ----------
     clusters : sequence of Cluster
-        Of B branches.
+        About B branches.
     offers : Offers
-        K pairs of them and measurements, and N births.
+        K pairs of a branch and a measurement, and N births.
     born : int array (N,)
         Measurement (0-based) of each birth.
     count : int
@@ -36,7 +36,7 @@ def generated(
     Returns
     -------
     list of Cluster
-        Of rows among branches missed, pairs, births, in this order.
+        About rows of the missed branches, the pairs, and the births, in this order.
     """
     total, pairs = len(offers.missed), len(offers.branch)
     own = np.repeat(np.arange(len(clusters)), [len(one.branches) for one in clusters])
@@ -48,7 +48,7 @@ def generated(
     near = [by_measurement[one] for one in grouped(label[own[offers.branch[by_measurement]]], parts)]
     birth, birth_row = np.full(count, -np.inf), np.zeros(count, dtype=np.int64)
     birth[born], birth_row[born] = offers.births.score, total + pairs + np.arange(len(born))
-    # what a branch can add to a log-probability at most
+    # the most that a branch can add to a log-probability
     potential = offers.missed.copy()
     np.maximum.at(potential, offers.branch, offers.gain)
     found, alone, odds = [], [], []
@@ -72,11 +72,11 @@ def generated(
 def _children(
     whole: Cluster, offers: Offers, z: Array, pair: Array, birth: Array, birth_row: Array, most: int, drop: float
 ) -> Cluster:
-    """The children of a cluster's hypotheses by the measurements z (their births: score and row) in its gates."""
+    """Children of a cluster's hypotheses by the measurements z (births: score and row) in its gates."""
     branch = offers.branch[pair]
     track = np.searchsorted(whole.branches, branch)
     if len(whole.branches) <= track.max() or (whole.branches[track] != branch).any():
-        # merging has left out all hypotheses that believe in a branch
+        # merging may have dropped all hypotheses that contain a branch
         there = np.isin(branch, whole.branches)
         pair, branch, track = pair[there], branch[there], track[there]
     first = np.searchsorted(offers.measurement[pair], np.append(z, z[-1] + 1))
@@ -96,16 +96,16 @@ def _children(
 def with_births(
     clusters: Sequence[Cluster], rows: Array, births: Births, sizes: Array, most: int, drop: float
 ) -> list[Cluster]:
-    """Merge the clusters that want the measurements of births, and add every set of births that a hypothesis allows.
+    """Merge the clusters that contend with births for measurements, and add every set of births that is possible.
 
     Parameters
     ----------
     clusters : sequence of Cluster
-        Of B branches.
+        About B branches.
     rows : int array (B, S)
         1-based measurements of this scan that each branch has taken, 0: none.
     births : Births
-        N of them.
+        N births.
     sizes : int array (S,)
         Measurements of each sensor.
     most, drop
@@ -114,7 +114,7 @@ def with_births(
     Returns
     -------
     list of Cluster
-        Of rows among the branches and the births, in this order.
+        About rows of the branches and the births, in this order.
     """
     width = int(sizes.max(initial=0)) + 1
     places = width * np.arange(len(sizes))
@@ -141,8 +141,8 @@ def with_births(
 def _with_sets(
     whole: Cluster, rows: Array, new: Array, births: Births, sizes: Array, most: int, drop: float
 ) -> Cluster:
-    """The children of a cluster's hypotheses by these births."""
-    # which births the measurements leave open that each hypothesis has taken
+    """Children of a cluster's hypotheses by these births."""
+    # births whose measurements each hypothesis has not taken
     used = rows[whole.branches]
     wants = births.rows[new]
     excluded = ((used[:, None] == wants) & (wants > 0)).any(axis=2)
@@ -161,7 +161,7 @@ def _with_sets(
 
 
 def _sets(births: Births, new: Array, able: Array, sizes: Array, most: int) -> tuple[Array, Array]:
-    """The best sets of births that may be, as masks over `new` (K, N), and the sum of the scores of each."""
+    """The best compatible sets of births, as masks over `new` (K, N), and the sum of scores of each."""
     numbers = np.flatnonzero(able)
     if not len(numbers):
         return np.zeros((1, len(new)), dtype=np.bool_), np.zeros(1)

@@ -1,8 +1,8 @@
-"""How the branches of a tracker grow by a scan, sensor by sensor: what may happen next, and what was kept of it.
+"""How the branches of a tracker grow by a scan, sensor by sensor.
 
-After each sensor the candidates are the branches before, missed, then the pairs of a branch and a measurement, then
-new targets; the tracker says which rows of them are kept. Whether measurements are of one instant or have times of
-their own matters here and nowhere else.
+At each sensor the candidates are, in this order: the old branches with a miss, the pairs of a branch and a measurement,
+and new targets. The tracker chooses the rows to keep. Only this module distinguishes scans of one instant from
+measurements with times of their own.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100
-"""The most new targets in a scan where several sensors together tell a position."""
+"""The most new targets in a scan that start from crossings of several sensors."""
 
 
 class Births(NamedTuple):
-    """New targets that may be."""
+    """N possible new targets."""
 
     ids: Array
-    """By time and place, so that the order of the measurements does not matter; int64 (N,)."""
+    """Assigned by time and position, so that the order of the measurements does not matter; int64 (N,)."""
     rows: Array
     """1-based measurement of each sensor, int32 (N, S)."""
     when: Array
@@ -38,18 +38,18 @@ class Births(NamedTuple):
 
 
 class Offers(NamedTuple):
-    """What the measurements of one sensor may mean to B branches."""
+    """Misses, pairs and births by the measurements of one sensor, for B branches."""
 
     missed: Array
-    """What a miss adds to the score of each branch, (B,)."""
+    """Score of a miss, for each branch, (B,)."""
     branch: Array
-    """Of each pair of a branch and a measurement in its gate, (K,)."""
+    """Row of the branch of each pair of a branch and a measurement in its gate, (K,)."""
     measurement: Array
     """0-based, (K,)."""
     gain: Array
-    """What it adds to the score, (K,)."""
+    """Gain of the branch's score, (K,)."""
     when: Array
-    """Its time, seconds, (K,)."""
+    """Time of the measurement, seconds, (K,)."""
     births: Births
 
 
@@ -58,9 +58,9 @@ class Grown(NamedTuple):
 
     states: Any
     first: Array
-    """Time of the first measurement in the scan; where there is none, not finite; (B,)."""
+    """Time of the first measurement in the scan, seconds; not finite where there is none; (B,)."""
     last: Array
-    """Time of the last measurement in the scan, NaN where there is none, (B,)."""
+    """Time of the last measurement in the scan, seconds; NaN where there is none; (B,)."""
     looked: Array
     """Whether a sensor looked at it, bool (B,)."""
 
@@ -75,7 +75,7 @@ class Growth(ABC):
     Attributes
     ----------
     order : sequence of int
-        Sensors, in the order in which they are to be taken in.
+        The sensors in the order of their processing.
     origin : int64 array (B,)
         Row before the scan, -1 for new targets.
     rows : int32 array (B, S)
@@ -92,10 +92,10 @@ class Growth(ABC):
 
     @abstractmethod
     def offers(self, s: int) -> Offers:
-        """What the measurements of sensor s may mean."""
+        """Candidates by the measurements of sensor s."""
 
     def take(self, s: int, offers: Offers, kept: Array) -> None:
-        """Go on with these rows of what was offered."""
+        """Keep these rows of the candidates."""
         require_states(self._before.states, len(kept))
         hit = self.rows[offers.branch]
         hit[:, s] = offers.measurement + 1
@@ -106,7 +106,7 @@ class Growth(ABC):
 
     @abstractmethod
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
-        """Let what else is known of the branches follow."""
+        """Select the states of the rows that are kept."""
 
     @abstractmethod
     def finished(self) -> Grown:
@@ -122,7 +122,7 @@ class Growth(ABC):
 
 
 class AtOnce(Growth):
-    """All sensors looked everywhere at one instant: predicted branches are corrected sensor by sensor."""
+    """All sensors looked everywhere at one instant: predicted branches are updated sensor by sensor."""
 
     def __init__(self, progress: Progress) -> None:
         super().__init__(progress)
@@ -131,7 +131,7 @@ class AtOnce(Growth):
         self._offered: list[Any] = []
 
     def offers(self, s: int) -> Offers:
-        """What the measurements of sensor s may mean."""
+        """Candidates by the measurements of sensor s."""
         settings, time = self._progress.settings, self._progress.scan.time
         z, sensor, terms = self._progress.scan.measurements[s], settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
@@ -147,9 +147,9 @@ class AtOnce(Growth):
         self._states = concatenate(self._offered)[kept]
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
-        """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone.
+        """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
 
-        They are listed by their places, or the most likely first.
+        They are sorted by position, or the most likely first.
         """
         settings, scan = self._progress.settings, self._progress.scan
         if not settings.angles_alone:
@@ -158,7 +158,7 @@ class AtOnce(Growth):
         found = settings.births.crossings(scan, free)
         if found is None:
             return None
-        # by far the most are ghosts
+        # nearly all of them are ghosts
         best = np.argsort(-found.scores, kind="stable")[:_MOST_CROSSINGS]
         if by_place:
             best = best[np.lexsort(found.positions[best].T)]
@@ -183,13 +183,13 @@ class InOrder(Growth):
         super().__init__(progress)
         self.order, self._timed = timed.order, timed
         self._looked = timed.looked()
-        # the sensors that have been taken in: only they can have missed a branch
+        # the sensors processed so far: only they can have missed a branch
         self._past = np.zeros_like(self._looked)
         self._anchor, self._done = self.origin, list[int]()
         self._gained, self._total = np.zeros(len(self.origin)), np.zeros(0)
 
     def offers(self, s: int) -> Offers:
-        """What the measurements of sensor s may mean, each at its time among those of the sensors before."""
+        """Candidates by the measurements of sensor s, filtered in time order with those of earlier sensors."""
         timed, terms, past = self._timed, self._progress.settings.terms, self._past
         past[:, s] = self._looked[:, s]
         grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows)

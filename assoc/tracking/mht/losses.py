@@ -1,4 +1,6 @@
-"""What it costs the best global hypothesis to contain a branch: the measure by which track trees are cut.
+"""The loss of a branch: how much worse the best global hypothesis becomes if it must contain it.
+
+Track trees are pruned by these losses.
 
 A global hypothesis takes at most one branch of each tree and each measurement at most once. The score of the
 best one that contains a given branch is the branch's max-marginal; how far it lies below the best of all is
@@ -6,10 +8,10 @@ the branch's loss. By linear programming duality the loss is at least the branch
 
     loss >= sum of the prices of the trees and measurements that the branch uses - its score  (>= 0),
 
-up to the gap between the best hypothesis and the bound, which is mostly none. Prices are the multipliers of the
-assignment problem's constraints (`assoc.packing.bounds.dual_ascent`): a measurement that several trees want is dear,
-one that a single tree wants costs nothing. So a branch that is good for its own tree, but only with measurements that
-others need more, is known for what it is, and a tree keeps a branch that leaves them alone.
+up to the gap between the best hypothesis and the bound, which is mostly zero. Prices are the multipliers of the
+assignment problem's constraints (`assoc.packing.bounds.dual_ascent`): a measurement that several trees contend for has
+a price above 0, one that only a single tree uses costs nothing. So a branch with a high score has a high loss if it
+needs measurements that other trees need more, and its tree keeps a branch without them.
 """
 
 from __future__ import annotations
@@ -23,24 +25,24 @@ from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, sm
 from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import PackingArrays, assembled
 
-# temperatures of the smoothed ascent, in nats: alternatives of a tree differ by some ten, however large their scores
-# have grown, and losses must be known well enough to tell the best hypothesis from those next to it
+# temperatures of the smoothed ascent, in nats: the branches of a tree differ by about ten, however high their scores,
+# and losses must be exact enough to tell the best hypothesis from the second best
 _HOTTEST, _COLDEST, _PASSES = 4.0, 0.05, 60
 
 
 class Priced(NamedTuple):
-    """Branches, and what they cost by the prices of trees and measurements.
+    """Losses of B branches, and the prices that give them.
 
     Attributes
     ----------
     number : int64 array (B,)
         Tree of each branch, from 0.
     first : int64 array (C + 1,)
-        Where the measurements of each column begin among all.
+        Offset of each column's measurements in `measurements`.
     trees, measurements : arrays
-        What each is worth to the bound, 0 or more: the sum of all bounds the best global hypothesis from above.
+        Prices, 0 or more; their sum is an upper bound on the score of the best global hypothesis.
     loss : array (B,)
-        What the branch lacks, 0 or more up to rounding.
+        Lower bound on the loss of each branch, 0 or more up to rounding.
     """
 
     number: Any
@@ -52,14 +54,14 @@ class Priced(NamedTuple):
 
 @njit
 def priced(tree: Any, score: Any, history: Any) -> Any:
-    """Bound from below what each branch costs the best global hypothesis that must contain it.
+    """Find prices, and a lower bound on the loss of each branch.
 
     Parameters
     ----------
     tree : int64 array (B,)
         Tree of each branch.
     score : array (B,)
-        Log likelihood ratios; a tree without a branch in a hypothesis scores 0.
+        Log likelihood ratios; a tree that no branch of a hypothesis uses scores 0.
     history : int32 array (B, C)
         Measurements of each branch by column, 1-based, 0: missed.
 
@@ -75,7 +77,7 @@ def priced(tree: Any, score: Any, history: Any) -> Any:
         for b in range(tree.size):
             top = max(top, history[b, c])
         first[c + 1] = first[c] + top
-    # only measurements that several trees want have a price, and only the trees that want them a say in it
+    # only measurements that several trees contend for have a price, and only these trees determine it
     holder = np.full(first[columns], -1, np.int64)
     contested = np.zeros(first[columns], np.bool_)
     for b in range(tree.size):
@@ -106,7 +108,7 @@ def priced(tree: Any, score: Any, history: Any) -> Any:
 
 @njit
 def _numbered(tree: Any) -> Any:
-    """Number the trees from 0; also how many there are."""
+    """Number the trees from 0; return the number of each branch's tree, and how many trees there are."""
     order = order_of(tree)
     number = np.empty(tree.size, np.int64)
     trees = 0
@@ -146,7 +148,7 @@ def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, in
     packing = PackingArrays(cols, costs, free, col_start, row_start, row_ptr, row_cols)
     duals, reduced = np.zeros(free.size), np.empty(count)
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
-    # trees come first in every component: they take what their best branches score, and the rest is differences
+    # rows of trees come first in every component: after this sweep their prices are the scores of their best branches
     hard_sweeps(packing, duals, reduced, 1)
     temperature = np.minimum(np.maximum(START * spread(packing), 2.0 * _COLDEST), _HOTTEST)
     while temperature.max() > _COLDEST:

@@ -1,4 +1,4 @@
-"""How track trees are cut: weak branches, and branches against what has been decided."""
+"""Pruning of track trees: weak branches, and branches that contradict decisions."""
 
 from __future__ import annotations
 
@@ -10,22 +10,19 @@ from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.packing.kernels.sorting import order_of
 
-MOST_SCANS = 1000
-"""The most scans that a decision may be put off: every branch carries its history with it."""
-
 
 @njit
 def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) -> Array:
     """Rows of the branches that matter to good global hypotheses, ordered by tree, then loss.
 
-    A tree of which every branch costs the best global hypothesis more than `drop` ends: others explain its
-    measurements so much better. What a tree in the making lacks in score of its own does not count here.
+    A tree ends if all its branches have losses above `drop`: other trees explain its measurements much better. A tree
+    whose best score is still negative is allowed that much more.
 
     Parameters
     ----------
     tree, score : arrays (B,)
     loss : array (B,)
-        What each branch costs the best global hypothesis; see `assoc.tracking.mht.losses`.
+        Loss of each branch; see `assoc.tracking.mht.losses`.
     most : int
         The most branches of a tree.
     drop : float
@@ -52,14 +49,13 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
 def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, sizes: Array) -> tuple[Array, Array]:
     """Decide which tree each measurement of the oldest scan belongs to.
 
-    The trees of the best global hypothesis take theirs first. Trees that are not in it, but began in that
-    scan or before, take what is left in the order of their scores, and end if nothing fits; they are targets
-    in the making. Younger trees do not touch the scan and stay.
+    The trees of the best global hypothesis take theirs first. Other trees that began in that scan or before take
+    what is left, the best score first, and end if nothing fits. Trees that began later are not affected.
 
     Parameters
     ----------
     tree, score : arrays (B,)
-        Of each branch; those of one tree stand together.
+        Of each branch; branches of one tree are contiguous.
     chosen : bool array (B,)
         Whether it is in the best global hypothesis.
     old : bool array (B,)
@@ -71,9 +67,9 @@ def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, 
     Returns
     -------
     kept : bool array (B,)
-        Branches that agree with what was decided.
+        Branches that agree with the decision.
     speakers : int array
-        One branch of each tree that has decided.
+        For each tree in the decision, the row of the branch that it follows.
     """
     kept, speakers = _decide(tree, score, chosen, old, oldest, int(sizes.max(initial=0)))
     return np.asarray(kept), np.asarray(speakers)
@@ -121,7 +117,7 @@ def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int
 
 @njit
 def same_tree(tree: Any, mask: Any) -> Any:
-    """Branches of the trees of which a branch is in the mask; those of one tree stand together."""
+    """Mask of all branches of the trees with a branch in `mask`; branches of one tree are contiguous."""
     result = mask.copy()
     for row in range(1, tree.size):
         if result[row - 1] and tree[row] == tree[row - 1]:

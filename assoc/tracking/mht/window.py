@@ -1,4 +1,4 @@
-"""The scans that a multiple hypothesis tracker has not decided yet, and what its branches say of them."""
+"""The scans that a multiple hypothesis tracker has not decided yet, and its branches' measurements in them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from assoc.tracking.track import Decision, owners
 from assoc.tracking.track_batch import TrackBatch
 
 MOST_SCANS = 1000
-"""The most scans that a decision may be put off: every branch carries its history with it."""
+"""The longest window, in scans: every branch stores its history in it."""
 
 MOST_MEASUREMENTS = 10_000_000
-"""Of a sensor in a scan, in a file."""
+"""The most measurements of a sensor in a scan that a file may claim."""
 
 
 class Window(NamedTuple):
-    """W open scans, the last one first, and B branches in them."""
+    """The W open scans, the latest first, and the history of B branches in them."""
 
     history: Array
-    """Measurements of each branch (1-based, 0 missed): the sensors of the last scan, of the one before, ...; int32."""
+    """Measurements of each branch (1-based, 0 missed), int32 (B, depth * S): the last scan's sensors first."""
     times: Array
     """Seconds, (W,)."""
     sizes: Array
@@ -36,12 +36,12 @@ class Window(NamedTuple):
 
     @staticmethod
     def empty(branches: int, depth: int, sensors: int) -> Window:
-        """Branches before the first scan."""
+        """The window before the first scan."""
         history = np.zeros((branches, depth * sensors), dtype=np.int32)
         return Window(history, np.zeros(0), np.zeros((0, sensors), dtype=np.int64))
 
     def opened(self, scan: Scan, history: Array) -> Window:
-        """The window with one scan more, and what branches have in all of them."""
+        """The window with this scan added, and the new history."""
         times, sizes = np.append(scan.time, self.times), np.concatenate([scan.sizes[None].astype(np.int64), self.sizes])
         return Window(history, times, sizes)
 
@@ -54,15 +54,15 @@ class Window(NamedTuple):
         return self._replace(history=self.history[rows])
 
     def decision(self, age: int, scan: int, tracks: TrackBatch, rows: Array) -> Decision:
-        """Which tracks the measurements of the scan `age` scans before scan number `scan` went to, by these rows."""
+        """Tracks of the measurements of the scan `age` scans before number `scan`, by these rows."""
         sizes, confirmed = self.sizes[age], tracks.confirmed[rows].astype(np.int64)
-        said = self.history[rows, age * sizes.size : (age + 1) * sizes.size]
-        assigned, sure = owners(said, tracks.track_id[rows], sizes), owners(said, confirmed, sizes)
-        known = tuple(one.astype(np.bool_) for one in sure)
+        history = self.history[rows, age * sizes.size : (age + 1) * sizes.size]
+        assigned, sure = owners(history, tracks.track_id[rows], sizes), owners(history, confirmed, sizes)
+        known = tuple(flags.astype(np.bool_) for flags in sure)
         return Decision(scan - age, float(self.times[age]), tuple(assigned), known)
 
     def decisions(self, scan: int, tracks: TrackBatch, rows: Array) -> tuple[Decision, ...]:
-        """What these rows say of all open scans, oldest first."""
+        """Decisions of these rows about all open scans, oldest first."""
         return tuple(self.decision(age, scan, tracks, rows) for age in reversed(range(len(self.times))))
 
     def arrays(self) -> Mapping[str, Array]:
@@ -88,12 +88,12 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class DeferringMethod(Method):
-    """A method that decides a scan `depth` - 1 scans later."""
+    """A method that decides each scan `depth` - 1 scans later."""
 
     depth: int = 3
 
     def _check(self, whole: str, drop: str) -> None:
-        """Refuse a depth, a number of hypotheses or branches, or a drop of their scores that is none."""
+        """Check depth, the number of hypotheses or branches (`whole`), and the drop of their scores."""
         for what in ("depth", whole):
             if not is_whole(getattr(self, what), 1):
                 raise InvalidInputError(f"{what} must be a whole number above 0, got {getattr(self, what)!r}")
