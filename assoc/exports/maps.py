@@ -76,7 +76,7 @@ def write_map(path: str | os.PathLike[str], tracks: pd.DataFrame) -> None:
     if ending == ".kml":
         write_text(path, _kml(tracks))
     else:
-        write_json(path, {"type": "FeatureCollection", "features": [_feature(*one) for one in _by_track(tracks)]})
+        write_json(path, {"type": "FeatureCollection", "features": [_feature(*track) for track in _by_track(tracks)]})
 
 
 def _by_track(tracks: pd.DataFrame) -> Iterator[tuple[int, str, pd.DataFrame]]:
@@ -124,5 +124,5 @@ def _kml(tracks: pd.DataFrame) -> str:
         for part in _lines(rows):
             line = ElementTree.SubElement(owner, "LineString" if len(part) > 1 else "Point")
             ElementTree.SubElement(line, "altitudeMode").text = "absolute"
-            ElementTree.SubElement(line, "coordinates").text = " ".join(",".join(map(str, one)) for one in part)
+            ElementTree.SubElement(line, "coordinates").text = " ".join(",".join(map(str, point)) for point in part)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)

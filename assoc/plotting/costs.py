@@ -115,7 +115,7 @@ def plot_gates(
     if not is_whole(bins, 1):
         raise InvalidInputError(f"bins: expected a whole number >= 1, got {bins!r}")
     scans = association.scans if isinstance(association, Association) else association
-    parts = [(np.zeros(0), np.zeros(0)), *(_squares(scene, one) for one in scans)]
+    parts = [(np.zeros(0), np.zeros(0)), *(_squares(scene, scan) for scan in scans)]
     ax = axes_or_new(ax)
     squares, freedom = (np.concatenate(column) for column in zip(*parts, strict=True))
     share = gammainc(freedom / 2.0, squares / 2.0)

@@ -39,7 +39,7 @@ def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes
     InvalidInputError
         The association does not hold that scan.
     """
-    found = [one for one in association.scans if one.scan == scan]
+    found = [item for item in association.scans if item.scan == scan]
     if not found:
         raise InvalidInputError(f"scan: the association has no scan {scan!r}")
     if axes is None:

@@ -53,10 +53,11 @@ def plot_scene(
     chosen = [scene.scan(scan)] if scan is not None else [scene.scan(k) for k in range(scene.num_scans)]
     middle = float(scene.region[2].mean())
     found = [
-        [_ends(scene, sensor, one.measurements[s], middle) for one in chosen] for s, sensor in enumerate(scene.sensors)
+        [_ends(scene, sensor, scan.measurements[s], middle) for scan in chosen]
+        for s, sensor in enumerate(scene.sensors)
     ]
     sites = stacked(sensor.position for sensor in scene.sensors)
-    truth = [] if scene.truth is None else [one.truth_positions for one in chosen]
+    truth = [] if scene.truth is None else [scan.truth_positions for scan in chosen]
     named = [part for row, sensor in zip(found, scene.sensors, strict=True) for part in row if not _bears(sensor)]
     near, far = stacked([sites, *truth]), stacked(named)
     unit = unit_of(np.concatenate([near, far]))
@@ -96,7 +97,7 @@ def _rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
 
 def _draw_gates(ax: Any, scene: Scene, scans: Sequence[Scan], height: float, probability: float, factor: float) -> None:
     for s, sensor in enumerate(scene.sensors):
-        z = np.concatenate([one.measurements[s] for one in scans])
+        z = np.concatenate([scan.measurements[s] for scan in scans])
         style = {"color": colour(s), "linewidth": 0.8, "linestyle": "--"}
         if _bears(sensor):
             # one degree of freedom: the square root of the quantile is that of the normal distribution
@@ -115,7 +116,7 @@ def draw_truth(ax: Any, scene: Scene, scans: Sequence[Scan], factor: float, *, p
     if scene.truth is None:
         return
     if not paths:
-        where = factor * stacked(one.truth_positions for one in scans)
+        where = factor * stacked(scan.truth_positions for scan in scans)
         ax.plot(*where[:, :2].T, "+", color=BLACK, markersize=11, markeredgewidth=1.4, label="truth", zorder=4)
         return
     known = truth_paths(scene)

@@ -30,7 +30,7 @@ TRACKERS: dict[str, type[Tracker]] = {
         JointProbabilisticTracker,
     )
 }
-"""Trackers by the names that programs know them by."""
+"""Trackers by the names that programs use."""
 
 __all__ = [
     "TRACKERS",

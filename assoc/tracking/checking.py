@@ -1,4 +1,4 @@
-"""What a tracker asks of the measurements that it is given, before anything is done with them."""
+"""Checks of a tracker's input."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from assoc.sensors.base import ANGLES, finite_array
 
 # noise may carry a range this many standard deviations below 0
 _NOISE = 10.0
-# metres, radians, m/s: what is beyond them is no measurement, and would leave no digits in what follows
+# metres, radians, m/s: larger values are no measurements, and later sums would lose all digits
 _LENGTH, _ANGLE, _SPEED = 1e9, 1e3, 3e8
 
 
 def checked_time(time: object, last: float | None) -> float:
-    """Seconds, not before those of the last scan."""
+    """The time as a float, checked to be finite and not before the last scan's."""
     if not is_number(time):
         raise InvalidInputError(f"time must be a finite number of seconds, got {time!r}")
     when = float(time)  # type: ignore[arg-type]
@@ -29,7 +29,7 @@ def checked_time(time: object, last: float | None) -> float:
 
 
 def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor]) -> list[Array]:
-    """Measurements as float64 arrays (n_s, d_s), all of which their sensors can have made.
+    """Measurements as float64 arrays (n_s, d_s), checked against what their sensors can measure.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor
 
 
 def checked(z: Array, s: int, sensor: Sensor) -> Array:
-    """Measurements (n, d) of the sensor of this number; see `checked_measurements`."""
+    """Measurements (n, d) of sensor number s; see `checked_measurements`."""
     what = f"measurements of sensor {s}"
     if z is None:
         raise InvalidInputError(f"{what} must be an array of shape (n, {sensor.dim}), got None; n may be 0")
@@ -70,7 +70,7 @@ def checked(z: Array, s: int, sensor: Sensor) -> Array:
 
 
 def _limits(sensor: Sensor, axis: int) -> tuple[float, float, str]:
-    """Least and largest value of a component, and what to call them."""
+    """Smallest and largest value of a component, and their description for messages."""
     name = sensor.components[axis] if axis < len(sensor.components) else ""
     if name in ANGLES:
         return -_ANGLE, _ANGLE, f"radians within +-{_ANGLE:g}"

@@ -1,4 +1,4 @@
-"""A tracker's state as an npz file: written, checked when read, since kernels do not check indices."""
+"""A tracker's state as an npz file. Reading checks everything, since kernels do not check indices."""
 
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
 class Saved(dict[str, Array]):
-    """Arrays of a file by name."""
+    """The arrays of a file, by name."""
 
     prefix = ""
-    """What their names begin with in the file."""
+    """Prefix of the names in the file, for messages."""
 
     def require(self, good: object, name: str, expected: str) -> None:
-        """Refuse a field by name."""
+        """Raise an error that names the field, unless `good`."""
         if not bool(good):
             what = f"the field {self.prefix + name!r} is not that of a saved tracker"
             raise InvalidInputError(f"{what}: expected {expected}")
 
     def part(self, prefix: str) -> Saved:
-        """Those whose names begin so, by what follows."""
+        """The arrays whose names have this prefix, without it."""
         found = Saved({name.removeprefix(prefix): value for name, value in self.items() if name.startswith(prefix)})
         found.prefix = self.prefix + prefix
         return found
 
 
 def save(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> None:
-    """Write a state, whole or not at all."""
+    """Write a state; the file appears whole or not at all."""
     save_npz(path, FORMAT, VERSION, file_arrays(settings, state))
 
 
 def file_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
-    """What `save` writes."""
+    """The arrays that `save` writes."""
     return {"settings": np.array(json.dumps(settings_as_text(settings))), **_arrays(settings, state)}
 
 
 def restore(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> TrackerState:
-    """Read a state that a tracker of these settings has saved; `state` is any of its states, for the kinds of arrays.
+    """Read a state saved by a tracker with these settings; `state`, any of its states, gives the arrays' types.
 
     Raises
     ------
@@ -103,14 +103,14 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
     if state.identities is not None:
         found |= state.identities.arrays()
     if settings.nursery is not None and state.nursery is not None:
-        young, unseen = state.nursery
-        found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, young).items()}
+        inner, unseen = state.nursery
+        found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, inner).items()}
         found |= {"unseen_ids": unseen.ids, "unseen": unseen.misses}
     return found
 
 
 def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> TrackerState:
-    """The state that arrays hold, checked; `model` is any state of these settings."""
+    """The state in these arrays, checked; `model` is any state of these settings."""
     saved.require(1 <= int(saved["next_id"]) < 2**62, "next_id", "a whole number above 0")
     _check_tracks(settings, saved.part("tracks."), int(saved["next_id"]))
     tracks = model.tracks.restored(saved.part("tracks."))
@@ -134,17 +134,17 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     state = state._replace(own=settings.method.restored(settings, saved, state))
     if settings.nursery is None or model.nursery is None:
         return state
-    young = _state(settings.nursery, model.nursery.state, saved.part("nursery."))
-    saved.require(young.time in (None, state.time), "nursery.time", "the tracker's time")
+    inner = _state(settings.nursery, model.nursery.state, saved.part("nursery."))
+    saved.require(inner.time in (None, state.time), "nursery.time", "the tracker's time")
     ids, misses = saved["unseen_ids"], saved["unseen"]
     saved.require((np.diff(ids) > 0).all(), "unseen_ids", "ids that ascend")
     good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
     saved.require(good, "unseen", "how often each sensor has missed each track")
-    return state._replace(nursery=Nursery(young, Unseen(ids, misses)))
+    return state._replace(nursery=Nursery(inner, Unseen(ids, misses)))
 
 
 def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:
-    """Tracks: all arrays of one length, ids that were given, states of the filter's shape."""
+    """Check tracks: arrays of equal length, ids below `next_id`, states of the filter's shape."""
     ids = saved["track_id"]
     for name, value in saved.items():
         saved.require(len(value) == len(ids), name, f"{len(ids)} rows, as many as ids")
@@ -156,7 +156,7 @@ def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None
     widest = max(sensor.dim for sensor in settings.sensors)
     for name, model in arrays_of(one_state(settings.filter)).items():
         key, value = f"state.{name}", saved[f"state.{name}"]
-        # what a filter keeps of measurements has no width before the first one
+        # arrays in which a filter stores measurements have width 0 before the first one
         pairs = zip(value.shape[1:], model.shape[1:], strict=True)
         same = all(a == b or (b == 0 and a <= widest) for a, b in pairs)
         saved.require(same, key, f"rows of the shape {model.shape[1:]}")
@@ -166,7 +166,7 @@ def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None
 
 
 def _rng_state(settings: TrackerSettings, text: str, now: Any) -> Any:
-    """State of the filter's random generator from its JSON text, tried out on a copy; without a text as it is now."""
+    """State of the filter's random generator from JSON, tested on a copy; without a text, the present state."""
     if now is None or not text:
         return now
     try:
@@ -178,7 +178,7 @@ def _rng_state(settings: TrackerSettings, text: str, now: Any) -> Any:
 
 
 def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
-    """What a saved state depends on, as texts."""
+    """The settings that a saved state depends on, as texts."""
     return {
         "tracker": settings.name,
         "filter": described(settings.filter),
@@ -191,7 +191,7 @@ def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
         "gate_probability": repr(settings.gate_probability),
         "registration": "none" if settings.registration is None else repr(settings.registration.parameters),
         "identity": repr(settings.identity),
-        **{one.name: described(getattr(settings.method, one.name)) for one in fields(settings.method)},
+        **{item.name: described(getattr(settings.method, item.name)) for item in fields(settings.method)},
     }
 
 
@@ -207,7 +207,7 @@ def _changed_setting(saved: str, own: str) -> str:
     for key in now:
         old, new = str(before.get(key)), now[key]
         if old != new:
-            # long texts from where they part
+            # long texts are shown from their first difference
             same = len(os.path.commonprefix([old, new]))
             first = 0 if same < 60 else same - 20
             return f"{key} was {old[first : first + 80]!r}, is {new[first : first + 80]!r}"
@@ -215,13 +215,13 @@ def _changed_setting(saved: str, own: str) -> str:
 
 
 def described(thing: object) -> str:
-    """A filter or sensor, with all that it and its motion model are made of, as text."""
+    """A filter or sensor with all its parameters, and those of its motion model, as text."""
     if isinstance(thing, (Filter, Motion)):
         parts = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
         parts.pop("rng", None)
         inside = [f"{name}={described(parts[name])}" for name in sorted(parts)]
         if isinstance(thing, Motion):
-            # what a user's function does is known by what it gives
+            # functions of users are compared by their results
             somewhere = np.full((1, thing.dim), 100.0)
             matrix = thing.matrices(1.0)[1] if isinstance(thing, LinearMotion) else thing.noise(somewhere, 1.0)
             inside.append(f"noise of a second={described(matrix)}")
@@ -231,11 +231,11 @@ def described(thing: object) -> str:
     if isinstance(thing, np.ndarray):
         return str(thing.tolist())
     if isinstance(thing, (tuple, list)):
-        return f"[{', '.join(described(one) for one in thing)}]"
+        return f"[{', '.join(described(item) for item in thing)}]"
     if isinstance(thing, Mapping):
         return f"{{{', '.join(f'{key}: {described(one)}' for key, one in thing.items())}}}"
     if is_dataclass(thing) and not isinstance(thing, type):
-        inside = [f"{one.name}={described(getattr(thing, one.name))}" for one in fields(thing)]
+        inside = [f"{item.name}={described(getattr(thing, item.name))}" for item in fields(thing)]
         return f"{type(thing).__name__}({', '.join(inside)})"
     plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
     return repr(thing) if plain else type(thing).__name__

@@ -1,4 +1,4 @@
-"""Filters by name, and the one that trackers take where none is given."""
+"""Filters by name, and the default filter of trackers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PROCESS_NOISE = 30.0
 MANOEUVRE_NOISE = 50.0
 """Process noise of the manoeuvring model of `two_speeds`: turns of 5 g at a scan a second."""
 
-# imm-cv: the quiet model's share of the process noise, and the probability that a model gives way in so many seconds,
+# imm-cv: the quiet model's share of the process noise, and the probability that a model gives way in this many seconds,
 # a turn of a radar's antenna
 _QUIET = 0.1
 _CHANGE, _TURN = 0.1, 4.0
@@ -32,8 +32,8 @@ _TURN_NOISE = 0.03
 def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[Any]:
     """Interacting multiple models: nearly constant velocity, and manoeuvres.
 
-    A target that flies straight is tracked with a tenth of the process noise; either model has given way to the
-    other four seconds later with probability 0.1, and lasts for 36 seconds on average.
+    The quiet model has a tenth of the process noise. Each model changes to the other within four seconds with
+    probability 0.1, and lasts for 36 seconds on average.
 
     Parameters
     ----------
@@ -51,24 +51,24 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[An
 
 
 def pace_of(times: Array) -> float:
-    """Usual seconds from one scan to the next; 1 where there is one scan only."""
+    """Usual seconds from one scan to the next; 1 if there is only one scan."""
     steps = np.diff(np.unique(times))
     return float(np.median(steps)) if len(steps) else 1.0
 
 
 def manoeuvre_noise(pace: float) -> float:
-    """Process noise of `two_speeds` that suits scans so many seconds apart, m/s^1.5.
+    """Process noise of `two_speeds` for scans `pace` seconds apart, m/s^1.5.
 
     From scan to scan a velocity changes by 50 m/s (standard deviation) in a manoeuvre: turns of 5 g at a scan a
-    second, as fighters fly them, and turns as airliners fly them where scans are 10 s apart, because nobody turns
+    second, as fighters fly, and gentler turns, as airliners fly, where scans are 10 s apart, because nobody turns
     with 5 g for so long.
     """
     return MANOEUVRE_NOISE / math.sqrt(max(pace, 1.0))
 
 
 def planar(sensors: Sequence[Sensor]) -> bool:
-    """Whether no sensor tells a height, so that states of two dimensions are enough."""
-    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim >= 3 for one in sensors)
+    """Whether no sensor measures heights, so that two-dimensional states suffice."""
+    return not any(isinstance(sensor, (Radar3D, PositionSensor)) and sensor.dim >= 3 for sensor in sensors)
 
 
 def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:
@@ -115,12 +115,12 @@ def make_filter(
     name : str
         One of `FILTERS`.
     sensors : sequence of Sensor
-        Where none tells a height, states are planar.
+        If none measures heights, states are planar.
     process_noise : float, optional
-        Root of the acceleration's spectral density, m/s^1.5, of imm-cv that of its manoeuvring model; of imm and
-        fuzzy the acceleration, m/s^2. Left out, `manoeuvre_noise` of the pace for imm-cv and 30 for all others.
+        Root of the acceleration's spectral density, m/s^1.5; for imm-cv that of its manoeuvring model, for imm and
+        fuzzy the acceleration, m/s^2. Default: `manoeuvre_noise` of the pace for imm-cv, 30 for all others.
     seed : int
-        Of the ensemble's noise.
+        Seed of the ensemble filter's noise.
     pace : float
         Seconds from scan to scan.
 

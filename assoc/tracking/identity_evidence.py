@@ -1,19 +1,17 @@
 """Transponder codes as evidence of which track a plot belongs to.
 
-A track's aircraft has an unknown code c, a priori each of N with the same probability. A plot of it tells c with
-probability 1 - g and any of the N codes, garbled, else. Of the n plots that the track has taken lately n_c told the
-code c, so that by Bayes' rule
+A track's aircraft has an unknown code c, a priori uniform over N codes. A plot of it reports c with probability 1 - g,
+and otherwise, garbled, any of the N codes. If n_c of the track's last n plots reported the code c, then by Bayes' rule
 
     w(c) = L^(n_c) / Z,    L = (1 - g + g/N) / (g/N),    Z = the sum of L^(n_c) over all N codes,
 
-is the probability that c is the code. A plot with the code d is then (1 - g) w(d) + g/N likely if it is of the track.
-If it is of something else, an aircraft that shares the code (probability s) or any other, it is s w(d) + (1 - s)/N
-likely. The logarithm of the ratio of the two joins the track's score. A plot without a code, or a track without one,
-says nothing.
+is the probability that c is the code. The likelihood of a plot's code d is (1 - g) w(d) + g/N if the plot is of the
+track. If it is of something else, an aircraft that shares the code (probability s) or any other, the likelihood is
+s w(d) + (1 - s)/N. The logarithm of their ratio is added to the track's score; it is 0 if plot or track has no code.
 
-The same holds of the addresses of 24 bits with probabilities of their own. They are protected by parity and do not
-change in flight: what tells another address than that which the track has by its plots is not in its gate. Where both
-address and code of plot and track are known, the address counts alone, since the code tells nothing more.
+24-bit addresses are weighed in the same way, with their own probabilities. They are protected by parity and do not
+change in flight: a plot with another address than the track's is outside its gate. If plot and track both have an
+address, it counts alone, since the code adds no information.
 """
 
 from __future__ import annotations
@@ -29,27 +27,27 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 
 CODES, ADDRESSES = 2**12, 2**24
-"""Mode 3/A codes, and addresses."""
+"""Numbers of Mode 3/A codes and of addresses."""
 UNKNOWN = 0
-"""Of a code and of an address."""
+"""Code or address of a plot without one."""
 MEMORY = 6
-"""Plots of a track whose codes count: a code may be changed in flight."""
+"""Last plots of a track that count: codes may change in flight."""
 PREFIX = "identity."
-"""Of the names of the arrays."""
+"""Prefix of the names of the arrays in files."""
 
 
 @dataclass(frozen=True)
 class IdentityParameters(Parameters):
-    """How far codes and addresses are to be trusted.
+    """How far codes and addresses can be trusted.
 
     Parameters
     ----------
     code_garbled : float
-        Probability that a code that was decoded is not the aircraft's.
+        Probability that a decoded code is wrong.
     code_shared : float
-        Probability that another aircraft, whose plot this might be, has the same code.
+        Probability that another aircraft has the same code.
     address_garbled, address_shared : float
-        The same of addresses.
+        The same for addresses.
     """
 
     code_garbled: float = field(default=0.02, metadata={"help": "share of Mode 3/A codes that are garbled"})
@@ -62,38 +60,38 @@ class IdentityParameters(Parameters):
 
 
 class Evidence(NamedTuple):
-    """What identities say of K pairs of a track and a plot."""
+    """Evidence of identities about K pairs of a track and a plot."""
 
     log_ratio: Array
-    """"The plot is of the track" against "of something else", (K,); finite."""
+    """Log likelihood ratio of "the plot is of the track" and "of something else", (K,); finite."""
     possible: Array
-    """Whether the pair is not ruled out by addresses, bool (K,)."""
+    """False where addresses rule the pair out, bool (K,)."""
 
 
 class Identities(NamedTuple):
-    """The identities that tracks have had lately."""
+    """Identities of the last plots of tracks."""
 
     parameters: IdentityParameters
     ids: Array = np.zeros(0, dtype=np.int64)
-    """Tracks, ascending."""
+    """Ids of the tracks, ascending, (K,)."""
     told: Array = np.zeros((0, MEMORY, 2), dtype=np.int64)
-    """Code and address of each one's last plots, the newest first; 0 unknown."""
+    """Code and address of each track's last plots, the newest first; 0 unknown; (K, MEMORY, 2)."""
 
     def evidence(self, track_id: Array, identities: Array) -> Evidence:
-        """Weigh pairs of a track (K,) and the code and address of a plot (K, 2)."""
+        """Weigh pairs of a track id (K,) and a plot's code and address (K, 2)."""
         told = self._of(track_id)
         p = self.parameters
         code, _ = log_ratio(told[:, :, 0], identities[:, 0], CODES, p.code_garbled, p.code_shared)
-        address, own = log_ratio(told[:, :, 1], identities[:, 1], ADDRESSES, p.address_garbled, p.address_shared)
-        both = (identities[:, 1] != UNKNOWN) & (own != UNKNOWN)
-        return Evidence(np.where(both, address, code), ~both | (own == identities[:, 1]))
+        address, likeliest = log_ratio(told[:, :, 1], identities[:, 1], ADDRESSES, p.address_garbled, p.address_shared)
+        both = (identities[:, 1] != UNKNOWN) & (likeliest != UNKNOWN)
+        return Evidence(np.where(both, address, code), ~both | (likeliest == identities[:, 1]))
 
     def after(self, taken: Sequence[Array], identities: Sequence[Array], living: Array) -> Identities:
-        """Identities once the tracks (0: none) have taken these plots, sequences over sensors; others are forgotten."""
+        """Add plots and their tracks (0: none), by sensor; tracks that are not in `living` are forgotten."""
         ids = np.unique(living)
         told = self._of(ids)
-        for owners, own in zip(taken, identities, strict=True):
-            for track, pair in zip(np.asarray(owners).tolist(), own, strict=True):
+        for owners, pairs in zip(taken, identities, strict=True):
+            for track, pair in zip(np.asarray(owners).tolist(), pairs, strict=True):
                 row = int(np.searchsorted(ids, track))
                 if pair.any() and row < len(ids) and ids[row] == track:
                     told[row, 1:] = told[row, :-1].copy()
@@ -102,7 +100,7 @@ class Identities(NamedTuple):
         return Identities(self.parameters, ids[known], told[known])
 
     def _of(self, track_id: Array) -> Array:
-        """What the plots of tracks told, (K, MEMORY, 2)."""
+        """Codes and addresses of tracks' last plots, (K, MEMORY, 2)."""
         rows = np.searchsorted(self.ids, track_id)
         found = np.append(self.ids, -1)[rows] == track_id
         told = np.concatenate([self.told, np.zeros((1, MEMORY, 2), dtype=np.int64)])
@@ -113,12 +111,12 @@ class Identities(NamedTuple):
         return {f"{PREFIX}ids": self.ids, f"{PREFIX}told": self.told}
 
     def restored(self, arrays: Mapping[str, Array]) -> Identities:
-        """Take over a state that `arrays` has given.
+        """Read a state that `arrays` returned.
 
         Raises
         ------
         InvalidInputError
-            The arrays are of no such state.
+            The arrays do not hold such a state.
         """
         ids, told = arrays[f"{PREFIX}ids"], arrays[f"{PREFIX}told"]
         good = ids.ndim == 1 and told.shape == (len(ids), MEMORY, 2) and bool((np.diff(ids) > 0).all())
@@ -128,21 +126,21 @@ class Identities(NamedTuple):
 
 
 def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:
-    """Log likelihood ratio of plots' codes, and the likeliest code of each track (0 where it told none).
+    """Log likelihood ratios of plots' codes, and the likeliest code of each track (0 where its plots have none).
 
     Parameters
     ----------
     told : int array (K, M)
-        Codes that the last plots of each track told, 0 unknown.
+        Codes of the last plots of each track, 0 unknown.
     given : int array (K,)
         Code of the plot, 0 unknown.
     count : int
-        N, how many codes there are.
+        N, the number of codes.
     garbled, shared : float
         g and s; see the module's description.
     """
     known = told != UNKNOWN
-    # how often each of the codes was told; a code told k times is there k times, each with a k-th of its weight
+    # how often each code occurs among the last plots; a code that occurs k times counts k times with weight 1/k
     times = ((told[:, :, None] == told[:, None, :]) & known[:, None, :]).sum(axis=2)
     each = np.where(known, 1.0 / np.maximum(times, 1), 0.0)
     vote = np.log1p(-garbled + garbled / count) - np.log(garbled / count)
@@ -151,15 +149,15 @@ def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: flo
     scaled = (each * np.exp(vote * votes - top[:, None])).sum(axis=1) + (count - each.sum(axis=1)) * np.exp(-top)
     same = ((told == given[:, None]) & known).sum(axis=1)
     weight = np.exp(vote * same - top) / scaled
-    own = (1.0 - garbled) * weight + garbled / count
+    same_aircraft = (1.0 - garbled) * weight + garbled / count
     other = shared * weight + (1.0 - shared) / count
-    says = (given != UNKNOWN) & known.any(axis=1)
+    informative = (given != UNKNOWN) & known.any(axis=1)
     best = np.take_along_axis(told, np.argmax(np.where(known, times, -1), axis=1)[:, None], axis=1)[:, 0]
-    return np.where(says, np.log(own / other), 0.0), np.where(known.any(axis=1), best, UNKNOWN)
+    return np.where(informative, np.log(same_aircraft / other), 0.0), np.where(known.any(axis=1), best, UNKNOWN)
 
 
 def no_identities(measurements: Sequence[Array]) -> list[Array]:
-    """Identities of measurements, none of which has any."""
+    """Unknown identities for all measurements."""
     return [np.zeros((len(z), 2), dtype=np.int64) for z in measurements]
 
 
@@ -171,16 +169,16 @@ def checked_identities(identities: Sequence[Array], sizes: Sequence[int]) -> lis
     InvalidInputError
         They are not whole numbers of this shape, or out of range.
     """
-    found = [np.asarray(one) for one in identities]
+    found = [np.asarray(array) for array in identities]
     if len(found) != len(sizes):
         raise InvalidInputError(f"identities: expected one array for each of {len(sizes)} sensors, got {len(found)}")
-    for s, (one, size) in enumerate(zip(found, sizes, strict=True)):
-        if one.shape != (size, 2) or (one.size and one.dtype.kind not in "iu"):
+    for s, (array, size) in enumerate(zip(found, sizes, strict=True)):
+        if array.shape != (size, 2) or (array.size and array.dtype.kind not in "iu"):
             raise InvalidInputError(
                 f"identities of sensor {s}: expected whole numbers (Mode 3/A code, address) of shape {(size, 2)}, "
-                f"got {one.dtype} {one.shape}"
+                f"got {array.dtype} {array.shape}"
             )
-        # codes are also written with their four octal digits as a decimal number, so up to 7777
-        if one.size and not (one.min() >= 0 and one.max() < ADDRESSES):
+        # some sources write the four octal digits of a code as a decimal number, up to 7777
+        if array.size and not (array.min() >= 0 and array.max() < ADDRESSES):
             raise InvalidInputError(f"identities of sensor {s}: expected numbers from 0 to {ADDRESSES - 1}")
-    return [one.astype(np.int64) for one in found]
+    return [array.astype(np.int64) for array in found]

@@ -1,4 +1,4 @@
-"""The life of a track: when it is confirmed, and when it is given up."""
+"""The life of a track: when it is confirmed, and when it is deleted."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ HISTORY = 62
 """Scans whose detections are remembered, one a bit."""
 
 OVERLOOKED = 1e-4
-"""A track is given up once a target that is there would be missed for so long with this probability."""
-# and not before so many scans
+"""A track is deleted when an existing target would be missed for as long only with this probability."""
+# and not before this many scans
 _LEAST_SCANS = 3.0
 
 
@@ -35,20 +35,20 @@ class LifeCycle:
         "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test.
         "m-of-n": detected in `m` of the last `n` scans.
     false_probability, missed_probability : float
-        alpha and beta of the test: the share of false tracks confirmed, of true ones given up. A tentative
-        track is given up when its score has fallen by -ln(missed_probability) since its best.
+        alpha and beta of the test: the share of false tracks confirmed, of true ones deleted. A tentative
+        track is deleted when its score has fallen by -ln(missed_probability) since its best.
     m, n : int
     deletion : "time", "count" or "score"
         What ends a track, tentative or confirmed: `deletion_time` seconds without a detection (however the
         measurements are grouped), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
     deletion_time : float, optional
-        Seconds. Left out, it is the time in which a target that is there is missed all along with
-        probability 1e-4, and at least three scans, at the usual pace of the scans.
+        Seconds. Default: the time for which an existing target is missed without a break with probability 1e-4,
+        at the usual pace of the scans, and at least three scans.
     deletion_count : int
     deletion_drop : float
     lifetime : float
-        Mean time for which a target stays, seconds. It says how soon a track that is no longer detected is taken for
-        gone: `Track.existence`. A track is deleted later, and comes back if it is detected in between.
+        Mean time for which a target exists, seconds. It determines how fast `Track.existence` falls without
+        detections. A track is deleted later, and is reported again if it is detected before.
     """
 
     confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})
@@ -82,7 +82,7 @@ class LifeCycle:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 
     def confirms(self, score: Array, detections: Array) -> Array:
-        """Which tracks are to be confirmed; `detections` has one bit a scan, the last one lowest."""
+        """Which tracks are to be confirmed; `detections` has one bit for each scan, the last scan lowest."""
         if self.confirmation == "score":
             reached: Array = score >= sequential_threshold(self.false_probability, self.missed_probability)
             return reached
@@ -133,5 +133,5 @@ class LifeCycle:
 
 
 def count_bits(values: Array) -> Array:
-    """Number of bits that are set in each of an array of uint64."""
+    """Number of set bits of each element of a uint64 array."""
     return np.unpackbits(values[:, None].view(np.uint8), axis=1).sum(axis=1)

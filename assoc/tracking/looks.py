@@ -1,4 +1,4 @@
-"""Where sensors looked: how often in a scan, who could see a track, and when a track has been missed too long."""
+"""Where sensors looked: how often in a scan, which tracks they could see, and which were missed for too long."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
 
 _FORGETTING = 0.05
-# of a turn in a scan; where no sensor looks any more, tracks wait
+# turns in a scan; with fewer all sensors are taken to be off, and no track is deleted
 _LEAST_TURN = 1e-3
 
 
 def keep_pace(progress: Progress) -> Progress:
-    """Follow the pace of the scans and the turns of the sensors, means that forget, as both may change."""
+    """Update the exponential means of the scans' pace and of the sensors' turns, both of which may change."""
     state, dt = progress.state, progress.elapsed
     if dt == 0:
         return progress
@@ -27,26 +27,26 @@ def keep_pace(progress: Progress) -> Progress:
 
 
 def excuse(progress: Progress) -> Progress:
-    """Give back to tracks' existence what misses took of those that a sensor looked at and could not see."""
+    """Undo the effect of misses on existence for tracks outside the field of view of a sensor that looked."""
     tracks = progress.state.tracks
     overlooked: Array = (out_of_view(progress) & _looked(progress)) @ progress.settings.terms.miss
     return progress.with_state(tracks=tracks.not_overlooked(-overlooked))
 
 
 def out_of_view(progress: Progress) -> Array:
-    """Which sensors cannot see which tracks: they have not missed them; bool (T, S)."""
+    """Which tracks are outside of which sensors' fields of view, and so not missed, bool (T, S)."""
     where, views = _where(progress), [sensor.position_part for sensor in progress.settings.sensors]
-    return ~np.stack([one.in_view(one.measure(where)) for one in views], axis=1)
+    return ~np.stack([sensor.in_view(sensor.measure(where)) for sensor in views], axis=1)
 
 
 def _looked(progress: Progress) -> Array:
-    """Which sensors looked where the tracks are, bool (T, S)."""
+    """Which sensors looked towards which tracks, bool (T, S)."""
     sectors, sensors = progress.scan.sectors, progress.settings.sensors
     if sectors is None:
         return np.ones((len(progress.state.tracks), len(sensors)), dtype=np.bool_)
     away = _where(progress)[:, None] - np.array([sensor.position for sensor in sensors])
     azimuths = np.arctan2(away[..., 1], away[..., 0])
-    return np.stack([looked_at(one, own) for one, own in zip(sectors, azimuths.T, strict=True)], axis=1)
+    return np.stack([looked_at(sector, azimuth) for sector, azimuth in zip(sectors, azimuths.T, strict=True)], axis=1)
 
 
 def _where(progress: Progress) -> Array:
@@ -60,7 +60,7 @@ def _where(progress: Progress) -> Array:
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     """Which tracks are to be deleted after the scan, bool (T,)."""
     settings, state = progress.settings, progress.state
-    # a look is a scan of which a sensor sees a part, the quickest sensor most
+    # dwells are counted in scans of the sensor that turns fastest
     most = float(state.turns.max())
     if most < _LEAST_TURN:
         return np.zeros(len(tracks), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""A recording of radar plots through a tracker: tracks, and CT, MT and IT where the aircraft are known."""
+"""Track a recording of radar plots: tracks, and CT, MT and IT where the aircraft are known."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from assoc.tracking.tracker import Tracker
 
 
 def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = True) -> Iterator[Step]:
-    """Take windows of plots in, one after the other.
+    """Step a tracker through windows of plots.
 
     Parameters
     ----------
     tracker : Tracker
-        Of a single sensor, one that takes measurements with times of their own.
+        With a single sensor; must support measurements with times of their own.
     windows : iterable of Window
-        By the antenna's turn they may overlap a little in time; a plot older than the last window's end
-        counts as of that end.
+        They may overlap a little in time; a plot older than the last window's end gets that time.
     stamps : bool
-        Whether each plot keeps its own time; otherwise all of a window are taken to be of its end.
+        Whether each plot keeps its own time; otherwise all plots of a window get the time of its end.
 
     Yields
     ------
@@ -45,7 +44,7 @@ def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = 
 
 
 class PlotTracks(NamedTuple):
-    """A recording as a tracker took it.
+    """Result of tracking a recording.
 
     Attributes
     ----------
@@ -58,10 +57,10 @@ class PlotTracks(NamedTuple):
     rates : CtMtIt or None
         CT, MT and IT of the windows; None where no aircraft is known.
     table : TrackTable
-        The tracks after each window; their altitude is the last that a plot of theirs has told, garbled ones left out.
+        The tracks after each window; their altitude is that of their last plot with one that is not garbled.
     kept : (int, int) or None
-        Confirmed tracks that kept one identity, and those that had any: the aircraft where it is known, else the
-        address if any plot has one, else Mode 3. None where no plot has an identity.
+        Numbers of confirmed tracks that kept one identity, and that had any: the aircraft if known, else the
+        address if any plot has one, else Mode 3. None if no plot has an identity.
     """
 
     recording: Recording
@@ -85,7 +84,7 @@ def track_plots(
     Parameters
     ----------
     tracker : Tracker
-        Of a single sensor, one that takes measurements with times of their own.
+        With a single sensor; must support measurements with times of their own.
     recording : Recording
     windows : iterable of Window
         Of this recording.
@@ -129,7 +128,7 @@ def track_plots(
 
 
 def _names(recording: Recording) -> Array:
-    """One number for each identity (n,): of the aircraft, else the address, else Mode 3; -1 where a plot has none."""
+    """Number of each plot's identity (n,): aircraft, else address, else Mode 3; -1 for none."""
     if recording.sources is not None:
         return recording.sources
     given = recording.addresses if recording.addresses.any() else recording.identities

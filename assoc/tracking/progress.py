@@ -1,4 +1,4 @@
-"""A step under way: what each stage is given and hands on."""
+"""A step under way: the record that stages pass on."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import TrackBatch
 
-# what the exact solver may do on one scan where the user says nothing of it: visits of tuples in branch and bound,
-# and nodes at the least; counted, so that the answer does not depend on the machine
+# default limits of the exact solver on one scan: visits of tuples in branch and bound, and the least number of nodes;
+# counted, not timed, so that the answer does not depend on the machine
 _VISITS, _LEAST_NODES = 500_000, 10
 
 
@@ -27,15 +27,15 @@ class Association(NamedTuple):
     """How a scan was associated with tracks."""
 
     tracks: TrackBatch
-    """After the scan: those of before, corrected, and new ones."""
+    """Tracks after the scan: the old ones, updated, then new ones."""
     assigned: Sequence[Array]
     """Track of each measurement of each sensor, 0 for none, int64 (n_s,)."""
     own: Any = None
-    """The tracker's own part of the state after the scan."""
+    """The method's own part of the state after the scan."""
 
 
 class Work:
-    """What a step uses up: ids of new tracks and calls of the solver, counted on from the state before it."""
+    """New ids and calls of the solver in a step, counted on from the state before it."""
 
     def __init__(self, settings: TrackerSettings, state: TrackerState) -> None:
         self.settings, self.scan = settings, state.scan
@@ -48,16 +48,16 @@ class Work:
         return ids
 
     def assign(self, problem: AssignmentProblem) -> Solution:
-        """Solve an assignment problem by the tracker's solver."""
+        """Solve an assignment problem with the tracker's solver."""
         self.solver_calls += 1
-        # a source of randomness of this step alone, so that a restored tracker goes on alike
+        # seeded by scan and call, so that a restored tracker continues identically
         seed = np.random.SeedSequence((self.settings.seed, self.scan))
         options = solver_options(self.settings, problem.num_tuples)
         return assign(problem, self.settings.solver, seed=seed, advise=False, **options)
 
 
 def solver_options(settings: TrackerSettings, tuples: int) -> dict[str, Any]:
-    """Time limit and parameters of the solver for a problem of so many tuples."""
+    """Time limit and parameters of the solver for a problem with this many tuples."""
     options = {"time_limit": settings.time_limit, **settings.solver_parameters}
     if settings.solver == "exact" and settings.time_limit is None:
         options = {"nodes": max(_LEAST_NODES, _VISITS // max(tuples, 1)), "patience": 0} | options
@@ -69,16 +69,16 @@ class Progress(NamedTuple):
 
     settings: TrackerSettings
     state: TrackerState
-    """What the stages so far have made of it; the time is that of the last scan until the last stage."""
+    """The state after the stages so far; its time is that of the last scan until the last stage."""
     scan: Scan
     work: Work
     timed: TimedScan | None = None
-    """Tracks and measurements with times of their own; None where all sensors looked everywhere at one instant."""
+    """Set for measurements with times of their own; None if all sensors looked everywhere at one instant."""
     found: Association | None = None
     step: Step | None = None
 
     def with_state(self, **changes: Any) -> Progress:
-        """Go on with another state."""
+        """Return the step with a changed state."""
         return self._replace(state=self.state._replace(**changes))
 
     @property

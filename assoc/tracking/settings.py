@@ -1,4 +1,4 @@
-"""What a tracker is made with: checked once, never changed."""
+"""Settings of a tracker: checked once, never changed."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class TrackerSettings:
     Attributes
     ----------
     name : str
-        Of the tracker.
+        Name of the tracker.
     method : Method
         How scans are associated, with its own settings; see `assoc.tracking.associate.method`.
     place : Scene
         Sensors and region.
     registration : OnlineRegistration or None
-        As it is before the first scan.
+        Its state before the first scan.
     nursery : TrackerSettings or None
-        Where tracks begin if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
+        Of the nursery, if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
     """
 
     name: str
@@ -82,7 +82,7 @@ class TrackerSettings:
 
     @cached_property
     def angles_alone(self) -> bool:
-        """Whether no sensor tells a distance, so that none starts a track alone."""
+        """Whether no sensor measures distances, so that none starts a track alone."""
         return all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
 
     @cached_property
@@ -92,7 +92,7 @@ class TrackerSettings:
 
     @cached_property
     def terms(self) -> ScoreTerms:
-        """What detections and misses of each sensor add to a score."""
+        """Scores of detections and misses of each sensor."""
         return score_terms(self.sensors)
 
     @cached_property

@@ -1,8 +1,8 @@
-"""Finished tracks smoothed: each position by all measurements of its track, those before it and those after it.
+"""Smoothing of finished tracks: each position uses all measurements of its track, earlier and later ones.
 
-A tracker that decides for good which measurement is whose leaves a filter's problem. Each track is filtered again,
-from its first detection to its last, and the recursion of Rauch, Tung and Striebel runs back over it. The IMM's
-mixtures are smoothed by their moments (`assoc.filters.FixedLagSmoother`).
+Once the association is final, each track is filtered again from its first detection to its last, and smoothed by the
+backward recursion of Rauch, Tung and Striebel. The IMM's mixtures are smoothed by their moments
+(`assoc.filters.FixedLagSmoother`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     Parameters
     ----------
     tracker : Tracker
-        Its filter and its way to begin tracks are used; it is not changed.
+        Only its filter and its initiation are used; it is not changed.
     scene : Scene
     decisions : sequence of Decision
         The final decisions of all scans, see `assoc.tracking.track_scene`.
@@ -40,28 +40,29 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     Returns
     -------
     TrackTable
-        One row for each track and scan, from its first detection to its last, also where scans in between missed it.
-        Its existence is 1; it has no score (NaN).
+        One row for each track and scan, from its first detection to its last, scans that missed it included.
+        Existence is 1; there is no score (NaN).
 
     Raises
     ------
     InvalidInputError
-        Measurements have times of their own, the tracker corrects biases of sensors, or the decisions are those of
+        Measurements have times of their own, the tracker corrects biases of sensors, or the decisions belong to
         other scans.
     """
     check_smoothable(scene, corrects=tracker.settings.registration is not None)
-    for one in decisions:
-        scan = scene.scan(one.scan)
-        if one.time != scan.time or [len(ids) for ids in one.assigned] != scan.sizes.tolist():
-            raise InvalidInputError(f"decisions: that of scan {one.scan} is of another scan than the scene's")
-    ordered = sorted(decisions, key=lambda one: one.scan)
-    sure = {i for one in ordered for ids, known in zip(one.assigned, one.confirmed, strict=True) for i in ids[known]}
+    for decision in decisions:
+        scan = scene.scan(decision.scan)
+        if decision.time != scan.time or [len(ids) for ids in decision.assigned] != scan.sizes.tolist():
+            raise InvalidInputError(f"decisions: that of scan {decision.scan} is of another scan than the scene's")
+    ordered = sorted(decisions, key=lambda decision: decision.scan)
+    flags = [pair for decision in ordered for pair in zip(decision.assigned, decision.confirmed, strict=True)]
+    sure = {i for ids, confirmed in flags for i in ids[confirmed]}
     rows: dict[int, dict[int, Array]] = {int(i): {} for i in sorted(sure) if i > 0}
-    for one in ordered:
-        for s, ids in enumerate(one.assigned):
+    for decision in ordered:
+        for s, ids in enumerate(decision.assigned):
             for m in np.flatnonzero(np.isin(ids, list(rows))).tolist():
-                own = rows[int(ids[m])].setdefault(one.scan, np.zeros(len(one.assigned), dtype=np.int32))
-                own[s] = m + 1
+                taken = rows[int(ids[m])].setdefault(decision.scan, np.zeros(len(decision.assigned), dtype=np.int32))
+                taken[s] = m + 1
     table = TrackTable(scene.origin)
     for track_id, found in rows.items():
         table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position)
@@ -108,6 +109,6 @@ def check_smoothable(scene: Scene, *, corrects: bool) -> None:
 
 
 def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:
-    """The window at a track's first detection, which tells the position; a later one will tell the velocity."""
+    """The window at a track's first detection, which gives the position; the velocity has its prior."""
     positions, covariances = positions_and_covariances(scene, scan, rows[None])
     return Window(tracker.settings.initiation.start(smoother.filter, positions, covariances))

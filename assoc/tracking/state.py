@@ -1,6 +1,6 @@
-"""What a tracker knows between two steps: one immutable record, which a step takes and another of which it returns.
+"""The state of a tracker between two steps: an immutable record; a step takes one and returns another.
 
-Going back is keeping an old state, saving is writing it (`assoc.tracking.file`). Nothing in a state is written to.
+To go back, keep an old state; to save, write it (`assoc.tracking.file`). Nothing in a state is modified.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ class TrackerState(NamedTuple):
     """A tracker between two steps."""
 
     tracks: TrackBatch
-    """Tracks; of a multiple hypothesis tracker the branches of its trees."""
+    """Tracks; in a multiple hypothesis tracker, the branches."""
     turns: Array
-    """Turns that each sensor does in a scan, on average, (S,)."""
+    """Mean number of turns of each sensor in a scan, (S,)."""
     own: Any
-    """What this kind of tracker knows besides; see `assoc.tracking.associate.method`."""
+    """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
     time: float | None = None
-    """Of the last scan, seconds."""
+    """Time of the last scan, seconds; None before the first."""
     scan: int = 0
     """Number of scans so far."""
     pace: float = 0.0
     """Usual seconds from scan to scan, 0 while it is not known."""
     next_id: int = 1
     solver_calls: int = 0
-    """Problems that the solver was given so far."""
+    """Number of calls of the solver so far."""
     registration: OnlineRegistration | None = None
     identities: Identities | None = None
     nursery: Nursery | None = None
     rng: Any = None
     """State of the filter's random generator, if it has one."""
     warned: bool = False
-    """Whether a warning has said that the measurements can start no track."""
+    """Whether the tracker has warned that the measurements can start no track."""
 
 
 class Nursery(NamedTuple):
-    """Tracks of bearings alone in the making; see `assoc.tracking.births.nursery`."""
+    """Tentative tracks of bearings alone; see `assoc.tracking.births.nursery`."""
 
     state: TrackerState
     unseen: Unseen
-    """How often in a row each sensor has missed each track that has left the nursery."""
+    """Misses in a row of the tracks that have left the nursery."""
 
 
 def first_state(settings: TrackerSettings) -> TrackerState:

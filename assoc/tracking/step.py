@@ -1,8 +1,8 @@
 """A step of a tracker: check -> register -> predict -> associate -> life cycle -> report, one function a stage.
 
-A stage takes a step under way and hands it on (`assoc.tracking.progress`); `stages_of` lists those that a tracker has.
-What a measurement adds to a track's score is told by the filter's correction: associating and updating are one stage.
-Whatever fails, the state of before is as it was: stages write to nothing.
+A stage takes a step under way (`assoc.tracking.progress`) and returns the next one; `stages_of` lists the stages of a
+tracker. Scores of measurements come from the filter's update, so associating and updating are one stage. Stages do not
+modify their input: after an error the old state is intact.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import predict_each
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
-from assoc.tracking.births.nursery import current, end_ghosts, raise_young, take_over
+from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
 from assoc.tracking.checking import checked_measurements, checked_time
 from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.looks import excuse, keep_pace
@@ -43,7 +43,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         predict,
         associate,
         live,
-        *([end_ghosts, young] if nursing else []),
+        *([end_ghosts, grow_nursery] if nursing else []),
         *([remember_identities] if settings.identity is not None else []),
         excuse,
         report,
@@ -51,12 +51,12 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
 
 
 def advance(settings: TrackerSettings, state: TrackerState, scan: Scan) -> tuple[TrackerState, Step]:
-    """Take in a checked scan.
+    """Process a checked scan.
 
     Returns
     -------
     state, step
-        What the tracker is after it, and what it says of it.
+        The tracker's state after it, and its result.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def check(
     if settings.identity is not None and identities is not None:
         codes = tuple(checked_identities(identities, [len(z) for z in checked]))
         if stamps is None:
-            # identities are weighed where measurements are followed one by one, at their own times
+            # only the functions for measurements with times of their own weigh identities
             stamps = tuple(np.full(len(z), when) for z in checked)
     return Scan(state.scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
 
@@ -120,7 +120,7 @@ def _checked_stamps(
 
 
 def _warned(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TrackerState:
-    """Warn once where angles alone can start no track, and there is none."""
+    """Warn once if there is no track and measurements of angles alone cannot start one."""
     sensors = settings.sensors
     if not settings.angles_alone or state.warned or not any(map(len, scan.measurements)):
         return state
@@ -137,7 +137,7 @@ def _warned(settings: TrackerSettings, state: TrackerState, scan: Scan) -> Track
 
 
 def register(progress: Progress) -> Progress:
-    """Estimate the sensors' biases by the scan, and correct its measurements by them."""
+    """Update the estimated biases of the sensors by the scan, and correct its measurements."""
     scan = progress.scan
     assert progress.state.registration is not None
     registration = progress.state.registration.after(scan.time, scan.measurements)
@@ -146,7 +146,7 @@ def register(progress: Progress) -> Progress:
 
 
 def predict(progress: Progress) -> Progress:
-    """Let time pass: some targets leave; tracks move to the scan, or are followed from measurement to measurement."""
+    """Lower the existence of tracks by the time passed; predict them to the scan, or prepare them for own times."""
     settings, dt = progress.settings, progress.elapsed
     tracks = progress.state.tracks.survived(dt / settings.life_cycle.lifetime)
     progress = progress.with_state(tracks=tracks)
@@ -159,7 +159,7 @@ def predict(progress: Progress) -> Progress:
 
 
 def _timed(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TimedScan:
-    """The tracks and a scan whose measurements have times of their own."""
+    """Tracks and scan, where measurements have times of their own."""
 
     def start(where: Array, spread: Array, lag: Array) -> Any:
         return settings.initiation.start(settings.filter, where, spread, lag)
@@ -173,7 +173,7 @@ def _timed(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TimedS
 
 
 def _evidence(state: TrackerState, scan: Scan) -> PairEvidence | None:
-    """What identities say of pairs of a row of the tracks and a measurement."""
+    """Evidence of identities about pairs of a track's row and a measurement; None without identities."""
     known, codes, track_id = state.identities, scan.identities, state.tracks.track_id
     if known is None or codes is None:
         return None
@@ -181,7 +181,7 @@ def _evidence(state: TrackerState, scan: Scan) -> PairEvidence | None:
 
 
 def associate(progress: Progress) -> Progress:
-    """Associate the measurements with the tracks, which are corrected by them, and begin new tracks."""
+    """Associate measurements with tracks, update the tracks, and begin new ones."""
     method = progress.settings.method
     if progress.timed is None:
         return progress._replace(found=method.at_once(progress))
@@ -189,28 +189,28 @@ def associate(progress: Progress) -> Progress:
 
 
 def live(progress: Progress) -> Progress:
-    """Confirm tracks, decide, delete tracks."""
+    """Confirm tracks, report decisions, delete tracks."""
     done: Progress = progress.settings.method.life_cycle(progress, progress.found)
     return done
 
 
 def remember_identities(progress: Progress) -> Progress:
-    """Take note of what the plots of each track told."""
-    state, told, step = progress.state, progress.scan.identities, progress.step
+    """Add the identities of this scan's plots to their tracks."""
+    state, codes, step = progress.state, progress.scan.identities, progress.step
     assert state.identities is not None and step is not None
-    if told is None:
+    if codes is None:
         return progress
-    return progress.with_state(identities=state.identities.after(step.assigned, told, state.tracks.track_id))
+    return progress.with_state(identities=state.identities.after(step.assigned, codes, state.tracks.track_id))
 
 
 def report(progress: Progress) -> Progress:
-    """End the step: the state is that after the scan."""
+    """End the step: set time, scan number and counters of the new state."""
     work, scan = progress.work, progress.scan
     return progress.with_state(
         time=scan.time, scan=progress.state.scan + 1, next_id=work.next_id, solver_calls=work.solver_calls
     )
 
 
-def young(progress: Progress) -> Progress:
-    """Take a step of the nursery with the measurements that the tracks have left over."""
-    return raise_young(progress, [keep_pace, predict, associate, live, excuse, report])
+def grow_nursery(progress: Progress) -> Progress:
+    """Step the nursery with the measurements that no track took."""
+    return step_nursery(progress, [keep_pace, predict, associate, live, excuse, report])

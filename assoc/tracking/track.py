@@ -1,4 +1,4 @@
-"""What trackers hand out: tracks, and what a step decided."""
+"""Results of trackers: tracks, decisions and steps."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Track(Shown):
     Attributes
     ----------
     track_id : int
-        From 1, never used again.
+        From 1, never reused.
     time : float
-        To which the state belongs, seconds.
+        Time of the state, seconds.
     mean, covariance : arrays (n,), (n, n)
         In the order of the motion model.
     position, velocity : arrays (3,)
-        Metres, m/s; what the motion model does not have is 0.
+        Metres, m/s; components that the motion model lacks are 0.
     confirmed : bool
     score : float
         Log likelihood ratio against false alarms.
@@ -51,12 +51,12 @@ class Track(Shown):
 
     @property
     def reported(self) -> bool:
-        """Whether it is confirmed and its target rather there than not."""
+        """Whether it is confirmed and its existence is at least 0.5."""
         return self.confirmed and self.existence >= 0.5
 
     def named(self, track_id: int) -> Track:
         """The same track under another id."""
-        # `dataclasses.replace` takes longer than all else that is done with a track
+        # `dataclasses.replace` would take longer than everything else done with a track
         made = object.__new__(Track)
         made.__dict__.update(self.__dict__, track_id=track_id)
         return made
@@ -69,7 +69,7 @@ class Track(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Decision(Shown):
-    """Which track each measurement of one scan went to.
+    """The track of each measurement of one scan.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Decision(Shown):
     assigned : tuple over sensors of int64 arrays (n_s,)
         Track of each measurement; 0 is a false alarm.
     confirmed : tuple over sensors of bool arrays (n_s,)
-        Whether that track was confirmed when this was said.
+        Whether that track was confirmed at the time of the decision.
     """
 
     scan: int
@@ -89,14 +89,14 @@ class Decision(Shown):
     confirmed: tuple[Array, ...]
 
     def __repr__(self) -> str:
-        sizes = " + ".join(str(len(one)) for one in self.assigned)
-        tracks = len({int(one) for ids in self.assigned for one in ids if one > 0})
+        sizes = " + ".join(str(len(ids)) for ids in self.assigned)
+        tracks = len({int(i) for ids in self.assigned for i in ids if i > 0})
         return f"{type(self).__name__}(scan {self.scan}, t = {self.time:g} s: {sizes} measurements, {tracks} tracks)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Step(Decision):
-    """What one step of a tracker did; for a tracker that defers decisions, what it would decide now.
+    """Result of a tracker's step; for a tracker that defers decisions, its present best decision.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Step(Decision):
     ended : int64 array
         Confirmed tracks deleted in this step.
     late, refused : int
-        Measurements that were older than the last scan and taken in, and those too old for that; see
+        Measurements older than the last scan that were used, and those too old for that; see
         `assoc.tracking.LatePlots`.
     """
 
@@ -117,7 +117,7 @@ class Step(Decision):
 
 
 def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
-    """Of each measurement of each sensor the value (int64) of the track that took it, 0 where none did.
+    """For each measurement of each sensor, the value (int64) of the track that took it, 0 if none did.
 
     Parameters
     ----------
@@ -136,6 +136,6 @@ def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
 
 
 def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: Array) -> Decision:
-    """Make a decision from track ids and the ids that are confirmed."""
-    ids = tuple(np.asarray(one, dtype=np.int64) for one in assigned)
-    return Decision(scan, time, ids, tuple(np.isin(one, confirmed_ids) & (one > 0) for one in ids))
+    """Make a decision from track ids and the ids of confirmed tracks."""
+    ids = tuple(np.asarray(array, dtype=np.int64) for array in assigned)
+    return Decision(scan, time, ids, tuple(np.isin(array, confirmed_ids) & (array > 0) for array in ids))

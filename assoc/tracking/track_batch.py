@@ -1,4 +1,4 @@
-"""Many tracks as arrays: what trackers keep of them between scans."""
+"""Many tracks as arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from assoc.tracking.life_cycle import HISTORY, LifeCycle
 from assoc.tracking.track import Track
 
 MASK = (1 << HISTORY) - 1
-"""The scans whose detections are remembered, one a bit."""
+"""Number of last scans whose detections are stored, one bit each."""
 
 
 SCORE, BEST, STARTED, LAST, EXISTS = 0, 1, 2, 3, 4
@@ -37,14 +37,14 @@ def _column(table: str, number: int, what: str) -> Any:
 class TrackBatch:
     """T tracks (or branches of tracks).
 
-    Two tables hold all but the states: a tracker with few tracks spends its time on calls, not on numbers.
+    Two tables hold everything but the states: with few tracks, the number of numpy calls determines the time.
 
     Attributes
     ----------
     states
-        The filter's states, all of one time.
+        The filter's states, all at one time.
     numbers : array (T, 5)
-        Score, best score, start, last detection, logarithm of the odds of existence.
+        Score, best score, start (s), last detection (s), log odds of existence.
     counts : int64 array (T, 5)
         Track id, confirmed, detections, missed, hits.
     """
@@ -78,7 +78,7 @@ class TrackBatch:
 
     @staticmethod
     def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> TrackBatch:
-        """Tracks that begin now, each with one detection that the scan's `counted` will count."""
+        """New tracks, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
         numbers, counts = np.empty((count, 5)), np.zeros((count, 5), dtype=np.int64)
         numbers[:, SCORE] = numbers[:, BEST] = numbers[:, EXISTS] = score
@@ -100,7 +100,7 @@ class TrackBatch:
         return TrackBatch(states, self.numbers, self.counts)
 
     def scored(self, states: Any, gain: Array | float, detected_at: Array | None = None) -> TrackBatch:
-        """Tracks after a scan of one sensor, or of all: states, what the score gains, and detections.
+        """Tracks after a scan of one sensor, or of all: new states, gain of scores, detections.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class TrackBatch:
         return TrackBatch(states, numbers, self.counts)
 
     def survived(self, lifetimes: float) -> TrackBatch:
-        """Tracks so many mean lifetimes later: exp(-lifetimes) of the targets are still there."""
+        """Tracks after `lifetimes` mean lifetimes: existence is multiplied by exp(-lifetimes)."""
         if lifetimes == 0.0:
             return self
         numbers = self.numbers.copy()
@@ -128,15 +128,15 @@ class TrackBatch:
         return TrackBatch(self.states, numbers, self.counts)
 
     def not_overlooked(self, gain: Array) -> TrackBatch:
-        """The same tracks, their existence (not their score) mended by what misses took that were none, (T,)."""
+        """The same tracks with `gain` (T,) added to the log odds of existence (not to the score)."""
         numbers = self.numbers.copy()
         numbers[:, EXISTS] += gain
         return TrackBatch(self.states, numbers, self.counts)
 
     def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
-        """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor.
+        """Count the scan's detections and misses: `detected`, bool (T,), by any sensor.
 
-        With `looked` (bool (T,)) the scan counts only for tracks that any sensor looked at.
+        With `looked`, bool (T,), the scan counts only for tracks that some sensor looked at.
         """
         if looked is not None and not looked.all():
             rows = np.flatnonzero(looked | detected)
@@ -151,13 +151,13 @@ class TrackBatch:
         return TrackBatch(self.states, self.numbers, counts)
 
     def with_confirmed(self, confirmed: Array | bool) -> TrackBatch:
-        """The same tracks, those in the mask confirmed, and no others."""
+        """The same tracks; exactly those in the mask are confirmed."""
         counts = self.counts.copy()
         counts[:, SURE] = confirmed
         return TrackBatch(self.states, self.numbers, counts)
 
     def confirm(self, life_cycle: LifeCycle) -> TrackBatch:
-        """Confirm the tracks whose time has come."""
+        """Confirm the tracks that meet the criterion."""
         return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections))
 
     def to_delete(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
@@ -171,7 +171,7 @@ class TrackBatch:
         return found | {f"state.{name}": value for name, value in arrays_of(self.states).items()}
 
     def restored(self, arrays: Mapping[str, Array]) -> TrackBatch:
-        """A batch of the kind of this one, made of the arrays of another."""
+        """A batch like this one, from the `arrays` of another."""
         numbers = np.stack([arrays[name] for name in _NUMBERS], axis=1)
         counts = np.stack([arrays[name].astype(np.int64) for name in _COUNTS], axis=1)
         state = {name: arrays[f"state.{name}"] for name in arrays_of(self.states)}

@@ -39,18 +39,18 @@ compass heading."""
 class TrackTable(Shown):
     """Collects tracks of scan after scan.
 
-    It grows with what it is given; trackers do not. Write parts of it away where a recording never ends.
+    It grows with every scan; for endless recordings write it in parts.
 
     Parameters
     ----------
     origin : tuple of latitude, longitude, height, optional
-        Of the scene (`assoc.Scene.origin`): the table then has latitude and longitude in degrees, and altitudes
+        `assoc.Scene.origin` of the scene: the table then has latitude and longitude in degrees, and altitudes
         above the ellipsoid.
 
     Attributes
     ----------
     targets : dict of int to str
-        Name of the target that a track followed most, where the truth has names: column target.
+        Name of the target that each track followed most, where the truth has names: column target.
     """
 
     def __repr__(self) -> str:
@@ -73,18 +73,18 @@ class TrackTable(Shown):
         ----------
         tracks : iterable of Track
         positions : sequence of int
-            Where x, y (and z) stand in the state: ``filter.motion.position``.
+            Indices of x, y (and z) in the state: ``filter.motion.position``.
         altitudes : mapping of track id to metres, optional
-            What transponders have told; without it the altitude is z, of tracks in the plane NaN.
+            Altitudes by transponders; without them the altitude is z, or NaN for planar tracks.
         """
         for track in tracks:
             sigma = np.zeros(3)
             sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
             vx, vy = track.velocity[:2].tolist()
-            told = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
+            altitude = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
             life = track.confirmed, track.score, track.hits, track.started, track.last_detection
             speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
-            altitude = told if altitudes is None else altitudes.get(track.track_id, math.nan)
+            altitude = altitude if altitudes is None else altitudes.get(track.track_id, math.nan)
             where = *track.position.tolist(), *track.velocity.tolist()
             more = *sigma.tolist(), track.existence, speed, heading, altitude
             self._rows.append((track.track_id, track.time, *where, *life, *more))
@@ -106,7 +106,7 @@ class TrackTable(Shown):
         frame = frame.astype(kinds)
         if self.origin is not None:
             latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
-            # a track in the plane has no height of its own; what its transponder told stays
+            # planar tracks have no z; altitudes by transponders stay
             frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
             frame = frame.assign(latitude=latitude, longitude=longitude)
         if self.targets:
@@ -139,9 +139,9 @@ class TrackTable(Shown):
         write_atomically(path, lambda file: frame.to_parquet(file, index=False))
 
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
-        """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take.
+        """Times (n,), track ids (n,) and positions (n, 3) of confirmed tracks or of all, for metrics.
 
-        Where several scans are of one time, the last row of each track.
+        Of several scans at one time, the last row of each track.
         """
         rows = [row for row in self._rows if row[8] or not confirmed]
         times = np.array([row[1] for row in rows], dtype=np.float64)
@@ -162,14 +162,14 @@ def track_scene(
     tracker : Tracker
     scene : Scene
     confirmed : bool
-        Whether only confirmed tracks are listed, while their targets are rather there than not (`Track.reported`).
+        Whether only tracks that are confirmed and probably exist are listed (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
 
     Returns
     -------
     table, decisions
-        The tracks as they were after each scan, and the final decisions, the open ones at the end included.
+        The tracks after each scan, and the final decisions, including those still open at the end.
     """
     table = TrackTable(scene.origin)
     decisions: list[Decision] = []

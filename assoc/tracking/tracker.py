@@ -1,4 +1,4 @@
-"""A tracker: settings that never change, one state, and the doors to both."""
+"""The class of all trackers: settings that never change, and one state."""
 
 from __future__ import annotations
 
@@ -45,37 +45,36 @@ class Tracker:
         Any filter of `assoc.filters`; by default interacting multiple models, quiet flight and manoeuvres
         (`assoc.tracking.filter_choice.two_speeds`).
     region : array_like (3, 2), optional
-        Bounds of x, y, z in metres, where targets are; see `assoc.Scene`.
+        Bounds of x, y, z of the targets, metres; see `assoc.Scene`.
     solver : str
         One of ``assoc.solvers.names()``; solves the assignment problems.
     solver_parameters : mapping, optional
     seed : int
-        Of the solver's randomness; the same seed gives the same tracks.
+        Seed of the solver; the same seed gives the same tracks.
     time_limit : float or None
-        Seconds for each assignment problem; when they are over the best solution found is taken, which then
-        depends on the machine. By default there is no clock; where `solver_parameters` say nothing of `nodes` the
-        exact solver stops after so many that dense scenes do not take minutes, the same on every machine.
+        Seconds for each assignment problem, after which the best solution found is used; the tracks then depend on
+        the machine. By default there is no time limit; unless `solver_parameters` set `nodes`, the exact solver has
+        a limit of nodes, the same on every machine, so that dense scenes do not take minutes.
     life_cycle : LifeCycle, optional
     initiation : Initiation, optional
     gate_probability : float
-        Share of true measurements that a gate lets through, above 0 and below 1.
+        Share of true measurements inside the gate, above 0 and below 1.
     max_tuples : int
         The most candidate tuples in a scan.
     registration : "online" or OnlineRegistration, optional
-        Estimates the sensors' biases from the measurements that come in and corrects these by them; all measurements of
-        a scan must then be of one instant. Without it measurements are taken as they are.
+        Estimates the sensors' biases while tracking and corrects the measurements; all measurements of a scan must
+        then be of one instant. Without it measurements are not corrected.
     identity : IdentityParameters, optional
-        How far Mode 3/A codes and addresses of measurements, which `step` may be given, tell to which track these
-        belong. Without it they are not looked at.
+        How to weigh Mode 3/A codes and addresses that `step` is given. Without it they are ignored.
     **own
-        Settings of the kind of tracker.
+        Settings of this kind of tracker.
 
     Attributes
     ----------
     settings : TrackerSettings
-        They never change.
+        Immutable.
     state : TrackerState
-        All that the tracker knows; immutable. To go back, keep it and set it again.
+        Everything the tracker knows, immutable. To go back, keep it and set it again.
 
     Raises
     ------
@@ -152,32 +151,32 @@ class Tracker:
 
     @property
     def registration(self) -> OnlineRegistration | None:
-        """The sensors' biases as they are known now; None where they are not estimated."""
+        """The present estimates of the sensors' biases; None if they are not estimated."""
         return self.state.registration
 
     @property
     def solver_calls(self) -> int:
-        """Problems that the solver was given so far."""
+        """Number of calls of the solver so far."""
         return self.state.solver_calls
 
     @property
     def tracks(self) -> list[Track]:
-        """The tracks that live now, confirmed or not, by their ids."""
+        """The living tracks, confirmed or not, sorted by id."""
         if self.state.time is None:
             return []
         return current(self.settings, self.state).tracks(self.filter, self.state.time)
 
     def begin(self, time: float, tracks: Gaussian, score: float = 20.0) -> Array:
-        """Take over targets that are known, from another system or a plan, before the first step.
+        """Start confirmed tracks of known targets, from another system or a plan, before the first step.
 
         Parameters
         ----------
         time : float
-            To which the states belong, seconds.
+            Time of the states, seconds.
         tracks : Gaussian
             Means and covariances in the order of the filter's motion model.
         score : float
-            What their track scores start with; they are confirmed.
+            Initial track score.
 
         Returns
         -------
@@ -206,24 +205,23 @@ class Tracker:
         sectors: Array | None = None,
         identities: Sequence[Array] | None = None,
     ) -> Step:
-        """Take one scan in.
+        """Process one scan.
 
         Parameters
         ----------
         time : float
-            Seconds, not before that of the last scan. Tracks are given for this time.
+            Seconds, not before the last scan's. Tracks are predicted to this time.
         measurements : sequence over sensors of arrays (n_s, d_s)
             n_s may be 0.
         times : sequence over sensors of arrays (n_s,), optional
-            Each measurement's own time, not before the last scan's and not after `time`; left out, all are of `time`.
-            What is older belongs into `assoc.tracking.LatePlots`.
+            Each measurement's own time, not before the last scan's and not after `time`; default: `time`. For older
+            measurements use `assoc.tracking.LatePlots`.
         sectors : array_like (S, 2), optional
-            From which to which azimuth each sensor looked since the last scan, see `assoc.Scene`: what a sensor did
-            not look at it has not missed. No sensor may have looked at anything twice. Left out, all looked
-            everywhere.
+            Azimuths between which each sensor looked since the last scan, see `assoc.Scene`: a sensor misses only
+            what it looked at. No sensor may have looked in a direction twice. Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
-            Mode 3/A code and ICAO address of each measurement, 0 where it has none. Used by trackers that were made
-            with `identity`, others do not look at them.
+            Mode 3/A code and ICAO address of each measurement, 0 where it has none; ignored by trackers that were
+            made without `identity`.
 
         Returns
         -------
@@ -232,20 +230,20 @@ class Tracker:
         Raises
         ------
         InvalidInputError
-            The time runs backwards, or measurements have the wrong shape, are not finite, or are none that the
-            sensor can have made. Whatever the error, the tracker is as it was before the step.
+            The time is before the last scan's, or measurements have the wrong shape, are not finite, or are outside
+            the sensor's range of values. After any error the tracker is as it was before the step.
 
         Warns
         -----
         AssocWarning
-            Once, where all sensors measure angles alone and these measurements can start no track.
+            Once, if all sensors measure angles alone and these measurements can start no track.
         """
         scan = check(self.settings, self.state, time, measurements, times, sectors, identities)
         self.state, step = advance(self.settings, self.state, scan)
         return step
 
     def flush(self) -> tuple[Decision, ...]:
-        """What the tracker says of the scans that are not final yet, oldest first; for the end of a recording."""
+        """Decisions about the scans that are not final yet, oldest first; for the end of a recording."""
         decisions: tuple[Decision, ...] = self.settings.method.open_decisions(self.state)
         return decisions
 
@@ -254,7 +252,7 @@ class Tracker:
         file.save(path, self.settings, self.state)
 
     def restore(self, path: str | os.PathLike[str]) -> None:
-        """Read the state that a tracker with the same settings has saved; the future is the same, bit for bit.
+        """Read the state of a tracker with the same settings; later results are the same, bit for bit.
 
         Raises
         ------

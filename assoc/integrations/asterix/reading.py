@@ -153,9 +153,9 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
             else:
                 rows.rows.append(found)
     if not any(rows.rows for rows in (*plots.values(), *reports.values())):
-        said = "; ".join(f"{count} {what}" for what, count in notes.items())
+        skipped = "; ".join(f"{count} {what}" for what, count in notes.items())
         raise InvalidInputError(
-            f"{os.fspath(path)}: holds no ASTERIX plots (048) or reports (021){': ' + said if said else ''}"
+            f"{os.fspath(path)}: holds no ASTERIX plots (048) or reports (021){': ' + skipped if skipped else ''}"
         )
     name = os.path.basename(os.fspath(path))
     if seen_from is None:

@@ -56,16 +56,16 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     ids = finite_array(tracks["track_id"].to_numpy(), "tracks: track_id", (len(tracks),))
     if (ids != np.round(ids)).any():
         raise InvalidInputError("tracks: expected whole numbers in the column 'track_id'")
-    raw, told = {}, {}
+    raw, given = {}, {}
     for name, (step, bits) in _STEPS.items():
         try:
             values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
         except (TypeError, ValueError):
             raise InvalidInputError(f"tracks: expected numbers in the column {name!r}") from None
         most = 1 << (bits - 1)
-        told[name] = ~np.isnan(values)
+        given[name] = ~np.isnan(values)
         if name not in ("x", "y"):
-            values = np.where(told[name], values, 0.0)
+            values = np.where(given[name], values, 0.0)
         if len(values) and not ((values >= -most) & (values < most)).all():
             expected = f"expected at most {most * step:g} in size"
             raise InvalidInputError(f"tracks: {name} does not fit category 062, {expected}")
@@ -82,10 +82,10 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
                 "100": (("X", int(raw["x"][k])), ("Y", int(raw["y"][k]))),
             }
         )
-        if told["vx"][k] and told["vy"][k]:
+        if given["vx"][k] and given["vy"][k]:
             contents[-1]["185"] = (("VX", int(raw["vx"][k])), ("VY", int(raw["vy"][k])))
         for item, name in (("130", "z"), ("220", "vz")):
-            if told[name][k]:
+            if given[name][k]:
                 contents[-1][item] = int(raw[name][k])
     write_blocks(path, 62, contents)
 
@@ -121,11 +121,11 @@ def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
             parts |= {"vx": value(record, "185", "VX"), "vy": value(record, "185", "VY")}
             now = clock.time(time)
             clock.rows.append((now,))
-            said = {
+            values = {
                 name: np.nan if parts[name] is None else signed(int(parts[name] or 0), bits) * step
                 for name, (step, bits) in _STEPS.items()
             }
-            found.append({"track_id": number, "time": now, **said, "confirmed": value(record, "080", "CNF") != 1})
+            found.append({"track_id": number, "time": now, **values, "confirmed": value(record, "080", "CNF") != 1})
     if not found:
         said_of = "; ".join(f"{count} {what}" for what, count in notes.items())
         raise InvalidInputError(f"{os.fspath(path)}: holds no ASTERIX tracks (062){': ' + said_of if said_of else ''}")

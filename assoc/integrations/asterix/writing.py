@@ -27,7 +27,7 @@ def time_of_day(seconds: float) -> int:
 
 def check_source(source: Source) -> None:
     """Refuse codes that are no system area and identification codes."""
-    if len(source) != 2 or not all(isinstance(one, int) and 0 <= one <= 255 for one in source):
+    if len(source) != 2 or not all(isinstance(number, int) and 0 <= number <= 255 for number in source):
         raise InvalidInputError(f"source: expected SAC and SIC, whole numbers from 0 to 255, got {source!r}")
 
 
@@ -69,8 +69,8 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     for name, bits in (("identities", 12), ("addresses", 24)):
         most = int(getattr(recording, name).max(initial=0))
         if most >> bits:
-            said = "; octal digits are read from a column mode3_oct" if name == "identities" else ""
-            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}{said}")
+            hint = "; octal digits are read from a column mode3_oct" if name == "identities" else ""
+            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}{hint}")
     theta = np.round((math.pi / 2 - recording.azimuths) / ANGLE_STEP).astype(np.int64) % 65536
     levels = np.round(recording.altitudes / LEVEL_STEP)
     wide = ~np.isnan(levels) & ((levels < -8192) | (levels > 8191))

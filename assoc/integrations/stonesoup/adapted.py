@@ -155,7 +155,7 @@ def adapt(
         if kind is BearingSensor or type(model) is CartesianToBearingRange:
             mapping = mapping[:2]
     else:
-        known = ", ".join(one.__name__ for one in (*_KNOWN, LinearGaussian))
+        known = ", ".join(kind.__name__ for kind in (*_KNOWN, LinearGaussian))
         raise InvalidInputError(f"measurement model {type(model).__name__} is not known here; known: {known}")
     noise = np.asarray(model.covar(), dtype=np.float64)[np.ix_(order, order)]
     options["field_of_view"] = _full_view(kind, max_range) if field_of_view is None else field_of_view

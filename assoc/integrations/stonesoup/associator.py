@@ -90,7 +90,7 @@ def _problem(
     pairs: Mapping[tuple[int, int], Hypothesis], missed: Mapping[int, Hypothesis], sizes: tuple[int, int]
 ) -> AssignmentProblem:
     """Tracks and detections as the two sensors of a problem; a lone index is a track missed or clutter."""
-    kinds = {isinstance(one, ProbabilityHypothesis) for one in (*pairs.values(), *missed.values())}
+    kinds = {isinstance(hypothesis, ProbabilityHypothesis) for hypothesis in (*pairs.values(), *missed.values())}
     if len(kinds) > 1:
         raise InvalidInputError("hypotheses: some have probabilities and some distances, expected one kind")
     by_probability = kinds.pop()

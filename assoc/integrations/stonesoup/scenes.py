@@ -86,9 +86,9 @@ def _own_times(
     stamps = [
         [[d.timestamp or time for d in part] for part in parts] for time, parts in zip(moments, scans, strict=True)
     ]
-    if all(one == time for time, parts in zip(moments, stamps, strict=True) for part in parts for one in part):
+    if all(stamp == time for time, parts in zip(moments, stamps, strict=True) for part in parts for stamp in part):
         return None
-    return [[np.array([(one - zero).total_seconds() for one in part]) for part in parts] for parts in stamps]
+    return [[np.array([(stamp - zero).total_seconds() for stamp in part]) for part in parts] for parts in stamps]
 
 
 def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[Any]]]:
@@ -98,7 +98,7 @@ def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tu
         if previous is not None and time < previous:
             raise InvalidInputError(f"detections: time {time} comes after {previous}, expected increasing times")
         previous = time
-        yield time, [one for _, found in group for one in found]
+        yield time, [detection for _, found in group for detection in found]
 
 
 def region_of(frame: Frame, region: ArrayLike | None) -> Array:
@@ -124,8 +124,8 @@ def _truth(
             known.setdefault(moment, []).append((i, place))
     present = [known.get(moment, []) for moment in moments]
     return Truth(
-        target_ids=[np.array([i for i, _ in one], dtype=np.int64) for one in present],
-        positions=[np.array([place for _, place in one]).reshape(len(one), 3) for one in present],
+        target_ids=[np.array([i for i, _ in targets], dtype=np.int64) for targets in present],
+        positions=[np.array([place for _, place in targets]).reshape(len(targets), 3) for targets in present],
         sources=[
             [np.array([number.get(id(getattr(d, "groundtruth_path", None)), -1) for d in p], dtype=np.int64) for p in s]
             for s in scans

@@ -103,8 +103,8 @@ def _page(association: Association, each: list[Source], files: list[str], words:
         (scene_view(each[i], association.scans[i], views[owners[i]]["decimals"]) for i in drawn),  # type: ignore[arg-type]
         [scans[i] for i in drawn],
     )
-    doubts = [line for source in {id(one): one for one in each}.values() for line in warnings_of(source)]
-    sections = [("summary", "Summary", warning_list(doubts) + _summary(association))]
+    warnings = [line for source in {id(source): source for source in each}.values() for line in warnings_of(source)]
+    sections = [("summary", "Summary", warning_list(warnings) + _summary(association))]
     if association.scans:
         note = ""
         if kept < len(drawn):
@@ -129,7 +129,7 @@ def _summary(association: Association) -> str:
     count = total["scans"]
     bound = total["lower_bound"]
     gaps = [closed_gap(scan) for scan in association.scans]
-    gap = None if any(one is None for one in gaps) else sum(one or 0.0 for one in gaps)
+    gap = None if any(gap is None for gap in gaps) else sum(gap or 0.0 for gap in gaps)
     content = {
         "Targets": (f"{total['targets']:,}", f"in {count:,} scans"),
         "False alarms": (f"{total['false_alarms']:,}", f"of {total['measurements']:,} measurements"),

@@ -113,7 +113,7 @@ def _packed(text: str) -> str:
 def _policy(scripts: Sequence[str]) -> str:
     """Content security policy: nothing is loaded, and only our scripts run, even if text were read as a tag."""
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
-    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
     nothing = "default-src 'none'; connect-src 'none'; form-action 'none'; base-uri 'none'"
     return f"{nothing}; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"
 

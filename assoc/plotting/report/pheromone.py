@@ -22,7 +22,7 @@ def add_pheromone(views: Sequence[dict[str, Any]], scans: Sequence[ScanAssociati
     """Attach what is shown of the ants to the views of scans, of fewer cycles where the budget asks for it."""
     most = _CYCLES
     shown = [_view(scan.pheromone, most) for scan in scans]
-    while most > 2 and sum(len(json.dumps(one, separators=(",", ":"))) for one in shown) > budget:
+    while most > 2 and sum(len(json.dumps(view, separators=(",", ":"))) for view in shown) > budget:
         most //= 2
         shown = [_view(scan.pheromone, most) for scan in scans]
     for view, one in zip(views, shown, strict=True):

@@ -77,7 +77,7 @@ def _summary(registration: Registration) -> str:
             "Residuals after": (noise, "of what the sensors' noise makes expect"),
         }
     )
-    items = "".join(f"<li>{escape(one)}</li>" for one in registration.open)
+    items = "".join(f"<li>{escape(line)}</li>" for line in registration.open)
     return found + (f"<p>Not observable, these sums of biases:</p><ul>{items}</ul>" if items else "")
 
 

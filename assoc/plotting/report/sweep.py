@@ -176,7 +176,7 @@ def _maps(frame: pd.DataFrame) -> list[dict[str, Any]]:
                 if np.isnan(measured(part, measure)).all():
                     continue
                 xs, ys, *tables = cells(part, measure, across, up)
-                shown[measure] = [[[number(value) for value in row] for row in one.tolist()] for one in tables]
+                shown[measure] = [[[number(value) for value in row] for row in table.tolist()] for table in tables]
             maps.append(
                 {
                     "title": f"{solver}: {across}, {up}" if several else f"{across}, {up}",
@@ -199,6 +199,6 @@ def _curves(frame: pd.DataFrame, traces: pd.DataFrame, table: pd.DataFrame) -> l
         entry = {}
         for column in ("iteration", "seconds") if len(part) else ():
             at, excess = mean_excess(part, column)
-            entry[column] = [[float(f"{value:.5g}") for value in one.tolist()] for one in (at, excess)]
+            entry[column] = [[float(f"{value:.5g}") for value in array.tolist()] for array in (at, excess)]
         curves.append(entry)
     return curves

@@ -114,8 +114,8 @@ def write_tracking_report(
     made = made_with("assoc.track", words)
     command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
-    doubts = warning_list(() if scene is None else scene.warnings)
-    sections = [("summary", "Summary", doubts + _summary(frame, len(rows), values, cutoff, plots))]
+    warnings = warning_list(() if scene is None else scene.warnings)
+    sections = [("summary", "Summary", warnings + _summary(frame, len(rows), values, cutoff, plots))]
     if len(frame) or known or (plots is not None and plots.windows):
         sections.append(("scene", "Tracks over time", _SCENE))
     if known:
@@ -133,8 +133,8 @@ def write_tracking_report(
     data = _data(frame, scene, truth, plots)
     data["gospa"] = {
         "times": plain_numbers(times, 6),
-        "distance": plain_numbers([one.distance for one in values], 4),
-        **{part: plain_numbers(np.sqrt([getattr(one, part) for one in values]), 4) for part in Gospa._fields[1:4]},
+        "distance": plain_numbers([gospa.distance for gospa in values], 4),
+        **{part: plain_numbers(np.sqrt([getattr(gospa, part) for gospa in values]), 4) for part in Gospa._fields[1:4]},
     }
     Page(title, f"{len(rows)} tracks", sections, data, ["tracks.js"]).write(path)
 
@@ -247,8 +247,8 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         life["score"] = number(float(track["score"].iloc[-1])) if "score" in track else None
         life["speed"] = length / (ended - began) if ended > began else None
         life["heading"] = float(track["heading"].iloc[-1]) if "heading" in track else None
-        told = track["altitude"].dropna().to_numpy(dtype=float) if "altitude" in track else np.zeros(0)
-        life["altitude"] = float(told[-1]) if len(told) else None
+        known = track["altitude"].dropna().to_numpy(dtype=float) if "altitude" in track else np.zeros(0)
+        life["altitude"] = float(known[-1]) if len(known) else None
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
@@ -263,7 +263,7 @@ def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
     columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
     columns += [("heading", "last heading, deg", ".0f"), ("altitude", "last altitude, m", ".0f")]
     columns += [("target", "target followed", "d"), ("share", "share of its rows", ".0%")] if known else []
-    used = [one for one in columns if any(life[one[0]] is not None for life in lives) or one[0] == "track"]
+    used = [column for column in columns if any(life[column[0]] is not None for life in lives) or column[0] == "track"]
     rows = [
         [("" if life[key] is None else format(life[key], style), life[key]) for key, _, style in used] for life in lives
     ]

@@ -90,7 +90,7 @@ def _trace(association: ScanAssociation) -> list[list[float | None]]:
     step = max(1, math.ceil(len(trace) / _LINES_OF_TRACE))
     # the last line is the answer and always stays
     kept = [*trace[:-1:step], *trace[-1:]]
-    return [[one.iteration, number(one.seconds), number(one.cost), number(one.lower_bound)] for one in kept]
+    return [[line.iteration, number(line.seconds), number(line.cost), number(line.lower_bound)] for line in kept]
 
 
 def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What trackers have in common that associate all sensors of a scan together: tracks and new tracks by their tuples."""
+"""Shared by trackers that associate all sensors of a scan together: update tracks, and start new ones, by tuples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assoc.tracking.track_batch import STARTED, TrackBatch
 
 
 def scan_problem(progress: Progress) -> AssignmentProblem:
-    """Which measurements of the scan may be a target, whether there is a track of it or not."""
+    """Candidate tuples of the scan, regardless of tracks."""
     settings = progress.settings
     return build_problem(
         settings.place, progress.scan, gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
@@ -26,27 +26,27 @@ def scan_problem(progress: Progress) -> AssignmentProblem:
 
 
 def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array) -> Association:
-    """What becomes of a scan of one instant.
+    """Apply the chosen tuples of a scan of one instant.
 
     Parameters
     ----------
     progress : Progress
         Its T tracks are predicted to the scan.
     states
-        The tracks' states after it, in their order.
+        The tracks' updated states, in their order.
     gain : array (T,)
-        What their scores gain.
+        Gains of their scores.
     rows : int array (T, S)
         Their measurements, 1-based, 0 missed.
     born : int array (K, S)
-        Tuples of the measurements that no track took.
+        Tuples that belong to no track.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
     return _joined(progress, tracks, rows, _begin(progress, born), None)
 
 
 def associated_in_order(progress: Progress, timed: TimedScan, looked: Array, rows: Array, born: Array) -> Association:
-    """What becomes of a scan with times of its own; `looked` is `TimedScan.looked`, else as `associated`."""
+    """Like `associated`, for measurements with times of their own; `looked` is `TimedScan.looked`."""
     track, terms = np.arange(len(rows)), progress.settings.terms
     followed = timed.follow(track, rows)
     gain = -score_costs(timed, followed, rows, terms, looked[track])
@@ -60,7 +60,7 @@ def associated_in_order(progress: Progress, timed: TimedScan, looked: Array, row
 def _joined(
     progress: Progress, tracks: TrackBatch, rows: Array, new: tuple[TrackBatch, Array], looked: Array | None
 ) -> Association:
-    """Tracks and new tracks, at the end of the scan; which of the tracks any sensor looked at (None: all)."""
+    """Join tracks and new tracks; `looked`: which of the tracks any sensor looked at (None: all)."""
     begun = np.ones(len(new[0]), dtype=np.bool_)
     looked = None if looked is None else np.concatenate([looked, begun])
     batch = TrackBatch.concatenate([tracks, new[0]]).counted(np.concatenate([rows.any(axis=1), begun]), looked)
@@ -68,7 +68,7 @@ def _joined(
 
 
 def _begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
-    """New tracks of tuples that tell a position, numbered by place."""
+    """New tracks of tuples that determine a position, with ids in the order of positions."""
     settings, scan = progress.settings, progress.scan
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
     if not len(tuples) or settings.nursery is not None:
@@ -87,7 +87,7 @@ def _begin_in_order(progress: Progress, timed: TimedScan, born: Array) -> tuple[
     """`_begin` where measurements have times of their own."""
     settings = progress.settings
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
-    fit = [np.append(one, False)[tuples[:, s] - 1] for s, one in enumerate(timed.places.fit)]
+    fit = [np.append(mask, False)[tuples[:, s] - 1] for s, mask in enumerate(timed.places.fit)]
     rows = tuples[np.any(fit, axis=0)]
     if not len(rows):
         return progress.state.tracks[:0], rows

@@ -1,19 +1,18 @@
-"""The joint probabilistic tracker: each track takes every measurement in its gate, each as far as it is its own.
+"""The joint probabilistic tracker: each track uses every measurement in its gate, weighted by its probability.
 
 Sensor after sensor, the joint events "these measurements are of these tracks, the others are false alarms" are the
 matchings of a graph of tracks and measurements. `assoc.ranking.pairs` sums them cluster by cluster, exactly where a
-cluster is not too wide, and with a bound on what was left out, so that each probability comes as an interval that
-holds. A track may be none: with existence probability p the pair of a track and a measurement weighs
+cluster is not too wide, and otherwise with a bound on the terms left out, so that each probability comes with an
+interval that certainly contains it. A track may be false: with existence probability p the weight of a pair is
 
     p P_D N(z; expected, S) / beta_FA,    against    1 - p P_D    for a track without a measurement,
 
-and what is left of p without a measurement is p (1 - P_D) / (1 - p P_D). A track's score is the logarithm of the odds
+and without a measurement the existence probability becomes p (1 - P_D) / (1 - p P_D). A track's score is the log odds
 of its existence, which the events update as well.
 
-Where measurements have times of their own, a track is not merged after each sensor but at the end of the scan: until
-then it is several parts, each with measurements of its own, filtered in the order of their times
-(`assoc.tracking.associate.track_parts`). The pair of a track and a measurement then weighs by the density averaged over
-parts.
+Where measurements have times of their own, a track is merged at the end of the scan, not after each sensor. Until then
+it consists of parts, each with its own measurements, filtered in time order (`assoc.tracking.associate.track_parts`),
+and the density in a pair's weight is the average over the parts.
 
 References
 ----------
@@ -50,12 +49,12 @@ from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 _SURE = 30.0
-"""Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
+"""Scores are clipped here: exp(-30) is below the accuracy of the probabilities."""
 
 
 @dataclass(frozen=True, eq=False)
 class PairProbabilities:
-    """Probabilities of one sensor's measurements in one scan to be of the tracks in whose gates they lie.
+    """Probabilities that one sensor's measurements of one scan belong to the tracks in whose gates they lie.
 
     Attributes
     ----------
@@ -63,7 +62,7 @@ class PairProbabilities:
     measurement : int64 array (K,)
         From 0.
     probability, lower, upper : arrays (K,)
-        The probability, and the interval in which it lies for certain.
+        The probability, and an interval that certainly contains it.
     """
 
     track_id: Array
@@ -74,14 +73,14 @@ class PairProbabilities:
 
 
 class _Update(NamedTuple):
-    """What one sensor's measurements say of T tracks."""
+    """Update of T tracks by one sensor's measurements."""
 
     detected: Array
-    """Probability that a measurement is the track's."""
+    """Probability that some measurement is the track's, (T,)."""
     missed: Array
-    """Probability that the target is there and was missed."""
+    """Probability that the target exists and was missed, (T,)."""
     odds: Array
-    """Logarithm of the odds of existence."""
+    """Log odds of existence, (T,)."""
 
     @property
     def after(self) -> Array:
@@ -91,9 +90,9 @@ class _Update(NamedTuple):
 
 @dataclass(frozen=True)
 class JointProbabilistic(Method):
-    """The tracker's own settings, and what it does with a scan.
+    """The method of `JointProbabilisticTracker`.
 
-    Its own part of a state are the probabilities of the last scan, `PairProbabilities` of each sensor.
+    Its own part of a state: the `PairProbabilities` of each sensor in the last scan.
     """
 
     nursery = TrackTrees()
@@ -107,22 +106,22 @@ class JointProbabilistic(Method):
 
     def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> tuple[PairProbabilities, ...]:
         """No probabilities."""
-        # refuse a filter that cannot merge now, not in the first scan
+        # a filter that cannot merge is refused here, not in the first scan
         merged(tracks.states[:0], np.zeros(0, dtype=np.int64), np.zeros(0), 0)
         return ()
 
     def arrays(self, own: Any) -> Mapping[str, Array]:
-        """Nothing: no scan depends on them."""
+        """Nothing: later scans do not depend on them."""
         return {}
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track, (T, S)."""
         ids = state.tracks.track_id[:, None]
-        shares = [(ids == one.track_id) @ one.probability for one in state.own]
+        shares = [(ids == pairs.track_id) @ pairs.probability for pairs in state.own]
         return np.minimum(np.stack(shares, axis=1), 1.0)
 
     def at_once(self, progress: Progress) -> Association:
-        """Take in sensor after sensor; what is rather no track's starts tracks."""
+        """Process sensor after sensor; measurements that probably belong to no track start new ones."""
         settings, time, tracks = progress.settings, progress.scan.time, progress.state.tracks
         terms = settings.terms
         seen = np.zeros(len(tracks), dtype=np.bool_)
@@ -150,7 +149,7 @@ class JointProbabilistic(Method):
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
         terms, tracks, looked = progress.settings.terms, progress.state.tracks, timed.looked()
-        # the sensors that have been taken in: only they can have missed a track
+        # the sensors processed so far: only they can have missed a track
         past, old, sensors = np.zeros_like(looked), len(tracks), range(looked.shape[1])
         parts = TrackParts.of_tracks(old, len(sensors))
         track_id, odds = tracks.track_id, tracks.existence
@@ -165,15 +164,15 @@ class JointProbabilistic(Method):
             of_pair = known.probability / update.after[grown.pairs.track]
             parts = parts.after(grown, of_pair, update.missed / update.after, missed)
             ids, taken = _owners(known, count)
-            own = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
-            own = own[np.lexsort((*timed.places.positions[s][own].T, timed.times[s][own]))]
-            first = timed.offsets[s] + own
-            begun = timed.places.births[s][own] + past[first] @ terms.miss - terms.miss[s]
-            ids[own] = progress.work.new_ids(len(own))
-            parts = parts.begun(len(odds), first, s, own, begun)
-            anchor, track_id = np.append(anchor, first), np.append(track_id, ids[own])
-            odds = np.append(update.odds, np.clip(begun + np.log1p(-taken[own]), -_SURE, _SURE))
-            seen = np.append(seen | (update.detected > 0.5), np.ones(len(own), dtype=np.bool_))
+            free = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
+            free = free[np.lexsort((*timed.places.positions[s][free].T, timed.times[s][free]))]
+            first = timed.offsets[s] + free
+            begun = timed.places.births[s][free] + past[first] @ terms.miss - terms.miss[s]
+            ids[free] = progress.work.new_ids(len(free))
+            parts = parts.begun(len(odds), first, s, free, begun)
+            anchor, track_id = np.append(anchor, first), np.append(track_id, ids[free])
+            odds = np.append(update.odds, np.clip(begun + np.log1p(-taken[free]), -_SURE, _SURE))
+            seen = np.append(seen | (update.detected > 0.5), np.ones(len(free), dtype=np.bool_))
             found[s], assigned[s] = known, ids
             done.append(s)
         states, when, started = parts.merged(timed, len(odds))
@@ -188,14 +187,14 @@ class JointProbabilistic(Method):
     def _probabilities(
         self, track_id: Array, existence: Array, missed: Array, pairs: ScoredPairs, count: int
     ) -> tuple[PairProbabilities, _Update]:
-        """Sum the joint events of T tracks and one sensor's measurements, so many.
+        """Sum the joint events of T tracks and `count` measurements of one sensor.
 
         Parameters
         ----------
         track_id, existence : arrays (T,)
-            Ids, and logarithms of the odds of existence.
+            Ids, and log odds of existence.
         missed : array (T,)
-            ln of the probability that a target that is there is missed.
+            Log-probability that an existing target is missed.
         pairs : ScoredPairs
         count : int
         """
@@ -206,7 +205,7 @@ class JointProbabilistic(Method):
         known = pair_probabilities(track, measurement, weight, (len(exists), count), self.max_events)
         detected = np.bincount(track, known.probability, len(exists))
         there = np.maximum(1.0 - detected, 0.0) * exists * np.exp(missed) / unseen
-        # a miss alone lowers the odds by what it costs, to the last digit; no 1 - 1 for "there is no target"
+        # without detections this is existence + missed, exactly: no cancellation in 1 - (1 - probability)
         odds = existence + missed + np.log1p(detected / np.maximum(there, 1e-300))
         update = _Update(detected, there, np.clip(odds, -_SURE, _SURE))
         return PairProbabilities(track_id[track], measurement, *known), update
@@ -215,7 +214,7 @@ class JointProbabilistic(Method):
 def _take_in(
     tracks: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
 ) -> tuple[TrackBatch, Array]:
-    """Tracks after a sensor's scan, and which of them were rather detected than not."""
+    """Tracks after a sensor's scan, and which of them were detected with probability above 0.5."""
     count = len(tracks)
     if not count:
         return tracks, np.zeros(0, dtype=np.bool_)
@@ -227,7 +226,7 @@ def _take_in(
 
 
 def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
-    """The track that each measurement belongs to rather than not, 0 for none, and how surely it is some track's."""
+    """The track with probability above 0.5 of each measurement, 0 for none, and the probability that it has any."""
     ids = np.zeros(count, dtype=np.int64)
     likely = pairs.probability > 0.5
     ids[pairs.measurement[likely]] = pairs.track_id[likely]
@@ -242,8 +241,8 @@ class JointProbabilisticTracker(Tracker):
     sensors, filter, ...
         As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
     max_events : int
-        Joint events, as far as they are summed, that are kept apart at a time in a cluster of tracks and measurements
-        (4096). Where a cluster would need more, its least likely pairs are left out: more make the intervals narrower.
+        Largest table of partially summed joint events for a cluster of tracks and measurements (4096). Where a cluster
+        would need more entries, its least likely pairs are left out: larger tables give narrower intervals.
     **options
         As for `Tracker`.
     """
@@ -253,6 +252,6 @@ class JointProbabilisticTracker(Tracker):
 
     @property
     def probabilities(self) -> tuple[PairProbabilities, ...]:
-        """Of the last step, for each sensor."""
+        """Probabilities of the last step's pairs, for each sensor."""
         found: tuple[PairProbabilities, ...] = self.state.own
         return found

@@ -1,8 +1,8 @@
-"""What a tracker says of itself: how it associates a scan with its tracks. Everything else is in `assoc.tracking.step`.
+"""How a kind of tracker associates a scan with its tracks; all other stages of a step are in `assoc.tracking.step`.
 
-A method is a frozen dataclass of the tracker's own settings. Its functions take a step under way and return records;
-they keep nothing. A tracker that decides each scan at once writes `at_once`, and `in_order` for measurements with
-times of their own; all else may stay as it is here.
+A method is a frozen dataclass of the settings of this kind of tracker. Its functions take a step under way, return
+records and have no side effects. A tracker that decides each scan at once defines `at_once`, and `in_order` for
+measurements with times of their own; the defaults of the other functions suit it.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ from assoc.tracking.track_batch import TrackBatch
 
 @dataclass(frozen=True)
 class Method(ABC):
-    """How a kind of tracker associates."""
+    """The method of association of a kind of tracker."""
 
     nursery: ClassVar[Method | None] = None
-    """By which tracks grow up where all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
+    """Method of the nursery where all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
 
     def arranged(self, scan: Scan) -> Scan:
-        """The scan as its measurements are to be numbered inside."""
+        """The scan with its measurements in the order in which the method numbers them."""
         return scan
 
     @abstractmethod
     def at_once(self, progress: Progress) -> Association:
-        """Associate a scan of one instant with the tracks of the state, which have been predicted to it."""
+        """Associate a scan of one instant with the tracks, which have been predicted to it."""
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """Associate a scan whose measurements have times of their own with the tracks as of the last scan."""
         raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
-        """Confirm tracks, say what was decided, delete tracks."""
+        """Confirm tracks, report decisions, delete tracks."""
         settings, scan = progress.settings, progress.scan
         tracks = found.tracks.confirm(settings.life_cycle)
         now = decision(scan.index, scan.time, found.assigned, tracks.track_id[tracks.confirmed])
@@ -58,24 +58,24 @@ class Method(ABC):
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track in a step, (T, S)."""
-        return np.stack([np.isin(state.tracks.track_id, one) for one in step.assigned], axis=1).astype(np.float64)
+        return np.stack([np.isin(state.tracks.track_id, ids) for ids in step.assigned], axis=1).astype(np.float64)
 
     def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> Any:
-        """The tracker's own part of the state before the first scan, with tracks that are known."""
+        """The method's own part of the state before the first scan, with tracks that are known."""
         return None
 
     def current(self, state: TrackerState) -> TrackBatch:
-        """The tracks to hand out."""
+        """The tracks that users see."""
         return state.tracks
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
-        """What is said now of the scans that are not final yet, oldest first."""
+        """Present decisions about the scans that are not final yet, oldest first."""
         return ()
 
     def arrays(self, own: Any) -> Mapping[str, Array]:
-        """The tracker's own part of a state as arrays for a file."""
+        """The method's own part of a state as arrays for a file."""
         return {} if own is None else own._asdict()
 
     def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Any:
-        """The tracker's own part of a state read from a file, checked; `state` is the rest."""
+        """The method's own part of a state read from a file, checked; `state` is the rest."""
         return self.begun(settings, state.tracks)

@@ -2,10 +2,10 @@
 
 Every measurement may start a tree; every branch grows by each measurement in its gate and by a miss. The best
 global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
-an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
-of the oldest scan of the window is then final (N-scan pruning). After each sensor the branches are cut by what
-they cost the best global hypothesis (`assoc.tracking.mht.losses`), not by their tree's own scores: of close targets
-the best branches of one tree may all want measurements that the others need more.
+an assignment problem over the trees and the sensors of the last N scans, which any solver can solve. Its decision
+about the oldest scan of the window is then final (N-scan pruning). After each sensor the branches are pruned by their
+losses (`assoc.tracking.mht.losses`), not by their scores: with close targets, the best branches of a tree may all use
+measurements that other trees need more.
 
 References
 ----------
@@ -42,7 +42,7 @@ from assoc.tracking.tracker import Tracker
 
 
 class Trees(NamedTuple):
-    """What is known of B branches besides their scores and states."""
+    """B branches without their scores and states."""
 
     window: Window
     born: Array
@@ -51,13 +51,13 @@ class Trees(NamedTuple):
     """Branches of the best global hypothesis, bool (B,)."""
 
     def of(self, rows: Array) -> Trees:
-        """These branches alone."""
+        """Select branches."""
         return Trees(self.window.of(rows), self.born[rows], self.chosen[rows])
 
 
 @dataclass(frozen=True)
 class TrackTrees(DeferringMethod):
-    """The tracker's own settings, and what it does with a scan."""
+    """The method of `TrackOrientedMHT`."""
 
     max_branches: int = 30
     branch_drop: float = 7.0
@@ -148,7 +148,7 @@ class TrackTrees(DeferringMethod):
         return progress.with_state(tracks=tracks, own=own)._replace(step=step)
 
     def _decided(self, tracks: TrackBatch, own: Trees, scan: int) -> tuple[Array, Array]:
-        """Branches that do not contradict what is decided of the oldest scan, and those that decide it."""
+        """Branches that agree with the decision about the oldest scan, and those that make it."""
         sizes = own.window.sizes[-1]
         oldest = np.ascontiguousarray(own.window.history[:, -sizes.size :])
         old = own.born <= scan - self.depth + 1
@@ -156,18 +156,18 @@ class TrackTrees(DeferringMethod):
 
     @staticmethod
     def hand_over(state: TrackerState, age: int) -> tuple[TrackerState, TrackBatch]:
-        """Give away confirmed tracks, as the best hypothesis knows them; branches that contradict them go, too.
+        """Hand over the confirmed tracks of the best hypothesis; branches that contradict them are removed, too.
 
         Parameters
         ----------
         state : TrackerState
         age : int
-            Scans since a track began after which it is given away.
+            Scans after its beginning at which a track is handed over.
 
         Returns
         -------
         state, tracks
-            Without these tracks; and the tracks, at the time of the last scan.
+            The state without these tracks; and the tracks, at the time of the last scan.
         """
         tracks, own = state.tracks, state.own
         grown = own.chosen & tracks.confirmed & (own.born <= state.scan - age)
@@ -177,7 +177,7 @@ class TrackTrees(DeferringMethod):
         return state._replace(tracks=tracks[stay], own=own.of(stay)), tracks[grown]
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
-        """What the best hypothesis says of the scans that are not final yet, oldest first."""
+        """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
         return state.own.window.decisions(state.scan - 1, state.tracks, np.flatnonzero(state.own.chosen))
 
     def arrays(self, own: Trees) -> Mapping[str, Array]:
@@ -195,7 +195,7 @@ class TrackTrees(DeferringMethod):
 
 
 def _tables(state: TrackerState, sensors: int) -> Tables:
-    """The branches, with room for this scan in their histories."""
+    """The branches, with empty columns for this scan in their histories."""
     before = state.own.window.history
     history = np.zeros_like(before)
     history[:, sensors:] = before[:, : before.shape[1] - sensors]
@@ -205,11 +205,11 @@ def _tables(state: TrackerState, sensors: int) -> Tables:
 def _solved(progress: Progress, tree: Array, score: Array, history: Array) -> Array:
     """Branches of the best global hypothesis by the tracker's solver, as a mask."""
     chosen = np.zeros(len(score), dtype=np.bool_)
-    # a branch of no positive score is better left to false alarms
+    # measurements of a branch without positive score are better explained as false alarms
     rows = np.flatnonzero(score > 0)
     if not len(rows):
         return chosen
-    # of each list only what some branch uses takes part
+    # each list of the problem is reduced to the entries that some branch uses
     tuples = np.empty((len(rows), 1 + history.shape[1]), dtype=np.int64)
     trees, numbers = np.unique(tree[rows], return_inverse=True)
     tuples[:, 0], sizes = numbers + 1, [len(trees)]
@@ -228,14 +228,14 @@ class TrackOrientedMHT(Tracker):
     Parameters
     ----------
     sensors, filter, ...
-        As for `Tracker`. Sensors of a scan are taken in one after the other.
+        As for `Tracker`. The sensors of a scan are processed one after the other.
     depth : int
         Scans in the window, N: a measurement's track is final N - 1 scans later. 1 decides at once; at most 1000.
     max_branches : int
-        The most branches of a tree (30).
+        The most branches of a tree (30); those with the least losses are kept.
     branch_drop : float
-        A branch is cut if every global hypothesis that contains it scores this much less than the best one: 7 is a
-        thousandth of its probability. Of more than `max_branches` those stay that cost the best hypothesis least.
+        A branch is cut if every global hypothesis that contains it scores this much less than the best one (7: less
+        than a thousandth of its probability).
     **options
         As for `Tracker`.
     """

@@ -1,14 +1,14 @@
 """Hypothesis-oriented multiple hypothesis tracking: Reid's clusters and generation, Murty's m best, n-scan pruning.
 
-A hypothesis says of every measurement so far: false alarm, one of the existing targets, or a new target. Its
+A hypothesis assigns every measurement so far to a false alarm, an existing target, or a new target. Its
 probability is equation 2.1 of the thesis on clustering time windows,
 
     p = 1/c  P_D^N_d  (1 - P_D)^(N_t - N_d)  P_FA^N_fa  P_NT^N_nt  prod p(z | t)  p_parent,
 
-with N_d the targets that were detected, densities for P_FA and P_NT. Relative to "all false alarms" its
-logarithm is the sum of the scores of the hypothesis' tracks (`assoc.costs.tracks.scores`), so that both forms
-of the tracker count alike. Tracks that contend for no measurement stand in clusters of their own, each with its own m
-best hypotheses (`assoc.tracking.mht.clusters`).
+with N_d detected targets, and densities for P_FA and P_NT. Relative to "all false alarms" its logarithm is the
+sum of the scores of the hypothesis' tracks (`assoc.costs.tracks.scores`), the score of the track-oriented form.
+Tracks that share no measurement are in separate clusters, each with its own m best hypotheses
+(`assoc.tracking.mht.clusters`).
 
 References
 ----------
@@ -43,7 +43,7 @@ from assoc.tracking.tracker import Tracker
 
 
 class Hypotheses(NamedTuple):
-    """What is known of B branches besides their scores and states."""
+    """Clusters and window of B branches, without their scores and states."""
 
     window: Window
     clusters: tuple[Cluster, ...]
@@ -52,12 +52,12 @@ class Hypotheses(NamedTuple):
     @property
     def best(self) -> Array:
         """Rows of the best hypothesis."""
-        return np.concatenate([np.zeros(0, dtype=np.int64), *(one.best for one in self.clusters)])
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(group.best for group in self.clusters)])
 
 
 @dataclass(frozen=True)
 class ClusteredHypotheses(DeferringMethod):
-    """The tracker's own settings, and what it does with a scan."""
+    """The method of `HypothesisOrientedMHT`."""
 
     max_hypotheses: int = 50
     hypothesis_drop: float = 15.0
@@ -79,13 +79,13 @@ class ClusteredHypotheses(DeferringMethod):
     def probabilities(self, own: Hypotheses) -> Array:
         """Probabilities of the best hypotheses about everything, the best first."""
         logarithms = np.zeros(1)
-        for one in own.clusters:
-            both = (logarithms[:, None] + np.log(one.probabilities)).ravel()
+        for group in own.clusters:
+            both = (logarithms[:, None] + np.log(group.probabilities)).ravel()
             logarithms = -np.sort(-both)[: self.max_hypotheses]
         return np.exp(logarithms)
 
     def arranged(self, scan: Scan) -> Scan:
-        """The scan with its measurements by value: of hypotheses of equal weight those of lower numbers are kept."""
+        """The scan with measurements sorted by value: ties between hypotheses are broken by their numbers."""
         return _by_value(scan, _orders(scan))
 
     def at_once(self, progress: Progress) -> Association:
@@ -133,7 +133,7 @@ class ClusteredHypotheses(DeferringMethod):
         return Association(batch, (), Hypotheses(own.window.opened(progress.scan, history), tuple(clusters)))
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
-        """Confirm tracks, decide the oldest scan of the window, delete tracks, let clusters fall apart."""
+        """Confirm tracks, decide the oldest scan of the window, delete tracks, split clusters."""
         before, scan = progress.state.tracks, progress.state.scan
         tracks, own = found.tracks, found.own
         known = before.track_id[before.confirmed]
@@ -146,30 +146,30 @@ class ClusteredHypotheses(DeferringMethod):
             tracks, own = _kept(tracks, own, _agreeing(tracks, own))
             final = (own.window.decision(self.depth - 1, scan, tracks, own.best),)
             own = own._replace(window=own.window.closed())
-        # a track is deleted where all its branches say so
+        # a track is deleted if all its branches are to be deleted
         ids = tracks.track_id
         gone = ~np.isin(ids, ids[~to_delete(progress, tracks)])
         if gone.any():
-            left = [one for one in own.clusters if not gone[one.branches].all()]
-            tracks, own = _kept(tracks, own, [without(one, gone[one.branches]) for one in left])
+            left = [group for group in own.clusters if not gone[group.branches].all()]
+            tracks, own = _kept(tracks, own, [without(group, gone[group.branches]) for group in left])
         tracks, own = _kept(tracks, own, _split(tracks, own))
         ended = np.setdiff1d(known, tracks.track_id)
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
         return progress.with_state(tracks=tracks, own=own)._replace(step=step)
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
-        """What the best hypothesis says of the scans that are not final yet, oldest first."""
+        """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
         return state.own.window.decisions(state.scan - 1, state.tracks, state.own.best)
 
     def arrays(self, own: Hypotheses) -> Mapping[str, Array]:
         """The hypotheses for a file."""
-        shapes = np.array([one.holds.shape for one in own.clusters], dtype=np.int64).reshape(-1, 2)
+        shapes = np.array([group.holds.shape for group in own.clusters], dtype=np.int64).reshape(-1, 2)
         return {
             **own.window.arrays(),
             "cluster_hypotheses": shapes[:, 0],
             "cluster_branches": shapes[:, 1],
-            "holds": np.concatenate([np.zeros(0, np.bool_), *(one.holds.ravel() for one in own.clusters)]),
-            "weight": np.concatenate([np.zeros(0), *(one.weight for one in own.clusters)]),
+            "holds": np.concatenate([np.zeros(0, np.bool_), *(group.holds.ravel() for group in own.clusters)]),
+            "weight": np.concatenate([np.zeros(0), *(group.weight for group in own.clusters)]),
         }
 
     def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Hypotheses:
@@ -194,7 +194,7 @@ class ClusteredHypotheses(DeferringMethod):
 
 
 def _orders(scan: Scan) -> list[Array]:
-    """The measurements of each sensor by value, and by time."""
+    """Order of each sensor's measurements by value, then by time."""
     times = scan.times or [None] * len(scan.measurements)
     pairs = zip(scan.measurements, times, strict=True)
     return [np.lexsort((*z.T[::-1], *(() if stamps is None else (stamps,)))) for z, stamps in pairs]
@@ -212,7 +212,7 @@ def _by_value(scan: Scan, orders: list[Array]) -> Scan:
 
 
 def _batch(before: TrackBatch, growth: Growth, grown: Grown, ids: Array, gained: Array) -> TrackBatch:
-    """The branches as tracks, with what their scores have gained in the scan."""
+    """The branches as tracks, with the scores they gained in the scan."""
     fresh = growth.origin < 0
     old, new = np.flatnonzero(~fresh), np.flatnonzero(fresh)
     known = before[growth.origin[old]].scored(grown.states[old], gained[old], grown.last[old])
@@ -222,9 +222,9 @@ def _batch(before: TrackBatch, growth: Growth, grown: Grown, ids: Array, gained:
 
 
 def _renumbered(clusters: Iterable[Cluster]) -> tuple[list[Cluster], Array]:
-    """Clusters whose branches are new rows, cluster after cluster; and their rows before."""
-    clusters = [one for one in clusters if len(one.branches)]
-    kept = np.concatenate([np.zeros(0, dtype=np.int64), *(one.branches for one in clusters)])
+    """Renumber branches, cluster after cluster; also return their old rows."""
+    clusters = [group for group in clusters if len(group.branches)]
+    kept = np.concatenate([np.zeros(0, dtype=np.int64), *(group.branches for group in clusters)])
     rows, end, found = np.arange(len(kept)), 0, []
     for branches, holds, weight in clusters:
         begin, end = end, end + len(branches)
@@ -233,21 +233,23 @@ def _renumbered(clusters: Iterable[Cluster]) -> tuple[list[Cluster], Array]:
 
 
 def _kept(tracks: TrackBatch, own: Hypotheses, clusters: Iterable[Cluster]) -> tuple[TrackBatch, Hypotheses]:
-    """Go on with these clusters."""
+    """Keep only these clusters."""
     found, kept = _renumbered(clusters)
     return tracks[kept], Hypotheses(own.window.of(kept), tuple(found))
 
 
 def _agreeing(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
     """Clusters without the hypotheses that disagree with the best one about the oldest scan of the window."""
-    said = own.window.history[:, -own.window.sizes.shape[1] :].astype(np.int64)
-    owner = np.where(said > 0, tracks.track_id[:, None] * (said.max(initial=0) + 1) + said, 0)
+    history = own.window.history[:, -own.window.sizes.shape[1] :].astype(np.int64)
+    owner = np.where(history > 0, tracks.track_id[:, None] * (history.max(initial=0) + 1) + history, 0)
     decided = np.asarray(owner.any(axis=1))
-    return [agreeing(one, owner[one.branches]) if decided[one.branches].any() else one for one in own.clusters]
+    return [
+        agreeing(group, owner[group.branches]) if decided[group.branches].any() else group for group in own.clusters
+    ]
 
 
 def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
-    """Let clusters fall apart: branches hang together that are of one track or want the same measurement."""
+    """Split clusters: branches of one track, or with a common measurement, stay together."""
     count, history = len(tracks), own.window.history
     ids, track = np.unique(tracks.track_id, return_inverse=True)
     branch, column = np.nonzero(history)
@@ -256,10 +258,10 @@ def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
     first, second = np.append(np.arange(count), branch), np.append(count + track, count + len(ids) + want)
     label = linked(first, second, count + len(ids) + len(wants))
     found: list[Cluster] = []
-    for one in own.clusters:
-        mine = label[one.branches]
+    for group in own.clusters:
+        mine = label[group.branches]
         together = len(mine) == 1 or bool((mine == mine[0]).all())
-        found += [one] if together else parts(one, mine, tracks.score[one.branches])
+        found += [group] if together else parts(group, mine, tracks.score[group.branches])
     return found
 
 
@@ -269,8 +271,8 @@ class HypothesisOrientedMHT(Tracker):
     Parameters
     ----------
     sensors, filter, ...
-        As for `Tracker`. Sensors of a scan are taken in one after the other. The `solver` is not used: the ranking is
-        Murty's.
+        As for `Tracker`. The sensors of a scan are processed one after the other. The `solver` is not used: Murty's
+        algorithm ranks.
     max_hypotheses : int
         m (50).
     depth : int

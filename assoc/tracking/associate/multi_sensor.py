@@ -17,7 +17,7 @@ from assoc.tracking.tracker import Tracker
 
 
 class MultiSensor(Method):
-    """What the tracker does with a scan."""
+    """The method of `MultiSensorTracker`."""
 
     nursery = TrackTrees()
 
@@ -47,17 +47,17 @@ class MultiSensor(Method):
         known = tuples.track >= 0
         value = -tuples.costs
         value[known] = doubted_gain(scores[tuples.track[known]], value[known])
-        # where false alarms are rarer than new targets a single measurement is one, too
-        # a track without measurements is missed, and has no part in the problem
-        wooed = np.append(np.bincount(tuples.track[known], minlength=len(scores)) > 1, False)
-        number = np.cumsum(wooed) * wooed
-        good = np.flatnonzero(np.where(known, wooed[tuples.track], value > 0))
+        # where new targets are more frequent than false alarms, single measurements may be new targets, too
+        # tracks without measurements are missed, and left out of the problem
+        contested = np.append(np.bincount(tuples.track[known], minlength=len(scores)) > 1, False)
+        number = np.cumsum(contested) * contested
+        good = np.flatnonzero(np.where(known, contested[tuples.track], value > 0))
         columns = np.column_stack([number[tuples.track], tuples.rows])[good]
-        sizes = np.concatenate([[int(wooed.sum())], progress.scan.sizes])
+        sizes = np.concatenate([[int(contested.sum())], progress.scan.sizes])
         solution = progress.work.assign(AssignmentProblem(columns, -value[good], sizes))
-        mine = solution.tuples[solution.tuples[:, 0] > 0]
+        taken = solution.tuples[solution.tuples[:, 0] > 0]
         rows = np.zeros((len(scores), len(settings.sensors)), dtype=np.int32)
-        rows[np.flatnonzero(wooed)[mine[:, 0] - 1]] = mine[:, 1:]
+        rows[np.flatnonzero(contested)[taken[:, 0] - 1]] = taken[:, 1:]
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
         return associated_in_order(progress, timed, looked, rows, born)
 
@@ -67,7 +67,7 @@ def _new_targets(progress: Progress) -> tuple[Array, Array]:
     problem, births = scan_problem(progress), progress.settings.births
     if not problem.num_tuples:
         return problem.tuples, problem.costs
-    # where false alarms are rarer than new targets a single measurement is one, too
+    # where new targets are more frequent than false alarms, single measurements may be new targets, too
     scores = births.scores(problem.tuples, problem.costs, births.fused(progress.scan, problem.tuples)[1])
     good = scores > 0
     return problem.tuples[good], -scores[good]
@@ -76,11 +76,10 @@ def _new_targets(progress: Progress) -> tuple[Array, Array]:
 class MultiSensorTracker(Tracker):
     """Tracks and S sensors in one (S+1)-D assignment problem for each scan.
 
-    Tracks are the first list. A tuple (track, z_1, ..., z_S) costs the negative log likelihood ratio of its
-    measurements under the track's predicted density, misses included, averaged over whether the track is a target
-    at all, which its score tells; a tuple without a track is a new target
-    and costs what `assoc.build_problem` says, with the birth density in it. Measurements in no tuple are false
-    alarms, and begin tentative tracks.
+    Tracks are the first list. The cost of a tuple (track, z_1, ..., z_S) is the negative log likelihood ratio of its
+    measurements under the track's predicted density, misses included, averaged over whether the track is a target, by
+    its score. A tuple without a track is a new target; its cost is that of `assoc.build_problem` plus the birth
+    density. Measurements in no tuple are false alarms, and begin tentative tracks.
 
     Parameters
     ----------

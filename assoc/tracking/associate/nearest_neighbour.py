@@ -26,7 +26,7 @@ Rule = Literal["greedy", "assignment"]
 
 @dataclass(frozen=True)
 class NearestNeighbour(Method):
-    """The tracker's own settings, and what it does with a scan."""
+    """The method of `NearestNeighbourTracker`."""
 
     nursery = TrackTrees()
 
@@ -37,7 +37,7 @@ class NearestNeighbour(Method):
             raise InvalidInputError(f"rule must be 'greedy' or 'assignment', got {self.rule!r}")
 
     def at_once(self, progress: Progress) -> Association:
-        """Take in sensor after sensor; what is left of one starts tracks that the next may confirm."""
+        """Process sensor after sensor; unused measurements of one start tracks that the next may confirm."""
         settings, time, tracks = progress.settings, progress.scan.time, progress.state.tracks
         seen = np.zeros(len(tracks), dtype=np.bool_)
         assigned = []
@@ -68,7 +68,7 @@ class NearestNeighbour(Method):
         """The same where measurements have times of their own."""
         settings, terms, tracks = progress.settings, progress.settings.terms, progress.state.tracks
         looked, old = timed.looked(), len(tracks)
-        # the sensors that have been taken in: only they can have missed a track
+        # the sensors processed so far: only they can have missed a track
         past = np.zeros_like(looked)
         anchor = track = np.arange(old)
         rows, score = np.zeros((old, len(settings.sensors)), dtype=np.int32), tracks.score
@@ -89,13 +89,13 @@ class NearestNeighbour(Method):
             rows[parent[chosen]] = grown.rows[chosen]
             free = timed.places.fit[s].copy()
             free[grown.measurement[chosen]] = False
-            own = np.flatnonzero(free)
-            single = np.zeros((len(own), rows.shape[1]), dtype=np.int32)
-            single[:, s] = own + 1
-            begun = timed.places.births[s][own] + past[timed.offsets[s] + own] @ terms.miss - terms.miss[s]
-            anchor, track = np.append(anchor, timed.offsets[s] + own), np.append(track, np.full(len(own), -1))
+            unused = np.flatnonzero(free)
+            single = np.zeros((len(unused), rows.shape[1]), dtype=np.int32)
+            single[:, s] = unused + 1
+            begun = timed.places.births[s][unused] + past[timed.offsets[s] + unused] @ terms.miss - terms.miss[s]
+            anchor, track = np.append(anchor, timed.offsets[s] + unused), np.append(track, np.full(len(unused), -1))
             rows, gain = np.concatenate([rows, single]), np.append(gain, begun)
-            score = np.append(score, np.zeros(len(own)))
+            score = np.append(score, np.zeros(len(unused)))
             done.append(s)
         followed = timed.follow(track, rows)
         states = timed.at_end(followed, track)
@@ -119,7 +119,7 @@ class NearestNeighbour(Method):
         scores: Array,
         count: int,
     ) -> Array:
-        """Rows of the pairs that are taken, given what each and a miss of each track adds to the score."""
+        """Rows of the chosen pairs, by their gains and the scores of a miss."""
         tracks, own = len(scores), scores[track]
         seen = doubted_gain(own, gain)
         if self.rule == "assignment":
@@ -138,7 +138,7 @@ class NearestNeighbour(Method):
 
 
 def _corrected(tracks: TrackBatch, pairs: TrackPairs, chosen: Array, hit: Array) -> object:
-    """States of the tracks, those of the chosen pairs corrected."""
+    """States of the tracks, updated by the chosen pairs."""
     if not len(tracks):
         return tracks.states
     rest = np.flatnonzero(~hit)
@@ -147,11 +147,11 @@ def _corrected(tracks: TrackBatch, pairs: TrackPairs, chosen: Array, hit: Array)
 
 
 class NearestNeighbourTracker(Tracker):
-    """The plain tracker that others are measured against.
+    """The plain tracker that others are compared with.
 
-    The sensors of a scan are taken in one after the other, whatever the measurements' times. Pairs of tracks and
-    measurements within the gate are taken by falling likelihood, averaged over whether the track is a target at all;
-    what is left over starts a track at once, which the next sensor may confirm.
+    The sensors of a scan are processed one after the other, whatever the measurements' times. Pairs of tracks and
+    measurements within the gate are chosen by decreasing likelihood, averaged over whether the track is a target;
+    each unused measurement starts a track at once, which the next sensor may confirm.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from assoc.tracking.tracker import Tracker
 
 
 class StaticFusion(Method):
-    """What the tracker does with a scan."""
+    """The method of `StaticFusionTracker`."""
 
     nursery = TrackTrees()
 
@@ -115,9 +115,9 @@ def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
 class StaticFusionTracker(Tracker):
     """S-D fusion of each scan by itself, then a 2-D assignment of the fused tuples to the tracks.
 
-    The S-D problem knows nothing of the tracks: what it puts together stays together. Single measurements go
-    to the tracks as tuples of one. A tuple's cost for a track is that of all its measurements under the
-    track's predicted density, misses included, averaged over whether the track is a target at all.
+    The S-D problem does not use the tracks, and its tuples are not revised. Single measurements are tuples of one. A
+    tuple's cost for a track is that of all its measurements under the track's predicted density, misses included,
+    averaged over whether the track is a target.
 
     Parameters
     ----------

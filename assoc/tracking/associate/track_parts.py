@@ -1,9 +1,9 @@
-"""Tracks within a scan whose measurements have times of their own: several parts each, merged at the scan's end.
+"""Parts of tracks within a scan whose measurements have times of their own; they are merged at the scan's end.
 
-A sensor may see a track before the sensor that was taken in before it, so that a track cannot be merged and predicted
-on between the sensors. Each part of a track has measurements of its own, one of each sensor or none, and is filtered
-through them in the order of their times (`assoc.costs.tracks.own_times`). It has a share: how probable it is that just
-these are the track's, given that the target is there.
+Sensors are processed one after the other, but their measurements interleave in time, so that a track cannot be merged
+and predicted between sensors. Each part of a track has at most one measurement of each sensor and is filtered through
+them in time order (`assoc.costs.tracks.own_times`). Its share is the probability that exactly these measurements are
+the track's, given that the target exists.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ class ScoredPairs(NamedTuple):
     measurement: Array
     """From 0, (K,)."""
     gain: Array
-    """What the measurement adds to the track's score, (K,)."""
+    """Gain of the track's score by the measurement, (K,)."""
 
 
 class GrownParts(NamedTuple):
     """Parts with one more measurement, and the pairs of a track and a measurement that they make."""
 
     parent: Array
-    """Row of the part before, (N,)."""
+    """Row of the part without that measurement, (N,)."""
     rows: Array
     """Measurements, (N, S)."""
     gain: Array
-    """What the measurement adds to the part's score, (N,)."""
+    """Gain of the part's score by the measurement, (N,)."""
     pair: Array
-    """Pair of each, (N,)."""
+    """Row in `pairs` of each part's pair, (N,)."""
     pairs: ScoredPairs
-    """Gains are by the density averaged over the track's parts."""
+    """Their gains use the density averaged over the track's parts."""
 
 
 class TrackParts(NamedTuple):
-    """P parts of T tracks, those of before the scan first, then those that begin in it."""
+    """P parts of T tracks, old tracks first, then those that begin in this scan."""
 
     owner: Array
-    """Track of each, (P,)."""
+    """Track of each part, (P,)."""
     anchor: Array
     """The track, or the measurement that began it, as `TimedScan` counts them, (P,)."""
     track: Array
@@ -62,7 +62,7 @@ class TrackParts(NamedTuple):
     share: Array
     """(P,); those of one track sum to 1."""
     score: Array
-    """What the scan has added to the score of a track with these measurements, (P,)."""
+    """Gain of the track's score in this scan if these are its measurements, (P,)."""
 
     @staticmethod
     def of_tracks(count: int, sensors: int) -> TrackParts:
@@ -71,17 +71,17 @@ class TrackParts(NamedTuple):
         return TrackParts(row, row, row, np.zeros((count, sensors), dtype=np.int32), np.ones(count), np.zeros(count))
 
     def grown(self, timed: TimedScan, s: int, done: Sequence[int], terms: ScoreTerms, past: Array) -> GrownParts:
-        """All parts with all measurements of sensor s in their gates.
+        """Extend all parts by all measurements of sensor s in their gates.
 
         Parameters
         ----------
         timed : TimedScan
         s : int
         done : sequence of int
-            Sensors taken in before.
+            Sensors processed before.
         terms : ScoreTerms
         past : bool array (A, S)
-            Which sensors looked at each anchor, of those taken in and this one.
+            Which sensors, of those processed and this one, looked at each anchor.
         """
         found = timed.grown(s, done, self.anchor, self.track, self.rows)
         score = -score_costs(timed, found.followed, found.rows, terms, past[self.anchor[found.parent]])
@@ -94,15 +94,15 @@ class TrackParts(NamedTuple):
         return GrownParts(found.parent, found.rows, gain, pair, ScoredPairs(track, measurement, mean))
 
     def after(self, grown: GrownParts, of_pair: Array, of_miss: Array, missed: Array) -> TrackParts:
-        """Parts after a sensor's measurements.
+        """Weigh the parts with and without a measurement of this sensor.
 
         Parameters
         ----------
         grown : GrownParts
         of_pair, of_miss : arrays (K,), (T,)
-            Probabilities of each pair, and of no measurement, given that the target is there.
+            Probabilities of each pair, and of no measurement, given that the target exists.
         missed : array (T,)
-            What a miss adds to the score.
+            Score of a miss.
         """
         parent = grown.parent
         within = self.share[parent] * np.exp(grown.gain - grown.pairs.gain[grown.pair])
@@ -119,7 +119,7 @@ class TrackParts(NamedTuple):
         return TrackParts(owner, self.anchor[whose], self.track[whose], rows[kept], share, score[kept])
 
     def begun(self, count: int, anchor: Array, s: int, measurement: Array, score: Array) -> TrackParts:
-        """These parts of `count` tracks, and new tracks of measurements (from 0) of sensor s."""
+        """Add new tracks of measurements (from 0) of sensor s to these parts of `count` tracks."""
         new = len(anchor)
         rows = np.zeros((new, self.rows.shape[1]), dtype=np.int32)
         rows[:, s] = measurement + 1
@@ -134,7 +134,7 @@ class TrackParts(NamedTuple):
         states
             At the scan's end.
         last, first : arrays (count,)
-            Times of the last and the first measurement of its likeliest part with any, NaN if there is none.
+            Times (s) of the last and first measurement of each track's likeliest part with any; NaN if none has any.
         """
         followed = timed.follow(self.track, self.rows)
         states = merged(timed.at_end(followed, self.track), self.owner, self.share, count)

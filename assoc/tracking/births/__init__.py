@@ -1,1 +1,1 @@
-"""How tracks begin: priors of new targets, from one measurement, a tuple, or crossing bearings."""
+"""How tracks begin: from one measurement, a tuple, or crossing bearings."""

@@ -1,9 +1,8 @@
-"""Which tracks of bearings alone are ghosts: a sensor that should see them does not, time after time.
+"""Find tracks of bearings alone that are ghosts: some sensor that should detect them never does.
 
-Where bearings of two targets cross, a track can feed on them for long: each of its detections is real, and its score
-grows, though a third sensor never sees anything there. Against false alarms that is a target; against the two targets
-whose bearings these are it is none. So it is judged by each sensor alone: one that sees a target misses it n times in
-a row with probability (1 - P_D)^n.
+A track can follow the crossing of two targets' bearings for long: its detections are real, and its score against false
+alarms grows, though a third sensor never detects anything there. So each sensor is tested by itself: it misses a target
+in its view n times in a row with probability (1 - P_D)^n.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from assoc.tracking.life_cycle import OVERLOOKED
 
 
 class Unseen(NamedTuple):
-    """How often in a row each sensor has missed each track."""
+    """Misses in a row of each track by each sensor."""
 
     ids: Array
-    """Tracks, ascending, int64 (T,)."""
+    """Ids of the tracks, ascending, int64 (T,)."""
     misses: Array
-    """(T, S); a measurement that is a track's only by some probability ends a row as far as that."""
+    """(T, S); a detection with probability p multiplies the count by 1 - p."""
 
     @staticmethod
     def none(sensors: int) -> Unseen:
@@ -36,11 +35,11 @@ class Unseen(NamedTuple):
         Parameters
         ----------
         ids : int64 array (T,)
-            The tracks that live; others are forgotten.
+            The living tracks; others are forgotten.
         detected : array (T, S)
-            Probability with which each sensor has detected each.
+            Probability with which each sensor has detected each track.
         looked : bool array (T, S)
-            Whether it could.
+            Whether the sensor could see the track.
         """
         order = np.argsort(ids)
         known = np.append(self.misses, np.zeros((1, self.misses.shape[1])), axis=0)
@@ -51,5 +50,5 @@ class Unseen(NamedTuple):
         return Unseen(ids[order], misses[order])
 
     def ghosts(self, miss: Array) -> Array:
-        """Ids of the tracks that are no targets, by ln(1 - P_D) of each sensor (S,)."""
+        """Ids of the ghosts; `miss` is ln(1 - P_D) of each sensor, (S,)."""
         return self.ids[(self.misses * miss < math.log(OVERLOOKED)).any(axis=1)]

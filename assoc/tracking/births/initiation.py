@@ -1,4 +1,4 @@
-"""How a track begins: a position with its covariance, and a prior for what a position does not tell."""
+"""How a track begins: a position with its covariance, and a prior for the other components of the state."""
 
 from __future__ import annotations
 
@@ -20,20 +20,19 @@ from assoc.filters.state import gaussian
 class Initiation:
     """Prior of a new track.
 
-    The second detection then gives the velocity, as two-point differencing does, but weighed with what
-    speeds are likely.
+    The second detection then determines the velocity, like two-point differencing combined with a prior of speeds.
 
     Parameters
     ----------
     speed : float or sequence of float
         Standard deviation of the velocity along each axis, m/s.
     rest : float
-        Standard deviation of every further component: acceleration, m/s^2, or turn rate, rad/s.
+        Standard deviation of all other components: acceleration, m/s^2, or turn rate, rad/s.
     birth_rate : float
         Mean number of new targets in a scan.
     widest : float
-        A single measurement starts a track only if it tells the position to this standard deviation, as a
-        share of the region's diagonal; a bearing alone does not.
+        A single measurement starts a track only if the standard deviation of its position is at most this share
+        of the region's diagonal; a bearing alone starts none.
     """
 
     speed: float | tuple[float, ...] = field(default=300.0, metadata={"help": "usual speed along an axis, m/s"})
@@ -47,18 +46,18 @@ class Initiation:
         speeds = self.speed if isinstance(self.speed, (tuple, list)) else (self.speed,)
         if not speeds:
             raise InvalidInputError("speed must be one number, or one for each axis")
-        for one in speeds:
-            positive(one, "speed")
+        for speed in speeds:
+            positive(speed, "speed")
         if not isinstance(self.speed, (int, float, tuple, list)):
             object.__setattr__(self, "speed", float(self.speed))  # a number of numpy's
 
     def prior(self, motion: Motion) -> tuple[Array, Array]:
-        """Where positions stand in a state, and the covariance of a new track before its position is put in.
+        """Indices of the position in a state, and the prior covariance of a new track, position not set.
 
         Raises
         ------
         InvalidInputError
-            The speed is that of other axes.
+            The number of speeds does not match the motion model's axes.
         """
         axes = len(motion.position)
         speed = self.speed if isinstance(self.speed, (int, float)) else tuple(self.speed)
@@ -67,26 +66,26 @@ class Initiation:
         return _prior(motion.dim, tuple(motion.position), speed, self.rest)
 
     def start(self, filter: Filter[Any], positions: Array, covariances: Array, lag: Array | None = None) -> Any:
-        """States of new tracks, of the filter's own kind.
+        """States of new tracks, of the filter's kind.
 
         Parameters
         ----------
         filter : Filter
         positions, covariances : arrays (K, 3), (K, 3, 3)
         lag : array (K,), optional
-            The states are those so many seconds before the targets were at these positions.
+            Seconds by which the states precede the times of the positions.
         """
         motion = filter.motion
         axes = len(motion.position)
-        place, prior = self.prior(motion)
+        index, prior = self.prior(motion)
         mean = np.zeros((len(positions), motion.dim))
-        mean[:, place] = positions[:, :axes]
+        mean[:, index] = positions[:, :axes]
         covariance = np.empty((len(positions), *prior.shape))
         covariance[:] = prior
-        covariance[:, place[:, None], place] = covariances[:, :axes, :axes]
+        covariance[:, index[:, None], index] = covariances[:, :axes, :axes]
         if lag is not None and lag.any():
             velocity = velocity_components(motion)
-            moving = place[: len(velocity)]
+            moving = index[: len(velocity)]
             variances = prior[velocity, velocity]
             covariance[:, moving, moving] += lag[:, None] ** 2 * variances
             covariance[:, moving, velocity] = covariance[:, velocity, moving] = -lag[:, None] * variances
@@ -95,18 +94,18 @@ class Initiation:
 
 @lru_cache(maxsize=64)
 def _prior(dim: int, position: tuple[int, ...], speed: float | tuple[float, ...], rest: float) -> tuple[Array, Array]:
-    place = np.array(position)
+    index = np.array(position)
     deviation = np.full(dim, rest)
-    velocity = _velocities(dim, place)
-    deviation[velocity] = np.broadcast_to(np.asarray(speed, dtype=np.float64), (len(place),))[: len(velocity)]
-    return place, np.diag(deviation**2)
+    velocity = _velocities(dim, index)
+    deviation[velocity] = np.broadcast_to(np.asarray(speed, dtype=np.float64), (len(index),))[: len(velocity)]
+    return index, np.diag(deviation**2)
 
 
 def velocity_components(motion: Motion) -> Array:
-    """Where the velocities stand in a state: after the positions."""
+    """Indices of the velocities in a state: they follow the positions."""
     return _velocities(motion.dim, np.array(motion.position))
 
 
 def _velocities(dim: int, position: Array) -> Array:
-    places = position + len(position)
-    return np.asarray(places[places < dim])
+    index = position + len(position)
+    return np.asarray(index[index < dim])

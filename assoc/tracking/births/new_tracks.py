@@ -1,8 +1,8 @@
-"""What measurements that no track takes begin: where their targets are, and what they score as new tracks.
+"""New tracks from measurements that no track took: their positions and scores.
 
-A bearing alone tells no position. What tracks leave over of sensors that measure angles alone is taken together: tuples
-of two measurements or more that may be one target. Most are ghosts, crossings of bearings of different targets or of
-false alarms. They die as false tracks do: the measurements of later scans do not follow them.
+A bearing alone determines no position. Unused measurements of sensors that measure angles alone start tracks as tuples
+of two or more that may be one target. Most of these are ghosts: crossings of bearings of different targets or of false
+alarms. They end like other false tracks: later measurements do not confirm them.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from assoc.tracking.births.initiation import Initiation
 
 
 class Crossings(NamedTuple):
-    """Tuples of measurements that may be one target each."""
+    """K tuples of measurements, each of which may be one target."""
 
     rows: Array
     """1-based measurement of each sensor, 0: none; int32 (K, S)."""
     costs: Array
-    """Against false alarms, (K,); see `assoc.build_problem`."""
+    """Costs relative to false alarms, (K,); see `assoc.build_problem`."""
     scores: Array
-    """As new targets, (K,)."""
+    """Scores as new targets, (K,)."""
     positions: Array
     """Metres, (K, 3)."""
     covariances: Array
@@ -48,7 +48,7 @@ class NewTracks:
     filter : Filter
     initiation : Initiation
     terms : ScoreTerms
-        What detections and misses of each sensor add to a score.
+        Scores of detections and misses of each sensor.
     limits : mapping
         gate_probability and max_tuples of `assoc.build_problem`.
     """
@@ -63,35 +63,35 @@ class NewTracks:
             terms,
             limits,
         )
-        # a target that appears with a sensor's measurement was missed by the sensors before it
+        # a target that first appears at a sensor was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
-        """Positions, covariances, and which of them are narrow enough to start a track."""
+        """Positions, covariances, and which are precise enough to start a track."""
         positions, covariances = positions_and_covariances(self._place, scan, tuples)
         return positions, covariances, self._narrow(covariances)
 
     def _narrow(self, covariances: Array) -> Array:
-        # heights are the scene's own where radars do not tell them: they do not forbid a track
+        # where no sensor measures heights, they come from the scene's region: they need not be precise
         limit = self._widest**2
         if len(self._filter.motion.position) == 1:
             return np.asarray(covariances[:, 0, 0] <= limit)
         return np.asarray((covariances[:, 0, 0] <= limit) & (covariances[:, 1, 1] <= limit))
 
     def _log_birth(self, covariances: Array) -> Array:
-        """What new targets add to the score of their measurements, by the covariances of their positions."""
+        """Birth term of new targets' scores, by the covariances of their positions."""
         return log_birth(covariances, self._place.region, self._initiation.birth_rate)
 
     def scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
         """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
         seen = rows > 0
-        # to `tuple_costs` a single measurement is a false alarm
+        # `tuple_costs` treats single measurements as false alarms
         alone = seen @ self._terms.birth + ~seen @ self._terms.miss
         return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
 
     def singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
-        """New tracks of single measurements (n, d) of sensor s: states, which can start one, where, and scores."""
+        """New tracks of single measurements (n, d) of sensor s: states, mask of those used, positions, scores."""
         positions, covariances = single_positions(self._place, s, measured)
         fit = self._narrow(covariances)
         if not fit.all():
@@ -100,7 +100,7 @@ class NewTracks:
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
     def places(self, measurements: Sequence[Array]) -> Places:
-        """Where each measurement of a scan alone says that its target is."""
+        """Position of the target of each measurement of a scan, by that measurement alone."""
         positions, covariances, fit, births = [], [], [], []
         for s, z in enumerate(measurements):
             where, spread = single_positions(self._place, s, z)
@@ -124,17 +124,17 @@ class NewTracks:
         Crossings or None
             None where there are no such tuples.
         """
-        numbers = [np.flatnonzero(one) for one in free]
-        if sum(len(one) > 0 for one in numbers) < 2:
+        numbers = [np.flatnonzero(mask) for mask in free]
+        if sum(len(rows) > 0 for rows in numbers) < 2:
             return None
-        left = Scan(scan.index, scan.time, tuple(z[own] for z, own in zip(scan.measurements, numbers, strict=True)))
+        left = Scan(scan.index, scan.time, tuple(z[rows] for z, rows in zip(scan.measurements, numbers, strict=True)))
         problem = build_problem(self._place, left, speed=self._initiation.speed, **self._limits)
         several = np.count_nonzero(problem.tuples, axis=1) > 1
         if not several.any():
             return None
         tuples, costs = problem.tuples[several], problem.costs[several]
         positions, covariances, fit = self.fused(left, tuples)
-        given = [np.concatenate([[0], own + 1]) for own in numbers]
-        rows = np.stack([one[tuples[:, s]] for s, one in enumerate(given)], axis=1).astype(np.int32)
+        number_of = [np.concatenate([[0], rows + 1]) for rows in numbers]
+        rows = np.stack([number[tuples[:, s]] for s, number in enumerate(number_of)], axis=1).astype(np.int32)
         rows, costs, positions, covariances = rows[fit], costs[fit], positions[fit], covariances[fit]
         return Crossings(rows, costs, self.scores(rows, costs, covariances), positions, covariances)

@@ -122,7 +122,7 @@ class LiveTracker:
         wait: float = 0.0,
         tell: Callable[[str], object] = print,
     ) -> None:
-        spans = positive(interval, "interval"), None if turns is None else [positive(one, "turns") for one in turns]
+        spans = positive(interval, "interval"), None if turns is None else [positive(turn, "turns") for turn in turns]
         late = positive(horizon, "horizon"), positive(wait, "wait", zero=True)
         self.settings = LiveSettings(scene, make, *spans, *late, tell)
         self.state = LiveState(LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors])
@@ -203,7 +203,7 @@ class LiveTracker:
             return []
         plot, state = SoundPlot(s, time, z, known), self.state
         # a repetition of a doubted plot does not confirm its time
-        if plot.key in state.recent or plot.key in state.behind or plot.key in [one.key for one in state.ahead]:
+        if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
             self.leave_out("repeated", f"{where} repeats a plot of {time:g} s: left out")
             return []
         return self._timed(plot)
@@ -265,18 +265,18 @@ class LiveTracker:
         self.state.ahead = []
 
     def _jump(self) -> list[Picture]:
-        """Believe the plots that were ahead."""
+        """Accept the plots that were ahead: the clock has jumped."""
         plots, self.state.ahead = self.state.ahead, []
         first = min(plot.time for plot in plots)
         self.settings.tell(f"the clock jumped from {self.state.newest:g} s to {first:g} s: tracks begin anew")
         pictures = self._rest()
         self._restart()
-        for plot in sorted(plots, key=lambda one: one.time):
+        for plot in sorted(plots, key=lambda plot: plot.time):
             pictures += self._timed(plot)
         return pictures
 
     def _hear(self, plot: SoundPlot) -> None:
-        """Learn of a sensor that it lives, and where its antenna is."""
+        """Update the sensor's antenna by a plot."""
         s, time, z, _ = plot
         turn, sensor = self.settings.turn_of(s), self.settings.scene.sensors[s]
         if self.state.antennas[s].silent:

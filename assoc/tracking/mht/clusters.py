@@ -79,11 +79,11 @@ def doubted(branches: Array, odds: Array, most: int, drop: float) -> list[Cluste
     return found
 
 
-def odds_of(one: Cluster) -> float:
-    """Log odds of a cluster of one branch, see `doubted`."""
-    if len(one.weight) == 1:
+def odds_of(group: Cluster) -> float:
+    """Log odds of a cluster of group branch, see `doubted`."""
+    if len(group.weight) == 1:
         return np.inf
-    return float(one.weight[0] - one.weight[1]) * (1.0 if one.holds[0, 0] else -1.0)
+    return float(group.weight[0] - group.weight[1]) * (1.0 if group.holds[0, 0] else -1.0)
 
 
 def linked(first: Array, second: Array, count: int) -> Array:
@@ -116,15 +116,15 @@ def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
     if len(clusters) == 1:
         return clusters[0]
     total, picked = np.zeros(1), np.zeros((1, 0), dtype=np.int64)
-    for one in clusters:
-        promise = one.weight + one.holds @ potential[one.branches]
-        both = (total[:, None] + promise).ravel()
+    for group in clusters:
+        bound = group.weight + group.holds @ potential[group.branches]
+        both = (total[:, None] + bound).ravel()
         order = np.argsort(-both, kind="stable")[:most]
-        before, own = np.divmod(order, len(one.weight))
-        total, picked = both[order], np.column_stack([picked[before], own])
-    holds = np.concatenate([one.holds[picked[:, i]] for i, one in enumerate(clusters)], axis=1)
-    weight = np.sum([one.weight[picked[:, i]] for i, one in enumerate(clusters)], axis=0)
-    return cluster(np.concatenate([one.branches for one in clusters]), holds, weight)
+        before, added = np.divmod(order, len(group.weight))
+        total, picked = both[order], np.column_stack([picked[before], added])
+    holds = np.concatenate([group.holds[picked[:, i]] for i, group in enumerate(clusters)], axis=1)
+    weight = np.sum([group.weight[picked[:, i]] for i, group in enumerate(clusters)], axis=0)
+    return cluster(np.concatenate([group.branches for group in clusters]), holds, weight)
 
 
 def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
@@ -173,6 +173,6 @@ def agreeing(whole: Cluster, owner: Array) -> Cluster:
     """
     if len(whole.weight) == 1:
         return whole
-    said = np.sort(whole.holds[:, :, None] * owner, axis=1)
-    same = (said == said[0]).all(axis=(1, 2))
+    decided = np.sort(whole.holds[:, :, None] * owner, axis=1)
+    same = (decided == decided[0]).all(axis=(1, 2))
     return cluster(whole.branches, whole.holds[same], whole.weight[same])
