@@ -1,1 +1,1 @@
-"""Tracks for other programs: maps of the earth. Tables are `assoc.tracking.TrackTable`, ASTERIX is an integration."""
+"""Tracks for other programs: maps. For tables see `assoc.tracking.TrackTable`, for ASTERIX `assoc.integrations`."""

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COORDINATES = ("latitude", "longitude", "altitude")
-"""Columns that the tracks of a scene with an origin have as well: degrees, degrees, metres above the ellipsoid."""
+"""Additional columns for tracks of a scene with an origin: degrees, degrees, metres above the ellipsoid."""
 
 FOLLOWED_WITHIN = 1_000.0
-"""Metres within which a track counts as one of a target, where it is asked which one it followed."""
+"""Largest distance at which a track follows a target, metres, to find the target followed most."""
 
 
 def coordinates(positions: Array, origin: Origin) -> Array:
@@ -33,14 +33,14 @@ def coordinates(positions: Array, origin: Origin) -> Array:
 
 
 def followed_targets(times: Array, ids: Array, positions: Array, scene: Scene) -> dict[int, str]:
-    """Name of the true target that each track followed most, for the tracks that followed one.
+    """Name of the true target that each track followed most; tracks that followed none are left out.
 
     Parameters
     ----------
     times, ids, positions
         Rows of tracks (`TrackTable.arrays`).
     scene : Scene
-        With truth.
+        Must have the truth.
     """
     if scene.truth is None:
         return {}
@@ -54,19 +54,19 @@ def followed_targets(times: Array, ids: Array, positions: Array, scene: Scene) -
 
 
 def write_map(path: str | os.PathLike[str], tracks: pd.DataFrame) -> None:
-    """Write tracks for a map: GeoJSON or KML, as the name of the file ends; it appears whole or not at all.
+    """Write tracks for a map, GeoJSON or KML by the file's extension; it appears whole or not at all.
 
     Parameters
     ----------
     path : path-like
         Ends in .geojson, .json or .kml.
     tracks : DataFrame
-        Columns track_id, time, latitude, longitude, altitude, and target where it is known.
+        Columns track_id, time, latitude, longitude, altitude, and target if known.
 
     Raises
     ------
     InvalidInputError
-        Another ending, or tracks without latitudes: their scene has no origin.
+        Another extension, or tracks without latitudes: their scene has no origin.
     """
     ending = os.path.splitext(os.fspath(path))[1].lower()
     if ending not in (".geojson", ".json", ".kml"):
@@ -86,8 +86,8 @@ def _by_track(tracks: pd.DataFrame) -> Iterator[tuple[int, str, pd.DataFrame]]:
 
 
 def _lines(rows: pd.DataFrame) -> list[list[list[float]]]:
-    """Longitude, latitude, altitude of each row, cut where the track passes the date line."""
-    # an altitude that nobody told is shown on the ground
+    """Longitude, latitude, altitude of each row, split where the track crosses the date line."""
+    # tracks of unknown altitude are drawn on the ground
     points = np.round(np.nan_to_num(rows[["longitude", "latitude", "altitude"]].to_numpy(dtype=float)), 7)
     cuts = np.flatnonzero(np.abs(np.diff(points[:, 0])) > 180.0) + 1
     return [part.tolist() for part in np.split(points, cuts)]
@@ -101,7 +101,7 @@ def _feature(number: int, name: str, rows: pd.DataFrame) -> dict[str, Any]:
     elif len(parts) == 1:
         geometry = {"type": "LineString", "coordinates": parts[0]}
     else:
-        # a line has two points at least
+        # a line needs at least two points
         parts = [part if len(part) > 1 else part * 2 for part in parts]
         geometry = {"type": "MultiLineString", "coordinates": parts}
     properties: dict[str, Any] = {"name": name, "track_id": number, "times": rows["time"].tolist()}

@@ -1,4 +1,4 @@
-"""Axes to draw into: the caller's, or new ones; lengths in a unit that people read."""
+"""Axes to draw into, the caller's or new ones, and units of length."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def axes_or_new(ax: Any, size: tuple[float, float] = (7.0, 5.0)) -> Any:
 
 
 class Unit(NamedTuple):
-    """A unit of length: its name, and what metres are multiplied by."""
+    """A unit of length: its name, and its factor from metres."""
 
     name: str
     factor: float
@@ -50,7 +50,7 @@ def stacked(parts: Iterable[Any]) -> Array:
 def box_around(near: Array, far: Array) -> Array:
     """Bounds (2, 2) of x and y around all of `near` and most of `far`, with a margin, metres.
 
-    A few false alarms or ghosts at the edge of the world must not shrink everything else to a dot.
+    A few distant false alarms or ghosts must not shrink everything else to a dot.
     """
     corners = [near[:, :2]] if len(near) else []
     if len(far):
@@ -66,7 +66,7 @@ def box_around(near: Array, far: Array) -> Array:
 def set_plan_view(ax: Any, box: Array, unit: Unit) -> None:
     """Make axes a map: equal scales, bounds, units."""
     middle, width = box.mean(axis=1), np.ptp(box, axis=1)
-    # a map may be wide or tall, but no strip
+    # limits the aspect ratio
     width = np.maximum(width, [width[1] / _TALL, width[0] / _WIDE])
     ax.set_xlim(*(unit.factor * (middle[0] + np.array([-0.5, 0.5]) * width[0])))
     ax.set_ylim(*(unit.factor * (middle[1] + np.array([-0.5, 0.5]) * width[1])))
@@ -77,7 +77,7 @@ def set_plan_view(ax: Any, box: Array, unit: Unit) -> None:
 
 
 def legend(ax: Any, **options: Any) -> None:
-    """Add a legend below the axes, where it hides nothing, if there is anything to name."""
+    """Add a legend below the axes, where it hides nothing, unless it would be empty."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         ax.legend(

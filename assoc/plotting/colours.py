@@ -12,7 +12,7 @@ YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#7F7F7F"
 
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, BLACK)
-"""In the order in which they are taken; yellow is too light for lines on white."""
+"""Colours of series, in order; yellow is left out: too light for lines on white."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 """matplotlib markers of sensors and series, in step with `SERIES`."""

@@ -1,4 +1,4 @@
-"""How cost and lower bound of solutions converge."""
+"""Convergence of cost and lower bound."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plot_convergence(
     Parameters
     ----------
     solutions : Solution, or mapping of names to solutions
-        Several of one problem are drawn over one another.
+        Several solutions must belong to one problem; they share the axes.
     over : {"iteration", "time"}
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
@@ -46,7 +46,7 @@ def plot_convergence(
         last = (solution.iterations, solution.runtime, solution.cost, solution.lower_bound)
         points = np.array([*solution.trace, last], dtype=np.float64)
         x = points[:, 0] if over == "iteration" else 1e3 * points[:, 1]
-        # a solver may report a weaker bound later: the best known counts
+        # a solver may report a weaker bound later: the best one so far counts
         bound = np.maximum.accumulate(np.where(np.isfinite(points[:, 3]), points[:, 3], -np.inf))
         bound[~np.isfinite(bound)] = np.nan
         style = {"color": colour(number), "markersize": 4, "drawstyle": "steps-post", "marker": marker(number)}

@@ -31,7 +31,7 @@ def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, 
     ----------
     problem : AssignmentProblem
     solution : Solution, optional
-        Of this problem.
+        A solution of this problem.
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -42,7 +42,7 @@ def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, 
     Raises
     ------
     InvalidInputError
-        The solution is one of another problem.
+        The solution belongs to another problem.
     """
     if solution is not None and not belongs(solution, problem):
         raise InvalidInputError("solution: is not one of this problem")
@@ -51,7 +51,7 @@ def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, 
     across = number.astype(np.float64)
     for count in np.unique(number):
         rows = np.flatnonzero(number == count)
-        # side by side in the order of their costs: a column of dots shows how many there are
+        # side by side in the order of costs, so that the width shows their number
         order = np.argsort(problem.costs[rows], kind="stable")
         across[rows[order]] += _SPREAD * ((np.arange(rows.size) + 0.5) / rows.size - 0.5)
     ax.plot(across, problem.costs, ".", color=GREY, alpha=0.5, markersize=4, label="candidate tuples")
@@ -69,7 +69,7 @@ def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, 
 
 
 def belongs(solution: Solution, problem: AssignmentProblem) -> bool:
-    """Whether a solution's indices name its tuples in this problem; they may not after gating otherwise."""
+    """Whether a solution's indices match its tuples in this problem; after another gating they may not."""
     rows = solution.indices
     inside = not rows.size or int(rows.max()) < problem.num_tuples
     return bool(inside and np.array_equal(problem.tuples[rows], solution.tuples))
@@ -84,19 +84,19 @@ def plot_gates(
     bins: int = 20,
     ax: Any = None,
 ) -> Any:
-    """Draw how far the chosen tuples fill their gates, as the probability that a true tuple is no farther apart.
+    """Draw a histogram of the chosen tuples' residuals, as the probability that those of a true tuple are smaller.
 
-    Where noise and model are right and the tuples true, all shares are equally likely and the bars level with the line;
-    a heap at the right says that the noise is stated too small or tuples are wrong, one at the left that it is
-    stated too large.
+    If noise and model are right and the tuples true, this probability is uniform and the bars are level with the line.
+    A peak at the right means that the stated noise is too small or tuples are wrong, one at the left that the stated
+    noise is too large.
 
     Parameters
     ----------
     scene : Scene
     association : Association or sequence of ScanAssociation
-        Of this scene.
+        Association of this scene.
     gate_probability : float
-        Where the gate ends.
+        Probability of a true tuple inside the gate.
     bins : int
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
@@ -108,7 +108,7 @@ def plot_gates(
     Raises
     ------
     InvalidInputError
-        Measurements of the scene have times of their own: their gates are those of predicted motion.
+        Measurements of the scene have times of their own: their gates depend on predicted motion.
     """
     from scipy.special import gammainc
 
@@ -130,7 +130,7 @@ def plot_gates(
 
 
 def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
-    """Normalised squared residuals of the targets, and their degrees of freedom (0 left out)."""
+    """Normalised squared residuals of the targets, and their degrees of freedom (targets with 0 left out)."""
     scan = scan_of(scene, one)
     if scan.times is not None:
         raise InvalidInputError(

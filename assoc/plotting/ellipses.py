@@ -1,4 +1,4 @@
-"""Ellipses of covariances in the plane, and the covariance of the place that a measurement names."""
+"""Ellipses of covariances in the plane, and covariances of measured positions."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ _CORNERS = 49
 
 
 def ellipses(centres: Array, covariances: Array, probability: float) -> tuple[Array, Array]:
-    """Outlines that hold a plane normal distribution with a probability, as one line with gaps.
+    """Ellipses that contain two-dimensional normal distributions with a probability, as one line with gaps.
 
     Parameters
     ----------
     centres : ndarray (n, 2 or more)
     covariances : ndarray (n, 2 or more, 2 or more)
-        Of x and y first.
+        x and y come first.
     probability : float
 
     Returns
     -------
     x, y : ndarray (n * 50,)
-        NaN between one ellipse and the next.
+        NaN between ellipses.
     """
     values, vectors = np.linalg.eigh(covariances[:, :2, :2])
     # the chi-square distribution of two degrees of freedom has a closed form
@@ -39,7 +39,7 @@ def ellipses(centres: Array, covariances: Array, probability: float) -> tuple[Ar
 
 
 def place_covariances(sensor: Sensor, measurements: Array, heights: Array | float) -> Array:
-    """Covariances (n, 2, 2) of x and y of the places that measurements name, to first order, m^2."""
+    """Covariances (n, 2, 2) of x and y of measured positions, to first order, m^2."""
     z = np.asarray(measurements, dtype=np.float64)
     sigma = np.sqrt(np.diagonal(sensor.covariance))
     slopes = np.zeros((len(z), 2, sensor.dim))

@@ -25,7 +25,7 @@ LABELS = {
     "cost": "mean cost, nats",
     "correct": "correct, %",
 }
-"""What is said of each measure; their units are those of `FACTORS`."""
+"""Descriptions of the measures, in the units of `FACTORS`."""
 
 
 @door
@@ -37,11 +37,11 @@ def plot_heat_map(
     Parameters
     ----------
     study : DataFrame
-        Runs, of ``assoc.sweeps.load``; of one solver.
+        Runs of one solver, from ``assoc.sweeps.load``.
     measure : str
         "gap", "optimal", "iterations", "time", "cost" or "correct".
     parameters : sequence of two str, optional
-        Across and up; without them the first two that vary. Runs are averaged over all others.
+        Horizontal and vertical; default: the first two that vary. Means are over all others.
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -83,7 +83,7 @@ def plot_heat_map(
 def cells(
     study: pd.DataFrame, measure: str, across: str, up: str, *, intervals: bool = True
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Means and 95 % intervals of a measure over two parameters, in the units in which it is shown.
+    """Means and 95 % intervals of a measure over two parameters, in displayed units.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def cells(
         Runs of one solver.
     measure, across, up : str
     intervals : bool, default True
-        Whether to find the intervals, which takes most of the time; they are NaN otherwise.
+        Whether to compute the intervals, which takes most of the time; otherwise they are NaN.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def cells(
     middle, low, high = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
     for (x, y), runs in study.groupby([across, up]):
         place = [*ys].index(y), [*xs].index(x)
-        # settings that differ in other parameters are further repeats here
+        # settings that differ only in other parameters count as repeats
         runs = runs.assign(repeat=runs.groupby(["setting", "repeat"]).ngroup())
         table = by_problem(runs, measured(runs, measure))
         weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
@@ -115,12 +115,12 @@ def cells(
 
 
 def is_constant(known: Floats) -> bool:
-    """Whether values are one and the same, up to rounding: they need no colour scale."""
+    """Whether values are equal up to rounding, so that they need no colour scale."""
     return bool(known.size) and float(np.ptp(known)) <= 1e-9 * float(np.abs(known).max())
 
 
 def colour_limits(known: Floats) -> tuple[float, float]:
-    """Ends of the colour scale for the values that are known."""
+    """Ends of the colour scale for these values."""
     if not known.size:
         return 0.0, 1.0
     low, high = float(known.min()), float(known.max())

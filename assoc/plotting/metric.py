@@ -22,9 +22,9 @@ def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None
     times : array_like (K,)
         Seconds.
     values : array_like (K,), or mapping of names to such
-        NaN where it is not known.
+        NaN where unknown.
     name, unit : str
-        Of the vertical axis, as "GOSPA" and "m".
+        Labels of the vertical axis, such as "GOSPA" and "m".
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -35,7 +35,7 @@ def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None
     Raises
     ------
     InvalidInputError
-        Values and times are not of one length.
+        Values and times differ in length.
     """
     ax = axes_or_new(ax, (7.0, 3.5))
     at = np.asarray(times, dtype=np.float64)

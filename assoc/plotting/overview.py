@@ -1,4 +1,4 @@
-"""An association at a glance: the scene, a scan, its candidates, and how the solver closed the gap."""
+"""Four plots of an association: the scene, a scan, its candidates, and the solver's convergence."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes
     ----------
     scene : Scene
     association : Association
-        Of this scene.
+        Association of this scene.
     scan : int
-        Number of the scan that is shown.
+        Number of the scan to show.
     axes : array of four matplotlib Axes, optional
-        Where to draw; those of a new figure without it.
+        Where to draw; default: those of a new figure.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes
     Raises
     ------
     InvalidInputError
-        The association does not hold that scan.
+        The association does not contain that scan.
     """
     found = [item for item in association.scans if item.scan == scan]
     if not found:

@@ -1,4 +1,4 @@
-"""The pheromone of the ant colony over its cycles, how the ants see the tuples, and what they draw them with."""
+"""Pheromone, visibility and probability of tuples over the cycles of the ant colony."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: i
     Parameters
     ----------
     history : PheromoneHistory
-        Of ``assoc.solvers.pheromone``.
+        From ``assoc.solvers.pheromone``.
     of : {"pheromone", "visibility", "probability"}
-        tau_j or eta_j, as shares of their sum over all tuples, or p_j of eq. 8.
+        tau_j or eta_j, as shares of their sums over all tuples, or p_j of eq. 8.
     nodes : int
-        So many tuples are shown, those that were chosen first, then those with the most pheromone in the end.
+        Number of tuples shown: first the chosen ones, then those with the most pheromone in the end.
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -44,7 +44,7 @@ def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: i
     Raises
     ------
     InvalidInputError
-        ``of`` is none of the three.
+        ``of`` is not one of the three.
     """
     if of not in _LABELS:
         raise InvalidInputError(f"of: expected {', '.join(_LABELS)}, got {of!r}")
@@ -53,7 +53,7 @@ def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: i
     values = getattr(shown, of)
     if of != "probability":
         values = values / np.maximum(np.nansum(getattr(history, of), axis=1, keepdims=True), 1e-300)
-    # on top what was chosen, in the order of its pheromone
+    # chosen tuples on top, sorted by pheromone
     values, chosen = values[:, ::-1], np.flatnonzero(shown.chosen[::-1])
     cycles = history.cycles
     edges = (float(cycles[0]) - 0.5, float(cycles[-1]) + 0.5) if len(cycles) else (0.5, 1.5)

@@ -1,4 +1,4 @@
-"""Where to draw a measurement: the point it names, or the ray along which it sees."""
+"""Where to draw a measurement: a point, or a ray along a bearing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
     Raises
     ------
     InvalidInputError
-        The scene has no such scan, or one of other measurements.
+        The scene has no such scan, or its measurements differ.
     """
     scan = scene.scan(association.scan)
     if tuple(scan.sizes) != tuple(association.sizes):
@@ -30,16 +30,16 @@ def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
 
 
 def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:
-    """Positions of measurements; what a sensor does not measure is given.
+    """Positions of measurements, given the coordinates that a sensor does not measure.
 
     Parameters
     ----------
     sensor : Sensor
     measurements : ndarray (n, d)
     heights : float or ndarray (n,)
-        Heights above the plane z = 0 for sensors that leave them open, metres.
+        Heights above the plane z = 0, for sensors that do not measure them, metres.
     distances : float or ndarray (n,)
-        Ground distances from sensors that measure a bearing alone, metres.
+        Ground distances, for sensors that measure only a bearing, metres.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def places(sensor: Sensor, measurements: Array, heights: Array | float, distance
 
 
 def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array:
-    """How far a ray from the sensor runs until it leaves the region, metres (n,); 0 if it never meets it.
+    """Distance at which a ray from the sensor leaves the region, metres (n,); 0 if they do not intersect.
 
     Parameters
     ----------
@@ -76,12 +76,12 @@ def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array
     direction = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (region[None, :2, :] - sensor.position[None, :2, None]) / direction[:, :, None]
-    # parallel to a side: that side never stops it
+    # parallel to a side: never crosses it
     ends = np.where(np.isnan(ends), np.inf, ends)
     leave = ends.max(axis=2).min(axis=1)
     return np.where(np.isfinite(leave), np.maximum(leave, 0.0), 0.0)
 
 
 def measures_height(sensor: Sensor) -> bool:
-    """Whether a measurement says how high the target is."""
+    """Whether the sensor measures heights."""
     return sensor.dim >= 3

@@ -1,4 +1,4 @@
-"""What is left of the measurements before and after registration."""
+"""Residuals of measurements before and after registration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from assoc.sensors.base import ANGLES
 
 
 def residual_columns(registration: Registration, component: str) -> list[tuple[int, int]]:
-    """Sensors that measure a component, and where it stands among theirs."""
+    """Sensors that measure a component, and its index among theirs."""
     return [
         (s, sensor.components.index(component))
         for s, sensor in enumerate(registration.sensors)
@@ -28,8 +28,8 @@ def residual_columns(registration: Registration, component: str) -> list[tuple[i
 def plot_residuals(registration: Registration, component: str = "range", *, ax: Any = None) -> Any:
     """Draw the residuals of a component before and after registration, one pair of boxes for each sensor.
 
-    A box holds the middle half of the residuals, its line is their median, whiskers hold 95 of a hundred; the black
-    lines are the sensor's own noise, 1.96 standard deviations.
+    A box holds the middle half of the residuals, its line is the median, the whiskers hold 95 %; the black lines are
+    1.96 standard deviations of the sensor's noise.
 
     Parameters
     ----------

@@ -28,16 +28,16 @@ def plot_scene(
     gate_probability: float = 0.999,
     ax: Any = None,
 ) -> Any:
-    """Draw where sensors and targets are and what was measured.
+    """Draw sensors, targets and measurements.
 
     Parameters
     ----------
     scene : Scene
     scan : int, optional
-        One scan alone; without it all measurements are drawn, and the truth as paths.
+        The scan to draw; default: all measurements, and the truth as paths.
     gates : bool
-        Draw around each measurement where its target is with the gate's probability; for a bearing the
-        wedge. Two measurements can be one target where their gates meet.
+        Draw around each measurement the region that contains its target with the gate's probability (a wedge for
+        a bearing). Two measurements can be one target if their gates overlap.
     gate_probability : float
         In (0, 1).
     ax : matplotlib Axes, optional
@@ -84,7 +84,7 @@ def _bears(sensor: Sensor) -> bool:
 
 
 def _ends(scene: Scene, sensor: Sensor, z: Array, height: float) -> Array:
-    """Places of measurements; for bearings where their rays leave the region."""
+    """Positions of measurements; for bearings, the points where their rays leave the region."""
     distance = distances_to_border(sensor, z[:, 0], scene.region) if _bears(sensor) else 0.0
     return places(sensor, z, height, distance)
 
@@ -112,7 +112,7 @@ def _draw_gates(ax: Any, scene: Scene, scans: Sequence[Scan], height: float, pro
 
 
 def draw_truth(ax: Any, scene: Scene, scans: Sequence[Scan], factor: float, *, paths: bool) -> None:
-    """Draw targets where they were: paths over the scans, or a cross each."""
+    """Draw true positions: paths over the scans, or crosses."""
     if scene.truth is None:
         return
     if not paths:
@@ -136,6 +136,6 @@ def truth_paths(scene: Scene) -> dict[int, Array]:
 
 
 def draw_sensors(ax: Any, sensors: Sequence[Sensor], factor: float) -> None:
-    """Draw where the sensors stand."""
+    """Draw the sensors' positions."""
     sites = factor * stacked(sensor.position for sensor in sensors)
     ax.plot(*sites[:, :2].T, "^", color=GREY, markersize=9, markeredgecolor=BLACK, label="sensors", zorder=3)

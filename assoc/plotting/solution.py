@@ -23,17 +23,17 @@ from assoc.sensors import BearingSensor
 def plot_solution(
     scene: Scene, association: ScanAssociation, *, target: int | None = None, probability: float = 0.95, ax: Any = None
 ) -> Any:
-    """Draw which measurements of a scan were taken together, and where their targets are.
+    """Draw which measurements of a scan were associated, and the positions of their targets.
 
     Parameters
     ----------
     scene : Scene
     association : ScanAssociation
-        Of one of its scans: ``assoc.associate(scene).scans[k]``.
+        Association of one of its scans: ``assoc.associate(scene).scans[k]``.
     target : int, optional
-        Draw the surroundings of this target alone (a row of ``association.targets``).
+        Draw only the surroundings of this target (a row of ``association.targets``).
     probability : float
-        Of the covariance ellipses, in (0, 1).
+        Probability content of the covariance ellipses, in (0, 1).
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -44,7 +44,7 @@ def plot_solution(
     Raises
     ------
     InvalidInputError
-        The association is of another scene, has no positions or no such target; or the probability is none.
+        The association belongs to another scene, has no positions or no such target; or the probability is invalid.
     """
     if association.positions is None or association.covariances is None:
         raise InvalidInputError("association: has no positions, expected one made from a scene")
@@ -108,13 +108,13 @@ def _bearings(ax: Any, site: Array, ends: Array, label: Array) -> None:
 def measured_places(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:
     """Where to draw the measurements of an associated scan.
 
-    What a sensor leaves open (the height, the distance along a bearing) is taken from the target that the
-    measurement was given to; a bearing that is a false alarm ends at the border of the region.
+    Coordinates that a sensor does not measure (height, distance along a bearing) are those of the associated target; a
+    false alarm of a bearing ends at the border of the region.
 
     Returns
     -------
     list over sensors of (places (n, 3), labels (n,))
-        Metres; the row of ``association.targets`` of each, -1 for false alarms.
+        Metres; row in ``association.targets`` of each measurement, -1 for false alarms.
     """
     scan = scene.scan(association.scan)
     found = np.zeros((0, 3)) if association.positions is None else association.positions

@@ -1,4 +1,4 @@
-"""Figures of a study: where in the design it is good, and how its settings converge."""
+"""Figures of a study: heat maps over its parameters, and convergence of its settings."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None
     ----------
     folder : path-like
     frame : DataFrame, optional
-        The runs to show; all of the study without it.
+        The runs to show; default: all.
 
     Returns
     -------
     list of Path
-        ``heatmap.png`` (one a solver, with its name, if there are several) and ``convergence.png``.
+        ``heatmap.png`` (one for each solver, with its name, if there are several) and ``convergence.png``.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None
     for solver, part in parts:
         if not varied(part):
             continue
-        # the name of a solver comes from the study's log: it must not lead elsewhere
+        # the solver's name comes from a file: it must not lead to another folder
         name = "heatmap.png" if len(parts) == 1 else "heatmap-" + re.sub(r"[^\w.-]", "_", solver) + ".png"
         drawn.append(_save(folder, name, heat_maps(part, new_figure())))
     drawn.append(_save(folder, "convergence.png", convergence(frame, load_traces(folder), new_figure())))
@@ -80,7 +80,7 @@ def new_figure() -> Any:
 
 def _save(folder: Any, name: str, figure: Any) -> Path:
     path = Path(folder) / name
-    check_regular(path)  # others may have put a link into the folder of a study
+    check_regular(path)  # the folder may contain a symbolic link, which must not be followed
     return save_png(path, figure)
 
 
@@ -93,7 +93,7 @@ def save_png(path: Path, figure: Any) -> Path:
 def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     """Draw each measure over two parameters, side by side for the values of the others.
 
-    With one parameter, or with more values than a map can hold, the measures are drawn over each parameter.
+    With one parameter, or too many values for a map, the measures are drawn over each parameter.
 
     Parameters
     ----------
@@ -164,14 +164,14 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[str], figur
 
 
 def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
-    """Draw the mean cost above the best known, over iterations and over time, one curve a setting.
+    """Draw the mean cost above the best known, over iterations and over time, one curve for each setting.
 
-    The eight settings of least mean gap are named, the others are grey.
+    The eight settings with the smallest mean gaps are named, the others are grey.
 
     Parameters
     ----------
     frame, traces : DataFrame
-        Of `load` and `load_traces`.
+        From `load` and `load_traces`.
     figure : matplotlib.figure.Figure
         Empty.
 
@@ -201,7 +201,7 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("mean cost above the best known")
     axes[0].set_yscale("symlog", linthresh=1e-3)
-    # where all settings find the best at once the curves lie on the axis, which still needs a height
+    # if all settings find the best solution at once, all curves are 0, and the axis still needs an extent
     axes[0].set_ylim(-1e-4, None if traces["excess"].max() > 0.0 else 1e-2)
     handles, labels = axes[1].get_legend_handles_labels()
     axes[1].legend(handles[::-1], labels[::-1], fontsize=7)
@@ -209,7 +209,7 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
 
 
 def setting_title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -> str:
-    """Return what a setting (a row of a summary) is called among the others of its study."""
+    """Title of a setting (a row of a summary) in its study."""
     words = [str(row["solver"])] if several or not names else []
     words += [f"{n} {short_text(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
     return ", ".join(words)

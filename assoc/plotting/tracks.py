@@ -29,7 +29,7 @@ def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = N
     tracks : DataFrame
         Columns track_id, time, x, y (metres) at least, as in a tracks.csv.
     truth : Scene, optional
-        Whose truth is drawn under the tracks, in wide grey.
+        Its truth is drawn under the tracks, in wide grey lines.
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -40,7 +40,7 @@ def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = N
     Raises
     ------
     InvalidInputError
-        A column is missing, or a place is no number.
+        A column is missing, or a position is not a number.
     """
     missing = [name for name in ("track_id", "time", "x", "y") if name not in tracks.columns]
     if missing:

@@ -1,6 +1,6 @@
-"""ASTERIX (extra ``[asterix]``): plots and ADS-B reports read as recordings, plots and tracks written.
+"""ASTERIX (extra ``[asterix]``): read plots and ADS-B reports as recordings, write plots and tracks.
 
-Decoding and encoding of items is that of the package ``libasterix``.
+The package ``libasterix`` decodes and encodes items.
 """
 
 from __future__ import annotations

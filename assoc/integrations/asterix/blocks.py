@@ -1,4 +1,4 @@
-"""Data blocks of ASTERIX in a file: one after the other, or in the UDP packets of a pcap."""
+"""ASTERIX data blocks in a file: in sequence, or in the UDP packets of a pcap."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UDP = 17
 
 
 class Block(NamedTuple):
-    """A data block: its category, its records undecoded, and where it began."""
+    """A data block: its category, its undecoded records, and its offset in the file."""
 
     category: int
     content: bytes
@@ -29,16 +29,16 @@ class Block(NamedTuple):
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Content of a file of bearable size."""
+    """Read a file, up to the largest size allowed."""
     check_extra("asterix", "asterix")
     return reading.read_bytes(path)
 
 
 def data_blocks(content: bytes, notes: dict[str, int]) -> Iterator[Block]:
-    """Split a file's content; what is no data block is counted in `notes` and passed over.
+    """Split a file's content into data blocks; other content is skipped and counted in `notes`.
 
-    In a plain file all that follows a length that cannot be is lost, for nothing tells where the next block begins; in
-    a pcap it is only the rest of that packet.
+    After an impossible length, the rest of a plain file is skipped, since the beginning of the next block is unknown;
+    in a pcap only the rest of that packet.
     """
     order = _PCAP.get(content[:4])
     if order is None:
@@ -60,7 +60,7 @@ def _split(content: bytes, start: int, notes: dict[str, int]) -> Iterator[Block]
 
 
 def _packets(content: bytes, order: str, notes: dict[str, int]) -> Iterator[tuple[int, bytes]]:
-    """Payloads of the UDP packets of a pcap, and where they begin."""
+    """Payloads of the UDP packets of a pcap, with their offsets."""
     if len(content) < 24:
         _count(notes, "bytes that are no whole data block", len(content))
         return
@@ -81,7 +81,7 @@ def _packets(content: bytes, order: str, notes: dict[str, int]) -> Iterator[tupl
 
 
 def _udp_payload(packet: bytes, link: int) -> tuple[int, bytes] | None:
-    """Payload of a packet and its offset, or None where it is not an unbroken UDP packet of IPv4."""
+    """Payload of a packet and its offset; None unless it is an unfragmented IPv4 UDP packet."""
     at = {_ETHERNET: 14, _COOKED: 16}.get(link, 0)
     if link == _ETHERNET:
         while packet[at - 2 : at] == b"\x81\x00":
@@ -112,7 +112,7 @@ def edition(category: int) -> Any:
 
 
 def records(block: Block, notes: dict[str, int]) -> list[Any]:
-    """Records of a data block; none, and a count, where they cannot be decoded."""
+    """Decoded records of a data block; if they cannot be decoded, none, and a count in `notes`."""
     found = edition(block.category).cv_uap.parse(library()[0].Bits.from_bytes(block.content))
     if isinstance(found, ValueError):
         _count(notes, f"data blocks of category {block.category:03d} that cannot be decoded", 1)
@@ -121,7 +121,7 @@ def records(block: Block, notes: dict[str, int]) -> list[Any]:
 
 
 def value(record: Any, item: str, *path: str) -> int | None:
-    """Raw number of an item, or of an element inside; None where it is not there."""
+    """Raw number of an item or of an element in it; None if absent."""
     found = record.get_item(item)
     for name in path:
         if found is None:
@@ -131,5 +131,5 @@ def value(record: Any, item: str, *path: str) -> int | None:
 
 
 def signed(raw: int, bits: int) -> int:
-    """Two's complement."""
+    """Signed value of a raw number in two's complement."""
     return raw - (1 << bits) if raw >> (bits - 1) else raw

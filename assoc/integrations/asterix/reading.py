@@ -1,4 +1,4 @@
-"""Plots (category 048), what radars say of themselves (034) and ADS-B reports (021) as recordings."""
+"""Read plots (category 048), radar service messages (034) and ADS-B reports (021) as recordings."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Source = tuple[int, int]
 
 @dataclass(frozen=True)
 class RadarNote:
-    """What a radar said of itself (category 034).
+    """Service messages of a radar (category 034).
 
     Attributes
     ----------
     norths : array (n,)
-        When the antenna passed north, seconds of the recording.
+        Times at which the antenna passed north, seconds of the recording.
     rotation : float or None
-        Seconds for a turn, as it said last.
+        Last reported duration of a turn, seconds.
     place : tuple of latitude, longitude, height, or None
         Radians, metres above the ellipsoid.
     """
@@ -52,19 +52,19 @@ class RadarNote:
 
 @dataclass(frozen=True)
 class AsterixContent:
-    """What a file holds.
+    """Content of a file.
 
     Attributes
     ----------
     plots : dict of (SAC, SIC) to Recording
-        Of each radar; `Recording.addresses` are the aircraft's ICAO addresses.
+        Plots of each radar; `Recording.addresses` are the aircraft's ICAO addresses.
     adsb : dict of (SAC, SIC) to Recording
         Reports of each ground station, as seen from `origin`.
     radars : dict of (SAC, SIC) to RadarNote
     origin : tuple of latitude, longitude, height, or None
-        From where ADS-B reports are seen.
+        Point from which ADS-B reports are given as range and azimuth.
     notes : dict of str to int
-        What could not be read, and how much of it.
+        Counts of content that could not be read, by kind.
     """
 
     plots: Mapping[Source, Recording]
@@ -75,26 +75,26 @@ class AsterixContent:
 
 
 class SourceRows:
-    """Rows of one source, with times of day that run on over midnight."""
+    """Rows of one source; times continue beyond 24 h after midnight."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []
         self.day = self.latest = 0.0
 
     def time(self, raw: int) -> float:
-        """Seconds of the recording at a time of day."""
+        """Seconds of the recording, by the raw time of day."""
         running = raw * SECOND + self.day
         if self.rows and running < self.latest - DAY / 2:
             self.day += DAY
             running += DAY
         elif self.day and running > self.latest + DAY / 2:
-            # a late one, of before midnight
+            # late, from before midnight
             running -= DAY
         self.latest = max(self.latest, running) if self.rows else running
         return running
 
     def columns(self) -> list[Array]:
-        """Columns in the order of the first, the time."""
+        """Columns, sorted by the first one, the time."""
         table = np.array(self.rows, dtype=np.float64)
         return list(table[np.argsort(table[:, 0], kind="stable")].T)
 
@@ -107,18 +107,18 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
     ----------
     path : path-like
     origin : tuple of latitude, longitude, height, optional
-        From where ADS-B reports are seen, radians and metres; by default the place of the first report, on the ground.
+        Point from which ADS-B reports are given, radians and metres; default: on the ground below the first report.
 
     Returns
     -------
     AsterixContent
-        Times are seconds of the day, and run on over midnight. Identities are Mode 3/A codes (12 bits as a number,
-        0 not decoded). A file that is cut, or holds what cannot be decoded, gives what can be, and notes of the rest.
+        Times are seconds of the day and continue after midnight. Identities are Mode 3/A codes (12 bits as a number,
+        0 not decoded). What cannot be decoded in a truncated or damaged file is counted in the notes.
 
     Raises
     ------
     InvalidInputError
-        The file cannot be read, or holds no plot and no report; or the origin is no place in radians and metres.
+        The file cannot be read, or holds no plot and no report; or the origin is not valid radians and metres.
     MissingExtraError
         libasterix is not installed.
     """
@@ -171,7 +171,7 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
 
 
 def _plot(record: Any, rows: SourceRows) -> tuple[float, ...] | None:
-    """Time, range, azimuth, identity, altitude, whether it is garbled, address."""
+    """Time, range, azimuth, identity, altitude, whether that is garbled, address."""
     time, rho, theta = value(record, "140"), value(record, "040", "RHO"), value(record, "040", "THETA")
     if time is None or rho is None or theta is None:
         return None

@@ -1,4 +1,4 @@
-"""Tracks as ASTERIX, category 062: written from a table of tracks, and read back."""
+"""Write a table of tracks as ASTERIX, category 062, and read it back."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PLACE_STEP, SPEED_STEP, HEIGHT_STEP, CLIMB_STEP = 0.5, 0.25, 6.25 * 0.3048, 6.25 * 0.3048 / 60.0
-"""Steps of the category: metres, m/s, metres (6.25 ft), m/s (6.25 ft a minute)."""
+"""Resolutions of the category: metres, m/s, metres (6.25 ft), m/s (6.25 ft/min)."""
 COLUMNS = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed")
 _STEPS = {"x": (PLACE_STEP, 24), "y": (PLACE_STEP, 24), "z": (HEIGHT_STEP, 16)}
 _STEPS |= {"vx": (SPEED_STEP, 16), "vy": (SPEED_STEP, 16), "vz": (CLIMB_STEP, 16)}
@@ -35,8 +35,8 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     path : path-like
     tracks : DataFrame
         Columns track_id, time, x, y, z, vx, vy, vz (tracks.csv, `assoc.tracking.TrackTable.to_frame`), and confirmed
-        where it is known. Of all but the place NaN says nothing. Track numbers have 16 bits: ids are taken modulo
-        65,536.
+        if known. NaN means unknown, except for x and y, which are required. Track numbers have 16 bits: ids are taken
+        modulo 65,536.
     source : (int, int)
         System area code and system identification code of the tracker.
 
@@ -97,8 +97,8 @@ def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns track_id, time, x, y, z, vx, vy, vz, confirmed; metres, m/s, seconds of the day that run on over
-        midnight; NaN where nothing was said.
+        Columns track_id, time, x, y, z, vx, vy, vz, confirmed; metres, m/s, seconds of the day, continued after
+        midnight; NaN for absent items.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Plots of a recording as ASTERIX, category 048."""
+"""Write plots of a recording as ASTERIX, category 048."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def time_of_day(seconds: float) -> int:
 
 
 def check_source(source: Source) -> None:
-    """Refuse codes that are no system area and identification codes."""
+    """Check a system area code and a system identification code."""
     if len(source) != 2 or not all(isinstance(number, int) and 0 <= number <= 255 for number in source):
         raise InvalidInputError(f"source: expected SAC and SIC, whole numbers from 0 to 255, got {source!r}")
 
 
 def write_blocks(path: str | os.PathLike[str], category: int, contents: list[dict[str, Any]]) -> None:
-    """Write records, by item, in data blocks of up to 100; the file appears whole or not at all."""
+    """Write records (contents by item) in data blocks of up to 100; the file appears whole or not at all."""
     kind = edition(category)
     made = [kind.cv_record.create(content) for content in contents]
     blocks = [kind.create(made[k : k + _IN_A_BLOCK]) for k in range(0, len(made), _IN_A_BLOCK)]
@@ -42,7 +42,7 @@ def write_blocks(path: str | os.PathLike[str], category: int, contents: list[dic
 
 @door
 def write_plots(path: str | os.PathLike[str], recording: Recording, source: Source = (0, 1)) -> None:
-    """Write a recording as plots of category 048, in the category's steps: 1/128 s, 1/256 nmi, 0.0055 deg, 25 ft.
+    """Write a recording as plots of category 048, with its resolutions: 1/128 s, 1/256 nmi, 0.0055 deg, 25 ft.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Adapter to Stone Soup 1.9: its trackers with our solvers, and scenes in both directions.
 
-``pip install 'assoc[stonesoup]'``. What is handed over is sorted by its content first: the order in which
-Python's sets iterate, which changes from run to run, changes no result.
+``pip install 'assoc[stonesoup]'``. Sets are sorted by content before use, so that results do not depend
+on their iteration order, which changes from run to run.
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D, Sensor
 from assoc.sensors.base import wrap_angle
 
-# Stone Soup's model -> our sensor, and where our components stand in its measurement; exact types, because a
-# child such as the binned range-rate radar measures something else
+# Stone Soup's model -> our sensor, and the indices of our components in its measurement; exact types, because
+# subclasses such as the binned range-rate radar measure something else
 _KNOWN: dict[type, tuple[type[Sensor], tuple[int, ...]]] = {
     CartesianToElevationBearingRange: (Radar3D, (2, 1, 0)),
     CartesianToSlantRangeBearing: (Radar2D, (1, 0)),
@@ -34,19 +34,19 @@ _KNOWN: dict[type, tuple[type[Sensor], tuple[int, ...]]] = {
 
 @dataclass(frozen=True, eq=False)
 class AdaptedSensor:
-    """A measurement model of Stone Soup and the sensor that it is here; made by `adapt`.
+    """A measurement model of Stone Soup and the corresponding sensor; made by `adapt`.
 
     Attributes
     ----------
     model : stonesoup.models.measurement.MeasurementModel
     sensor : Sensor
-        Its azimuths are counted in the scene's frame.
+        Its azimuths are in the scene's frame.
     order : tuple of int
-        Where the components of our measurement stand in Stone Soup's.
+        Index of each of our components in Stone Soup's measurement.
     turn : float
-        What is added to a bearing to count it from +x, rad.
+        Added to a bearing so that it counts from +x, rad.
     mapping : tuple of int
-        Where the state holds x, y (and z, if the height is measured).
+        Indices of x, y (and z, if heights are measured) in the state.
     """
 
     model: MeasurementModel
@@ -57,11 +57,11 @@ class AdaptedSensor:
 
     @property
     def measures_height(self) -> bool:
-        """Whether heights are part of its measurements."""
+        """Whether it measures heights."""
         return len(self.mapping) == 3
 
     def measurement(self, state_vector: ArrayLike) -> Array:
-        """Return a Stone Soup measurement as ours, shape (d,)."""
+        """Convert a Stone Soup measurement to ours, shape (d,)."""
         z = np.asarray(state_vector, dtype=np.float64).ravel()[list(self.order)]
         angular = list(self.sensor.angular[: len(z)])
         z[angular] = wrap_angle(z[angular] + self.turn)
@@ -79,7 +79,7 @@ class AdaptedSensor:
 
 
 def model_key(model: Any) -> tuple[Any, ...]:
-    """What tells measurement models apart; a sensor of Stone Soup makes a new one for each scan."""
+    """Content of a measurement model, to compare it; sensors of Stone Soup make a new model for each scan."""
 
     def numbers(value: object) -> tuple[float, ...]:
         return () if value is None else tuple(np.asarray(value, dtype=np.float64).ravel().tolist())
@@ -103,7 +103,7 @@ def adapt(
 ) -> AdaptedSensor:
     """Convert a Stone Soup sensor or measurement model.
 
-    A measurement model says how a sensor measures; what the costs need besides is given here.
+    Other properties that the costs need are given here.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def adapt(
         Bounds in our order (range, azimuth, elevation), azimuths counted from +x. By default all directions
         up to ``max_range``. Needed for ``LinearGaussian``: the area in which false alarms occur.
     name : str, optional
-        Tells apart sensors whose models are equal: detections then carry it in ``metadata["sensor"]``.
+        Needed if models of sensors are equal: detections then carry it in ``metadata["sensor"]``.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def adapt(
     Raises
     ------
     InvalidInputError
-        Another measurement model, a sensor that is tilted, or no field of view.
+        An unsupported measurement model, a tilted sensor, or no field of view.
     """
     model = getattr(source, "measurement_model", None) or source
     if max_range is None:

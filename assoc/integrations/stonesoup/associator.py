@@ -26,13 +26,13 @@ class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
 
     With hypotheses that have probabilities (``PDAHypothesiser``) the joint probability is maximised: the costs
     are negative log ratios of "this detection" to "missed". With distances (``DistanceHypothesiser``) their sum
-    is minimised, a missed detection counting its ``missed_distance``; where that is infinite, as many tracks as
-    can be are given a detection.
+    is minimised, a missed detection counting its ``missed_distance``; if that is infinite, as many tracks as
+    possible get a detection.
 
     Attributes
     ----------
     solution : Solution or None
-        The last solution, with its lower bound; None where there was nothing to choose.
+        The last solution, with its lower bound; None if there was nothing to choose.
     """
 
     solver: str = Property(default="exact", doc="One of ``assoc.solvers.names()``.")
@@ -54,7 +54,7 @@ class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
         tracks : set of Track
         detections : set of Detection
         timestamp : datetime
-            To predict to where a detection is missed.
+            Time of the prediction for missed detections.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
 def _problem(
     pairs: Mapping[tuple[int, int], Hypothesis], missed: Mapping[int, Hypothesis], sizes: tuple[int, int]
 ) -> AssignmentProblem:
-    """Tracks and detections as the two sensors of a problem; a lone index is a track missed or clutter."""
+    """Tracks and detections as the two sensors of a problem; a single index is a missed track, or clutter."""
     kinds = {isinstance(hypothesis, ProbabilityHypothesis) for hypothesis in (*pairs.values(), *missed.values())}
     if len(kinds) > 1:
         raise InvalidInputError("hypotheses: some have probabilities and some distances, expected one kind")

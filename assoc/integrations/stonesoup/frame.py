@@ -17,7 +17,7 @@ from assoc.sensors import Sensor
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Sensors that measure the same state space, and where it holds a position.
+    """Sensors that measure the same state space, and the position's indices in it.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Frame:
         As a scene takes them: in the plane if none of them measures heights.
     ndim_state : int
     mapping : tuple of int
-        State dimensions of x, y or x, y, z.
+        Indices of x, y or x, y, z in the state.
     """
 
     adapted: tuple[AdaptedSensor, ...]
@@ -60,7 +60,7 @@ class Frame:
         return parts
 
     def measurements(self, parts: Sequence[Sequence[Any]]) -> tuple[Array, ...]:
-        """Measurements of a scan as a scene has them, one array (n, d) for each sensor."""
+        """Measurements of a scan as in a scene, one array (n, d) for each sensor."""
         return tuple(
             np.array([one.measurement(d.state_vector) for d in part]).reshape(len(part), one.sensor.dim)
             for one, part in zip(self.adapted, parts, strict=True)
@@ -68,12 +68,12 @@ class Frame:
 
 
 def make_frame(adapted: Sequence[AdaptedSensor]) -> Frame:
-    """Check that sensors go together.
+    """Check that sensors are compatible, and join them.
 
     Raises
     ------
     InvalidInputError
-        No sensor, two that cannot be told apart, different state spaces, or ranges on the ground beside heights.
+        No sensor, two equal ones without names, different state spaces, or ground ranges together with heights.
     """
     if not adapted:
         raise InvalidInputError("sensors: expected at least one")

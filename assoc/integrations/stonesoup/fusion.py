@@ -27,22 +27,22 @@ from assoc.scene.scene import Scene
 
 
 class FusionFeeder(DetectionFeeder):  # type: ignore[misc]
-    """Fuse what several sensors detect at one time into one detection for each target.
+    """Fuse simultaneous detections of several sensors into one detection for each target.
 
     Each scan is an S-D assignment problem over the sensors. Its targets become detections: the fused position, a
     ``LinearGaussian`` measurement model with the covariance of that position, and metadata
 
-    * ``sources``: the detections that were fused, for each sensor one or None,
+    * ``sources``: the fused detections, one or None for each sensor,
     * ``tuple``: their 1-based numbers in the sorted scan, 0 where the sensor missed the target,
     * ``gap``: how far the scan's association can be from optimal.
 
-    Detections that the association calls false alarms are dropped. Sets that come with the same time are one
-    scan; sensors that report at different times are not fused.
+    Detections that are associated as false alarms are dropped. Sets with the same time are one scan; sensors that
+    report at different times are not fused.
 
     Attributes
     ----------
     association : ScanAssociation or None
-        Of the scan yielded last.
+        Association of the scan yielded last.
     """
 
     reader: Reader = Property(doc="A reader, a simulator, or a feeder that merges several readers.")

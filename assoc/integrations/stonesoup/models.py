@@ -22,7 +22,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D, Senso
 
 
 class CartesianToSlantRangeBearing(NonLinearGaussianMeasurement):  # type: ignore[misc]
-    """Bearing and slant range of a target in space: what a radar without elevation measures.
+    """Bearing and slant range of a target in space, as measured by a radar without elevation.
 
     Stone Soup's own ``CartesianToBearingRange`` takes the range on the ground. ``mapping`` names the state's
     x, y and z; a measurement is (bearing, range).
@@ -56,7 +56,7 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
     ndim_state : int, default 6
         Number of state dimensions; the default is that of a constant-velocity model in space.
     mapping : sequence of int, default (0, 2, 4)
-        Where the state holds x, y and z.
+        Indices of x, y and z in the state.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
     Raises
     ------
     InvalidInputError
-        A sensor of a kind of your own.
+        The sensor is of a user-defined kind.
     """
     common = {"ndim_state": ndim_state, "noise_covar": sensor.covariance}
     place = StateVector(sensor.position)

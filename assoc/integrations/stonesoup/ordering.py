@@ -1,6 +1,6 @@
 """Orders that depend on content, not on memory addresses.
 
-Stone Soup hands over sets of objects that hash by identity: they iterate in another order in each run.
+Stone Soup passes sets of objects that hash by identity: their iteration order changes from run to run.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _detection_key(detection: Any) -> tuple[Any, ...]:
 
 
 def sorted_detections(detections: Iterable[Any]) -> list[Any]:
-    """Detections by measurement model, sensor's place, measurement and time; those equal in all are alike."""
+    """Detections sorted by measurement model, sensor position, measurement and time."""
     return sorted(detections, key=_detection_key)
 
 
@@ -49,5 +49,5 @@ def _path_key(path: Any) -> tuple[Any, ...]:
 
 
 def sorted_paths(paths: Iterable[Any]) -> list[Any]:
-    """Tracks or ground truth paths by their first and last state."""
+    """Tracks or ground truth paths sorted by their first and last states."""
     return sorted(paths, key=_path_key)

@@ -21,11 +21,11 @@ from assoc.integrations.stonesoup.models import measurement_model
 from assoc.scene.scene import Scene
 
 EPOCH = datetime(1970, 1, 1)
-"""Time 0 of a scene, unless another is given: Unix times, without a time zone as is Stone Soup's custom."""
+"""Default time 0 of a scene: the Unix epoch, without a time zone, as usual in Stone Soup."""
 
 
 def moment(seconds: float, start: datetime) -> datetime:
-    """Time of a scan, or of a measurement; datetimes end at microseconds."""
+    """Time of a scan or measurement; datetimes have a resolution of a microsecond."""
     return start + timedelta(seconds=float(seconds))
 
 
@@ -34,8 +34,8 @@ class SceneDetectionReader(DetectionReader):  # type: ignore[misc]
 
     Each detection has the measurement model of its sensor and metadata: ``sensor`` (its name, or its number if
     it has none), ``measurement`` (1-based number among the sensor's), and ``target`` (id, or -1 for a false
-    alarm) where the scene knows it. Measurements with times of their own keep them as their timestamps; which sectors
-    a sensor looked at is not handed over.
+    alarm) if the scene has the truth. Measurements with times of their own keep them as timestamps; sectors are not
+    passed on.
     """
 
     scene: Scene = Property(doc="What to read.")
@@ -107,7 +107,7 @@ class SceneGroundTruthReader(GroundTruthReader):  # type: ignore[misc]
 
 
 def _velocities(scene: Scene) -> dict[tuple[int, int], Array]:
-    """Velocity (3,) of each (scan, target): towards its next position, at its last one as before."""
+    """Velocity (3,) of each (scan, target): towards its next position; the last one keeps the velocity before it."""
     assert scene.truth is not None
     seen: dict[int, list[tuple[int, Array]]] = {}
     for k, (ids, places) in enumerate(zip(scene.truth.target_ids, scene.truth.positions, strict=True)):

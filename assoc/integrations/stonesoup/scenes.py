@@ -29,11 +29,11 @@ def scene_from_detections(
     region: ArrayLike | None = None,
     name: str = "",
 ) -> Scene:
-    """Make a scene of what a Stone Soup reader, feeder or simulator yields.
+    """Make a scene from the detections of a Stone Soup reader, feeder or simulator.
 
-    Sets that come with the same time are one scan, as a ``PlatformDetectionSimulator`` yields a set for each
-    sensor. Detections with other timestamps than their set keep them as times of their own. If no sensor measures
-    heights, the scene lies in the plane z = 0.
+    Sets with the same time are one scan: a ``PlatformDetectionSimulator`` yields one set for each sensor.
+    Detections with other timestamps than their set keep them as times of their own. If no sensor measures heights,
+    the scene lies in the plane z = 0.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def scene_from_detections(
     sensors : sequence of AdaptedSensor
         See `adapt`.
     truth : iterable of GroundTruthPath, optional
-        What was really there; a ``TrueDetection`` then says which path caused it. It is read after the
-        detections, so that a simulator's own paths may be given. Paths are numbered in the order of their
+        The true targets; a ``TrueDetection`` refers to its path. They are read after the detections, so that a
+        simulator's own paths may be given. Paths are numbered in the order of their
         first states.
     start : datetime, optional
         The scene's time 0; by default the time of the first scan.
@@ -58,7 +58,7 @@ def scene_from_detections(
     Raises
     ------
     InvalidInputError
-        No detections at all, times that decrease, or a detection of none of the sensors.
+        No detections, decreasing times, or a detection of none of the sensors.
     """
     frame = make_frame(sensors)
     moments, scans = [], []
@@ -82,7 +82,7 @@ def scene_from_detections(
 def _own_times(
     moments: Sequence[datetime], scans: Sequence[Sequence[Sequence[Any]]], zero: datetime
 ) -> list[list[Array]] | None:
-    """Seconds of each detection; None where all are of the times of their sets."""
+    """Time of each detection, seconds; None if all have the times of their sets."""
     stamps = [
         [[d.timestamp or time for d in part] for part in parts] for time, parts in zip(moments, scans, strict=True)
     ]
@@ -92,7 +92,7 @@ def _own_times(
 
 
 def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[Any]]]:
-    """Put sets of the same time together."""
+    """Join sets of the same time."""
     previous: datetime | None = None
     for time, group in groupby(detections, key=lambda pair: pair[0]):
         if previous is not None and time < previous:
@@ -102,11 +102,11 @@ def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tu
 
 
 def region_of(frame: Frame, region: ArrayLike | None) -> Array:
-    """Return a region as given, or the default one; without heights it lies in the plane."""
+    """Return the given or the default region; without heights it lies in the plane."""
     sensors: Sequence[Sensor] = frame.sensors
     box = np.array(default_region(sensors) if region is None else region, dtype=np.float64)
     if frame.planar and box.shape == (3, 2):
-        # range-azimuth radars on the ground then see slant ranges that are ranges on the ground
+        # then slant ranges of range-azimuth radars on the ground equal ground ranges
         box[2] = 0.0
     return box
 
@@ -117,7 +117,7 @@ def _truth(
     number = {id(path): i for i, path in enumerate(paths)}
     known: dict[datetime, list[tuple[int, Array]]] = {}
     for i, path in enumerate(paths):
-        # a path may hold several states of one time, the last of them counts
+        # of several states of a path at one time the last one counts
         for moment, state in {state.timestamp: state for state in path}.items():
             place = np.zeros(3)
             place[: len(frame.mapping)] = np.asarray(state.state_vector, dtype=np.float64).ravel()[list(frame.mapping)]

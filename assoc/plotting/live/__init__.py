@@ -1,4 +1,4 @@
-"""A page on loopback that shows tracks while they move."""
+"""A page on loopback that shows tracks live."""
 
 from assoc.plotting.live.server import LivePage
 

@@ -1,7 +1,7 @@
-"""The page's server: the standard library's, on 127.0.0.1 only; pictures are pushed as server-sent events.
+"""The server of the page, on 127.0.0.1 only; pictures are pushed as server-sent events.
 
-Nothing leaves the machine: requests that were addressed to another host are refused (a page of another site whose name
-points here), and the page may load nothing from elsewhere.
+Nothing leaves the machine: requests addressed to another host name are refused (DNS rebinding), and the page may load
+nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ _FILES = {
     "/live.css": ("live.css", "text/css"),
 }
 _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
-# pictures that may wait for a browser that is too slow; then it misses some
+# pictures that wait for a slow browser; beyond this it misses some
 _WAITING = 50
 _BEAT = 10.0
-# connections at once, the seconds that one may be silent, and a pause where there are none to be had
+# connections at once, seconds that one may be silent, and pause (s) if the system has no more connections
 _MOST, _IDLE, _PAUSE = 32, 15.0, 0.2
-# digits: centimetres
+# decimals: centimetres
 _DIGITS = 2
 
 
 class LivePage:
-    """A page that shows the picture moving.
+    """A page that shows pictures of a live tracker.
 
     Parameters
     ----------
     scene : Scene
         Sensors and region.
     port : int
-        On 127.0.0.1; 0: any that is free.
+        Port on 127.0.0.1; 0: any free port.
     title : str
 
     Raises
     ------
     InvalidInputError
-        The port cannot be used.
+        The port is not available.
     """
 
     def __init__(self, scene: Scene, port: int = 0, title: str = "") -> None:
@@ -82,11 +82,11 @@ class LivePage:
 
     @property
     def address(self) -> str:
-        """Where a browser finds it."""
+        """URL of the page."""
         return f"http://127.0.0.1:{self._server.server_address[1]}/"
 
     def show(self, picture: Picture) -> None:
-        """Push a picture to all browsers that look."""
+        """Push a picture to all connected browsers."""
         tracks = [
             [one.track_id, *np.round(one.position, _DIGITS).tolist(), *np.round(one.velocity[:2], _DIGITS).tolist()]
             for one in picture.tracks
@@ -103,7 +103,7 @@ class LivePage:
             _put(one, event)
 
     def close(self) -> None:
-        """Tell the browsers that no more comes, and stop; a second time does nothing."""
+        """Tell the browsers that this is the end, and stop; further calls do nothing."""
         if self._closed:
             return
         self._closed = True
@@ -116,7 +116,7 @@ class LivePage:
         self._server.server_close()
 
     def join_reader(self) -> queue.Queue[str | None]:
-        """Return a queue of events for one more browser, what it missed first."""
+        """Return a queue of events for a new browser, with those that it missed first."""
         mine: queue.Queue[str | None] = queue.Queue(_WAITING)
         mine.put(self._first)
         with self._lock:
@@ -126,13 +126,13 @@ class LivePage:
         return mine
 
     def leave_reader(self, mine: queue.Queue[str | None]) -> None:
-        """Forget a browser that has gone."""
+        """Forget a browser that has disconnected."""
         with self._lock:
             self._readers.discard(mine)
 
 
 def _put(reader: queue.Queue[str | None], event: str | None) -> None:
-    """Hand a browser an event, without waiting for one that is too slow: the newest is worth more than the oldest."""
+    """Queue an event for a browser; for a slow one drop the oldest event instead of waiting."""
     while True:
         with suppress(queue.Full):
             reader.put_nowait(event)
@@ -146,7 +146,7 @@ def _event(name: str, content: Any) -> str:
 
 
 class _Server(ThreadingHTTPServer):
-    """Answers so many at once; who comes then is sent away, until another is done or says nothing any more."""
+    """Limits the connections; further ones are refused until one ends or times out."""
 
     daemon_threads = True
 
@@ -158,7 +158,7 @@ class _Server(ThreadingHTTPServer):
         try:
             return super().get_request()
         except OSError:
-            # the system has no more connections to give, and says so again at once
+            # no more connections available: without a pause this error would repeat at once
             time.sleep(_PAUSE)
             raise
 
@@ -172,7 +172,7 @@ class _Server(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: a browser has gone, and the terminal is the tracker's."""
+        """No output: a browser has disconnected, and the terminal belongs to the tracker."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -217,7 +217,7 @@ class _Handler(BaseHTTPRequestHandler):
                 try:
                     event = mine.get(timeout=_BEAT)
                 except queue.Empty:
-                    # finds out that the browser has gone
+                    # detects that the browser has disconnected
                     event = ": still here\n\n"
                 if event is None:
                     return
@@ -230,4 +230,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def log_message(self, format: str, *arguments: Any) -> None:
-        """Say nothing: the terminal is the tracker's."""
+        """No output: the terminal belongs to the tracker."""

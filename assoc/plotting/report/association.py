@@ -1,4 +1,4 @@
-"""The report of an association: what was found in each scan, at what cost, and how near the optimum."""
+"""The report of an association: targets, cost and gap of each scan."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def write_association_report(
     *,
     words: Sequence[str] | None = None,
 ) -> None:
-    """Write what was found as one HTML file that works without a network.
+    """Write an association as one HTML file that works without a network.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def write_association_report(
         The file to write; it appears whole or not at all.
     association : Association
     sources : Scene, AssignmentProblem, or a sequence of them
-        What was associated: one thing, or one for each scan of the association.
+        What was associated: one source for all scans, or one for each scan.
     names : sequence of str, optional
-        The file of each scan.
+        Name of each scan's file.
     words : sequence of str, optional
         The command line of ``python -m assoc.solve`` that made it, to be shown.
 
@@ -76,7 +76,7 @@ def write_association_report(
     MissingExtraError
         plotly is not installed; an ImportError that names the command.
     InvalidInputError
-        The file cannot be written, or there are not as many sources as scans.
+        The file cannot be written, or the numbers of sources and scans differ.
     """
     check_report()
     each = [sources] * len(association.scans) if isinstance(sources, Source) else list(sources)

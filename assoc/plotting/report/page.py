@@ -1,4 +1,4 @@
-"""A self-contained page: style, data, plotly and our script in one file."""
+"""A self-contained HTML page: style, data, plotly and our scripts in one file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
 
 def controls(label: str, prefix: str = "") -> str:
-    """Return a slider with its buttons; ``makeSlider`` in core.js moves it, and finds it by the prefix of its ids."""
+    """Return a slider with its buttons, for ``makeSlider`` in core.js, which finds it by the prefix of its ids."""
     return f"""<div class="controls">
 <div class="buttons"><button type="button" id="{prefix}before" aria-label="before">&#9664;</button>
 <button type="button" id="{prefix}play" aria-pressed="false">Play</button>
@@ -36,16 +36,16 @@ def controls(label: str, prefix: str = "") -> str:
 
 @dataclass(frozen=True)
 class Page:
-    """What a report says.
+    """Content of a report.
 
     Parameters
     ----------
     title, lead : str
         Heading, and one sentence under it; plain text.
     sections : sequence of (id, title, html)
-        In order; the HTML of each is ready, text in it escaped.
+        In order; text in the HTML must be escaped.
     data : mapping
-        What the scripts read, as JSON.
+        Data for the scripts, written as JSON.
     scripts : sequence of str
         Names of files in ``static`` beside ``core.js``, which is always there.
     """
@@ -93,7 +93,7 @@ class Page:
                 *body,
                 "</main>",
                 f'<script type="application/json" id="data">{script_json(self.data)}</script>',
-                # plotly is large: packed it is loaded in a third of the time, and the tables are there before it
+                # plotly is large: packed it loads in a third of the time, and the tables appear before it
                 f'<script type="application/gzip" id="packed">{_packed(script)}</script>',
                 f"<script>{unpack}</script>",
                 "</body></html>\n",
@@ -106,12 +106,12 @@ def _static(name: str) -> str:
 
 
 def _packed(text: str) -> str:
-    """Return text as gzip in base64, the same for the same text."""
+    """Return text as gzip in base64, reproducibly."""
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode()
 
 
 def _policy(scripts: Sequence[str]) -> str:
-    """Content security policy: nothing is loaded, and only our scripts run, even if text were read as a tag."""
+    """Content security policy: nothing is loaded, and only our scripts run, even if text were parsed as a tag."""
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
     nothing = "default-src 'none'; connect-src 'none'; form-action 'none'; base-uri 'none'"
@@ -119,7 +119,7 @@ def _policy(scripts: Sequence[str]) -> str:
 
 
 def made_with(program: str | None, words: Sequence[str] | None) -> dict[str, str]:
-    """Return what the reader needs to make it again: command, versions, machine, date."""
+    """Return what is needed to make the report again: command, versions, machine, date."""
     content = {}
     if program is not None and words is not None:
         content["command"] = shlex.join(["python", "-m", program, *words])
@@ -164,9 +164,9 @@ def sortable_table(
         Its id.
     headers : sequence of str
     rows : sequence of rows
-        Each cell as (text, key to sort by); cells with a number for key are set flush right.
+        Cells are (text, sort key); those with numeric keys are right-aligned.
     link : str, optional
-        Makes row i choose ``link``-i on the page; its first cell is a link.
+        Row i then selects ``link``-i on the page; its first cell is a link.
     """
     head = "".join(f'<th scope="col"><button type="button">{escape(header)}</button></th>' for header in headers)
     lines = []

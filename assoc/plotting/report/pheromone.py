@@ -1,4 +1,4 @@
-"""What a report shows of the ants: tau_j, eta_j and p_j of some tuples, cycle by cycle."""
+"""The ants in a report: tau_j, eta_j and p_j of some tuples, cycle by cycle."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from assoc.association.scan import ScanAssociation
 from assoc.plotting.report.views import number
 from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
-# cycles of a scan that are shown, and bytes of all scans together
+# limits: cycles shown of a scan, and bytes of all scans
 _CYCLES = 60
 _BUDGET = 900_000
 
@@ -46,5 +46,5 @@ def _view(history: PheromoneHistory | None, most: int) -> dict[str, Any] | None:
 
 
 def _numbers(values: Array) -> list[list[float | None]]:
-    """Three digits of each; None where no ant has walked."""
+    """Numbers with three digits; None where no ant has walked."""
     return [[number(float(f"{value:.3g}")) for value in row] for row in values.tolist()]

@@ -1,4 +1,4 @@
-"""plotly.js as reports use it: without the addresses of servers."""
+"""plotly.js for reports: without addresses of servers."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from functools import cache
 
 from assoc._system.extras import check_extra, load_extra
 
-# licences stay whole; names of XML's vocabularies are addresses in form only
+# licences are not changed; XML namespaces only look like addresses
 _ADDRESS = re.compile(r"(/\*!.{0,3000}?\*/)|\b(?:https?|wss?)://(?!www\.w3\.org/)(?=[\w{])[^\s\"'`<>\\)/]*", re.DOTALL)
 
 
 def check_report() -> None:
-    """Raise the MissingExtraError of a report before any work is done for it."""
+    """Raise MissingExtraError before any work for a report is done."""
     check_extra("plotly", "report")
 
 
 @cache
 def plotly_script() -> str:
-    """Return plotly.js as the plotly package ships it, but for the servers that it knows.
+    """Return plotly.js from the plotly package, without addresses of servers.
 
-    plotly can send a chart to a cloud service, and load maps. The data of a report must stay where they are, so the
-    addresses are taken out of the code; core.js names the buttons that a chart has, and lets no window open.
+    plotly can send charts to a cloud service, and load maps. The data of a report must stay in the file, so addresses
+    are removed from the code; core.js restricts the buttons of a chart, and blocks new windows.
 
     Raises
     ------
@@ -31,5 +31,5 @@ def plotly_script() -> str:
     check_report()
     text: str = load_extra("plotly.offline", "report").get_plotlyjs()
     text = _ADDRESS.sub(lambda found: found.group(1) or "", text)
-    # in a script element these would open a state in which the closing tag no longer closes
+    # in a script element these change the parser's state, so that the closing tag would be ignored
     return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")

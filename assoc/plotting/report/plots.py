@@ -1,4 +1,4 @@
-"""What the report of a tracker shows of a recording: plots, aircraft, and CT, MT and IT over the windows."""
+"""A recording in the report of a tracker: plots, aircraft, and CT, MT and IT over the windows."""
 
 from __future__ import annotations
 

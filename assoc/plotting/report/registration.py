@@ -1,4 +1,4 @@
-"""The report of a registration: biases, what cannot be observed, residuals before and after."""
+"""The report of a registration: biases, unobservable parameters, residuals before and after."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_registration_report(
         The file to write; it appears whole or not at all.
     registration : Registration
     name : str
-        Of the scene, to be shown.
+        Name of the scene, to be shown.
     words : sequence of str, optional
         The command line of ``python -m assoc.register`` that made it, to be shown.
 

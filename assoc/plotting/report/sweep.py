@@ -1,4 +1,4 @@
-"""The report of a parameter study: the table, heat maps, convergence, and what the study was."""
+"""The report of a parameter study: table, heat maps, convergence, design."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ def write_sweep_report(
     path : path-like
         The file to write; it appears whole or not at all.
     folder : path-like
-        Of the study.
+        Folder of the study.
     frame : DataFrame, optional
-        The runs to show; all of the study without it.
+        The runs to show; default: all.
     words : sequence of str, optional
         The command line of ``python -m assoc.sweep`` that made it, to be shown.
 
@@ -149,7 +149,7 @@ def _table(table: pd.DataFrame, names: Sequence[str]) -> str:
 
 
 def _value(value: Any) -> tuple[str, Any]:
-    """Text and sorting key of a parameter; solvers of a study need not have the same."""
+    """Text and sort key of a parameter; a solver may not have it."""
     if value is None or value != value:
         return "", None
     plain = value.item() if isinstance(value, np.generic) else value
@@ -165,7 +165,7 @@ def _setting(row: Mapping[Any, Any], text: str, names: Sequence[str]) -> dict[st
 
 
 def _maps(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Means and intervals over every two parameters of few values, solver by solver."""
+    """Means and intervals over all pairs of parameters with few values, for each solver."""
     maps: list[dict[str, Any]] = []
     several = frame["solver"].nunique() > 1
     for solver, part in frame.groupby("solver"):

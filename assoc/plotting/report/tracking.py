@@ -71,27 +71,27 @@ def write_tracking_report(
     path : path-like
         The file to write; it appears whole or not at all.
     tracks : DataFrame
-        Columns track_id, time, x, y (seconds, metres) at least; the others of a tracks.csv are used where they are.
+        Columns track_id, time, x, y (seconds, metres) at least; other columns of a tracks.csv are used if present.
     scene : Scene, optional
-        Where the tracks were made from; its truth and measurements are drawn, and the truth gives the metric.
+        Scene that was tracked; its truth and measurements are drawn, and the truth gives the metric.
     name : str
-        Heading, where the scene has no name.
+        Heading, if the scene has no name.
     settings : mapping, optional
-        How the tracker was set, to be shown.
+        Settings of the tracker, to be shown.
     cutoff : float
-        Of GOSPA, metres.
+        Cutoff of GOSPA, metres.
     words : sequence of str, optional
         The command line of ``python -m assoc.track`` that made it, to be shown.
     plots : PlotTracks, optional
-        The recording that the tracks were made from, in the place of a scene: its plots and aircraft are drawn, and
-        CT, MT and IT over the windows.
+        The recording that was tracked, instead of a scene: its plots and aircraft are drawn, and CT, MT and IT over
+        the windows.
 
     Raises
     ------
     MissingExtraError
         plotly is not installed; an ImportError that names the command.
     InvalidInputError
-        A column is missing or holds what is no finite number, or the file cannot be written.
+        A column is missing or holds values that are not finite numbers, or the file cannot be written.
     """
     check_report()
     missing = [column for column in _NEEDED if column not in tracks.columns]
@@ -140,7 +140,7 @@ def write_tracking_report(
 
 
 def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, list[Gospa]]:
-    # by track and time: of scans of one time the last row of a track
+    # of several scans at one time, the last row of a track
     times, ids = (frame[name].to_numpy(dtype=float) for name in ("time", "track_id"))
     frame = frame.iloc[last_at_each_instant(times, ids)]
     found = Trajectories(*(frame[name].to_numpy() for name in ("time", "track_id", ["x", "y", "z"])))
@@ -150,7 +150,7 @@ def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, lis
 def _data(
     frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array], plots: PlotTracks | None
 ) -> dict[str, Any]:
-    """Instants of the slider, paths of tracks and targets, measurements of the scans."""
+    """Times of the slider, paths of tracks and targets, measurements of the scans."""
     reach = np.abs(frame[["x", "y"]].to_numpy(dtype=float)).max() if len(frame) else 0.0
     decimals = 0 if reach > 20_000 else 1 if reach > 2_000 else 3
     step = max(1, len(frame) // _MOST_POINTS)
@@ -214,7 +214,7 @@ def _truth(scene: Scene | None, truth: Mapping[int, Array], decimals: int) -> li
 
 
 def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
-    """Places that the measurements of each scan name; none where they name only directions, or are too many."""
+    """Positions of each scan's measurements; none for directions alone, or if there are too many."""
     if scene is None:
         return []
     count = sum(len(z) for scan in scene.measurements for z in scan)
@@ -230,7 +230,7 @@ def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
 
 
 def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]:
-    """What became of each track; and the target that it followed most, where the truth is known."""
+    """Summary of each track, with the target that it followed most if the truth is known."""
     pairs: dict[int, Counter[int]] = {}
     for one in values:
         for target, track in one.pairs.tolist():

@@ -1,4 +1,4 @@
-"""What the pictures of a report need to know of a scan, in plain numbers that JSON can hold."""
+"""Data of a scan for the figures of a report, as plain numbers for JSON."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from assoc.sensors import BearingSensor
 from assoc.sensors.base import ANGLES
 
 BUDGET = 2_800_000
-"""Bytes that the views of all scans may take in a page; packed, plotly takes 1.9 MB more."""
+"""Limit on the bytes of all views in a page; plotly, packed, takes 1.9 MB more."""
 
 _LINES_OF_TRACE = 200
 
 
 def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
-    """Nested lists of rounded numbers, as integers where no decimals are kept; None where not finite."""
+    """Nested lists of rounded numbers, integers if `decimals` is 0; None where not finite."""
     array = np.round(np.asarray(values, dtype=np.float64), decimals)
     if not np.isfinite(array).all():
         return [
@@ -42,12 +42,12 @@ def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
 
 
 def number(value: float | None) -> float | None:
-    """Return what JSON can hold: None for what is not finite."""
+    """Return the value for JSON: None if it is not finite."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
 def closed_gap(scan: ScanAssociation) -> float | None:
-    """Return the gap, 0 where only rounding is left of it; None without a bound."""
+    """Return the gap, 0 if it is only rounding; None without a bound."""
     gap = scan.solution.gap
     return 0.0 if gap <= 1e-9 * max(1.0, abs(scan.solution.cost)) else number(gap)
 
@@ -80,7 +80,7 @@ def source_view(source: Source, file: str) -> dict[str, Any]:
 
 
 def _decimals(scene: Scene) -> int:
-    """Decimals of a metre that a reader could tell apart when zoomed in to a hundredth of the noise."""
+    """Decimals of a metre that are visible when zoomed in to a hundredth of the noise."""
     reach = float(np.abs(scene.region).max())
     return 0 if reach > 20_000 else 1 if reach > 2_000 else 3
 
@@ -88,13 +88,13 @@ def _decimals(scene: Scene) -> int:
 def _trace(association: ScanAssociation) -> list[list[float | None]]:
     trace = association.solution.trace
     step = max(1, math.ceil(len(trace) / _LINES_OF_TRACE))
-    # the last line is the answer and always stays
+    # the last line is the final answer and is always kept
     kept = [*trace[:-1:step], *trace[-1:]]
     return [[line.iteration, number(line.seconds), number(line.cost), number(line.lower_bound)] for line in kept]
 
 
 def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:
-    """Figures of a scan, its targets and its history; what can be drawn comes with `scene_view`."""
+    """Figures of a scan, its targets and its history; `scene_view` adds what is drawn."""
     solution = one.solution
     tuples = one.targets
     costs: Array
@@ -129,9 +129,9 @@ def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> di
 
 
 def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, Any]:
-    """Return what is drawn of a scan: truth, measurements, targets with residuals and covariances.
+    """Return the drawing of a scan: truth, measurements, targets with residuals and covariances.
 
-    Measurements that have times of their own have no residuals: the target was elsewhere when they were made.
+    Measurements with times of their own have no residuals: the target has moved since.
     """
     scan = scene.scan(one.scan)
     positions = np.zeros((0, 3)) if one.positions is None else one.positions
@@ -144,7 +144,7 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
         if scan.sources is not None:
             entry["source"] = scan.sources[s].tolist()
         measured.append(entry)
-        # one row for each target that this sensor saw, in the order of the targets
+        # one row for each target that this sensor detected, in the order of the targets
         seen = np.flatnonzero(one.targets[:, s])
         found = z[one.targets[seen, s] - 1]
         difference = sensor.residual(found, sensor.measure(positions[seen])) if len(seen) else found
@@ -177,12 +177,12 @@ def _significant(values: Array) -> list[Any]:
 
 
 def thin(views: Iterable[dict[str, Any]], wanted: Sequence[dict[str, Any]], budget: int = BUDGET) -> int:
-    """Attach views to scans until the budget is spent; evenly spaced over the scans when not all fit.
+    """Attach views to scans within the budget; if not all fit, evenly spaced over the scans.
 
     Parameters
     ----------
     views : iterable of dict
-        The view of each scan of `wanted`, made one by one.
+        The view of each scan of `wanted`, made on demand.
     wanted : sequence of dict
         Scans of `scan_view`, which get their "view".
     budget : int
@@ -191,7 +191,7 @@ def thin(views: Iterable[dict[str, Any]], wanted: Sequence[dict[str, Any]], budg
     Returns
     -------
     int
-        How many scans kept their view.
+        Number of scans with a view.
     """
     sizes = []
     for view, scan in zip(views, wanted, strict=True):
