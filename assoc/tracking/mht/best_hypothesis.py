@@ -12,8 +12,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit, search_njit
+from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
 from assoc.tracking.mht.losses import Priced
@@ -23,7 +25,7 @@ VISITS = 20_000
 
 
 @search_njit
-def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
+def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int) -> Any:
     """Find the branches of the best global hypothesis.
 
     Parameters
@@ -81,7 +83,7 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
 
 
 @njit
-def _root(parent: Any, t: int) -> int:
+def _root(parent: NDArray[np.int64], t: int) -> int:
     while parent[t] != t:
         parent[t] = parent[parent[t]]
         t = parent[t]
@@ -89,7 +91,7 @@ def _root(parent: Any, t: int) -> int:
 
 
 @njit
-def _fits(history: Any, first: Any, used: Any, row: int) -> bool:
+def _fits(history: NDArray[np.int32], first: NDArray[np.int64], used: NDArray[np.bool_], row: int) -> bool:
     for c in range(first.size - 1):
         m = history[row, c]
         if m > 0 and used[first[c] + m - 1]:
@@ -98,7 +100,7 @@ def _fits(history: Any, first: Any, used: Any, row: int) -> bool:
 
 
 @njit
-def _mark(history: Any, first: Any, used: Any, row: int, value: bool) -> None:
+def _mark(history: NDArray[np.int32], first: NDArray[np.int64], used: NDArray[np.bool_], row: int, value: bool) -> None:
     for c in range(first.size - 1):
         m = history[row, c]
         if m > 0:
@@ -106,7 +108,15 @@ def _mark(history: Any, first: Any, used: Any, row: int, value: bool) -> None:
 
 
 @njit
-def _left_over(trees: Any, taken: Any, good: Any, start: Any, history: Any, known: Any, used: Any) -> float:
+def _left_over(
+    trees: NDArray[np.int64],
+    taken: NDArray[np.int64],
+    good: NDArray[np.int64],
+    start: NDArray[np.int64],
+    history: NDArray[np.int32],
+    known: Priced,
+    used: NDArray[np.bool_],
+) -> float:
     """Sum the prices of the group's measurements that a complete choice does not use."""
     total = 0.0
     for i in range(trees.size):
@@ -126,7 +136,16 @@ def _left_over(trees: Any, taken: Any, good: Any, start: Any, history: Any, know
 
 
 @search_njit
-def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: Any, left: int, chosen: Any) -> int:
+def _search(
+    trees: NDArray[np.int64],
+    good: NDArray[np.int64],
+    start: NDArray[np.int64],
+    history: NDArray[np.int32],
+    known: Priced,
+    used: NDArray[np.bool_],
+    left: int,
+    chosen: NDArray[np.bool_],
+) -> int:
     """Choose the branches of one group; return the visits left, negative if the limit was exceeded."""
     depth = trees.size
     # trees with high prices first: leaving one of them out costs most

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit, search_njit
-from assoc._types import Array
+from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
@@ -96,10 +97,10 @@ def extend(
 class _Grown(NamedTuple):
     """All candidates: tree, score, loss, and whether the best global hypothesis contains it; each (K,)."""
 
-    tree: Any
-    score: Any
-    loss: Any
-    chosen: Any
+    tree: NDArray[np.int64]
+    score: Floats
+    loss: Floats
+    chosen: NDArray[np.bool_]
 
 
 class _Limits(NamedTuple):
@@ -111,7 +112,7 @@ class _Limits(NamedTuple):
 
 
 @search_njit
-def _extend(tables: Tables, miss: Any, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
+def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
     """Grow all branches and prune them; also return what is needed to prune them again."""
     numbers, counts, history, born = tables
     branch, measurement, gain, _ = hits
@@ -175,7 +176,7 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
 
 
 @njit
-def count_scan(counts: Any, history: Any, sensors: int, looked: Any) -> None:
+def count_scan(counts: NDArray[np.int64], history: NDArray[np.int32], sensors: int, looked: NDArray[np.bool_]) -> None:
     """Update, in place, the counts of detections and misses by the scan, the first columns of the history.
 
     The scan counts only for branches that some sensor looked at: `looked`, bool (B,).

@@ -17,9 +17,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import search_njit
-from assoc._types import Array
+from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.kernels.matching import match_sparse
@@ -53,35 +54,37 @@ class Meanings(NamedTuple):
 class _Nodes(NamedTuple):
     """Nodes of the partition, in the queue or taken from it, one a row."""
 
-    parent: Any
-    above: Any
+    parent: NDArray[np.int64]
+    above: NDArray[np.int64]
     """Node whose partition it is part of, -1: none."""
-    turn: Any
+    turn: NDArray[np.int64]
     """Measurement whose choice in that node is forbidden; those before it keep their choices."""
-    choice: Any
-    cost: Any
-    """Infinite while it is known by a bound alone."""
-    rise: Any
+    choice: NDArray[np.int32]
+    cost: Floats
+    """Infinite while only a bound on it is known."""
+    rise: Floats
     """Lower bound on the cost of changing each measurement's choice."""
 
 
 class _Work(NamedTuple):
     """Buffers of one assignment problem; its columns are the tracks, then a new target for each measurement."""
 
-    indptr: Any
-    columns: Any
-    costs: Any
-    choice: Any
-    row_slack: Any
-    column_slack: Any
-    edge: Any
-    u: Any
-    v: Any
-    taken: Any
+    indptr: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    costs: Floats
+    choice: NDArray[np.int32]
+    row_slack: Floats
+    column_slack: Floats
+    edge: NDArray[np.int64]
+    u: Floats
+    v: Floats
+    taken: NDArray[np.bool_]
 
 
 @search_njit
-def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, most: int, drop: float) -> Any:
+def next_hypotheses(
+    holds: NDArray[np.bool_], weight: Floats, missed: Floats, meanings: Meanings, most: int, drop: float
+) -> Any:
     """Generate the next hypotheses of a cluster, in one compiled call.
 
     Parameters

@@ -19,8 +19,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import PackingArrays, assembled
@@ -45,15 +47,15 @@ class Priced(NamedTuple):
         Lower bound on the loss of each branch, 0 or more up to rounding.
     """
 
-    number: Any
-    first: Any
-    trees: Any
-    measurements: Any
-    loss: Any
+    number: NDArray[np.int64]
+    first: NDArray[np.int64]
+    trees: Floats
+    measurements: Floats
+    loss: Floats
 
 
 @njit
-def priced(tree: Any, score: Any, history: Any) -> Any:
+def priced(tree: NDArray[np.int64], score: Floats, history: NDArray[np.int32]) -> Any:
     """Find prices, and a lower bound on the loss of each branch.
 
     Parameters
@@ -107,7 +109,7 @@ def priced(tree: Any, score: Any, history: Any) -> Any:
 
 
 @njit
-def _numbered(tree: Any) -> Any:
+def _numbered(tree: NDArray[np.int64]) -> Any:
     """Number the trees from 0; return the number of each branch's tree, and how many trees there are."""
     order = order_of(tree)
     number = np.empty(tree.size, np.int64)
@@ -120,7 +122,15 @@ def _numbered(tree: Any) -> Any:
 
 
 @njit
-def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, involved: Any, price: Any) -> None:
+def _price(
+    number: NDArray[np.int64],
+    score: Floats,
+    history: NDArray[np.int32],
+    first: NDArray[np.int64],
+    contested: NDArray[np.bool_],
+    involved: NDArray[np.bool_],
+    price: Floats,
+) -> None:
     """Fill in the prices of the trees involved and of the contested measurements."""
     trees, columns = involved.size, history.shape[1]
     wanted = np.zeros(score.size, np.bool_)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Array
+from assoc._types import Array, Floats
 from assoc.packing.kernels.sorting import order_of
 
 
@@ -76,7 +77,14 @@ def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, 
 
 
 @njit
-def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int) -> Any:
+def _decide(
+    tree: NDArray[np.int64],
+    score: Floats,
+    chosen: NDArray[np.bool_],
+    old: NDArray[np.bool_],
+    oldest: NDArray[np.int32],
+    most: int,
+) -> Any:
     count, sensors = oldest.shape
     number = np.zeros(count, np.int64)
     for row in range(1, count):
@@ -116,7 +124,7 @@ def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int
 
 
 @njit
-def same_tree(tree: Any, mask: Any) -> Any:
+def same_tree(tree: NDArray[np.int64], mask: NDArray[np.bool_]) -> Any:
     """Mask of all branches of the trees with a branch in `mask`; branches of one tree are contiguous."""
     result = mask.copy()
     for row in range(1, tree.size):
