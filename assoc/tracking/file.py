@@ -233,7 +233,7 @@ def described(thing: object) -> str:
     if isinstance(thing, (tuple, list)):
         return f"[{', '.join(described(item) for item in thing)}]"
     if isinstance(thing, Mapping):
-        return f"{{{', '.join(f'{key}: {described(one)}' for key, one in thing.items())}}}"
+        return f"{{{', '.join(f'{key}: {described(item)}' for key, item in thing.items())}}}"
     if is_dataclass(thing) and not isinstance(thing, type):
         inside = [f"{item.name}={described(getattr(thing, item.name))}" for item in fields(thing)]
         return f"{type(thing).__name__}({', '.join(inside)})"

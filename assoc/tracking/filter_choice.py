@@ -77,7 +77,7 @@ def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:
 
 def _turn(noise: float, flat: bool, name: str) -> filters.CoordinatedTurn:
     if flat:
-        raise InvalidInputError(f"filter: {name!r} needs a sensor that tells heights; use ekf, ukf or enkf")
+        raise InvalidInputError(f"filter: {name!r} needs a sensor that measures heights; use ekf, ukf or enkf")
     return filters.CoordinatedTurn(noise, _TURN_NOISE)
 
 

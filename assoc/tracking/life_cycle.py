@@ -69,15 +69,15 @@ class LifeCycle:
             raise InvalidInputError(f"confirmation must be 'score' or 'm-of-n', got {self.confirmation!r}")
         if self.deletion not in get_args(Deletion):
             raise InvalidInputError(f"deletion must be 'time', 'count' or 'score', got {self.deletion!r}")
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if isinstance(one.default, int):
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            if isinstance(setting.default, int):
                 if not is_whole(value, 1):
-                    raise InvalidInputError(f"{one.name} must be a whole number above 0, got {value!r}")
-            elif not isinstance(one.default, str) and (one.name, value) != ("deletion_time", None):
-                positive(value, one.name)
-                if one.name.endswith("probability") and value >= 1:
-                    raise InvalidInputError(f"{one.name} must be below 1, got {value!r}")
+                    raise InvalidInputError(f"{setting.name} must be a whole number above 0, got {value!r}")
+            elif not isinstance(setting.default, str) and (setting.name, value) != ("deletion_time", None):
+                positive(value, setting.name)
+                if setting.name.endswith("probability") and value >= 1:
+                    raise InvalidInputError(f"{setting.name} must be below 1, got {value!r}")
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 

@@ -129,9 +129,9 @@ def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
     """
     found = []
     for s, size in enumerate(sizes.tolist()):
-        own = np.zeros(size + 1, dtype=np.int64)
-        own[rows[:, s]] = values
-        found.append(own[1:])
+        values_of = np.zeros(size + 1, dtype=np.int64)
+        values_of[rows[:, s]] = values
+        found.append(values_of[1:])
     return found
 
 

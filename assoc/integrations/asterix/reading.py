@@ -164,7 +164,7 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
     return AsterixContent(
         {source: _recording(rows, name, notes) for source, rows in plots.items() if rows.rows},
         {source: _seen(rows, seen_from, name, notes) for source, rows in reports.items() if rows.rows and seen_from},
-        {source: RadarNote(np.sort(one.pop("norths")), **one) for source, one in radars.items()},
+        {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in radars.items()},
         seen_from,
         notes,
     )

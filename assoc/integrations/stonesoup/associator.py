@@ -98,7 +98,7 @@ def _problem(
     def cost(hypothesis: Hypothesis) -> float:
         return -float(hypothesis.probability.log_value) if by_probability else float(hypothesis.distance)
 
-    costs = {pair: cost(one) for pair, one in pairs.items()}
+    costs = {pair: cost(hypothesis) for pair, hypothesis in pairs.items()}
     alone = {t: cost(missed[t]) if t in missed else math.inf for t, _ in pairs}
     finite = [abs(value) for value in (*costs.values(), *alone.values()) if math.isfinite(value)]
     # costs more than any choice that misses one track fewer

@@ -49,11 +49,11 @@ class Frame:
         """
         parts: list[list[Any]] = [[] for _ in self.adapted]
         for detection in detections:
-            home = next((s for s, one in enumerate(self.adapted) if one.measured(detection)), None)
+            home = next((s for s, sensor in enumerate(self.adapted) if sensor.measured(detection)), None)
             if home is None:
                 raise InvalidInputError(
                     f"a detection at {detection.timestamp} is of none of the {len(parts)} sensors: its "
-                    f"{type(detection.measurement_model).__name__} differs in place, rotation, noise or mapping "
+                    f"{type(detection.measurement_model).__name__} differs in position, rotation, noise or mapping "
                     "(sensors that move are not supported)"
                 )
             parts[home].append(detection)
@@ -87,17 +87,17 @@ def make_frame(adapted: Sequence[AdaptedSensor]) -> Frame:
                     f"sensors: number {s} has the same measurement model as another; give each a name of its own "
                     'and set it as metadata["sensor"] of the detections'
                 )
-    states = {(one.model.ndim_state, one.mapping[:2]) for one in adapted}
-    heights = {one.mapping[2] for one in adapted if one.measures_height}
+    states = {(sensor.model.ndim_state, sensor.mapping[:2]) for sensor in adapted}
+    heights = {sensor.mapping[2] for sensor in adapted if sensor.measures_height}
     if len(states) > 1 or len(heights) > 1:
         raise InvalidInputError("sensors: their measurement models differ in ndim_state or in the mapping of x, y, z")
-    sensors = [one.sensor for one in adapted]
-    if heights and any(type(one.model) is CartesianToBearingRange for one in adapted):
+    sensors = [sensor.sensor for sensor in adapted]
+    if heights and any(type(sensor.model) is CartesianToBearingRange for sensor in adapted):
         raise InvalidInputError(
             "sensors: CartesianToBearingRange measures the range on the ground and cannot be combined with "
             "sensors that measure heights; use CartesianToSlantRangeBearing"
         )
     if not heights:
-        sensors = [replace(one, position=one.position * (1.0, 1.0, 0.0)) for one in sensors]
+        sensors = [replace(sensor, position=sensor.position * (1.0, 1.0, 0.0)) for sensor in sensors]
     (ndim_state, plane) = states.pop()
     return Frame(tuple(adapted), tuple(sensors), ndim_state, (*plane, *heights))

@@ -60,7 +60,9 @@ class LivePage:
         first = {
             "title": title,
             "region": scene.region.tolist(),
-            "sensors": [[one.name or str(s), *one.position[:2].tolist()] for s, one in enumerate(scene.sensors, 1)],
+            "sensors": [
+                [sensor.name or str(s), *sensor.position[:2].tolist()] for s, sensor in enumerate(scene.sensors, 1)
+            ],
         }
         self._first = _event("scene", first)
         self._last: str | None = None
@@ -88,8 +90,12 @@ class LivePage:
     def show(self, picture: Picture) -> None:
         """Push a picture to all connected browsers."""
         tracks = [
-            [one.track_id, *np.round(one.position, _DIGITS).tolist(), *np.round(one.velocity[:2], _DIGITS).tolist()]
-            for one in picture.tracks
+            [
+                track.track_id,
+                *np.round(track.position, _DIGITS).tolist(),
+                *np.round(track.velocity[:2], _DIGITS).tolist(),
+            ]
+            for track in picture.tracks
         ]
         plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
         content = {"time": picture.time, "tracks": tracks, "plots": plots, "sensors": picture.sensors.tolist()}
@@ -99,8 +105,8 @@ class LivePage:
         with self._lock:
             self._last = event
             readers = list(self._readers)
-        for one in readers:
-            _put(one, event)
+        for reader in readers:
+            _put(reader, event)
 
     def close(self) -> None:
         """Tell the browsers that this is the end, and stop; further calls do nothing."""
@@ -110,25 +116,25 @@ class LivePage:
         self._push(_event("end", {}))
         with self._lock:
             readers = list(self._readers)
-        for one in readers:
-            _put(one, None)
+        for reader in readers:
+            _put(reader, None)
         self._server.shutdown()
         self._server.server_close()
 
     def join_reader(self) -> queue.Queue[str | None]:
         """Return a queue of events for a new browser, with those that it missed first."""
-        mine: queue.Queue[str | None] = queue.Queue(_WAITING)
-        mine.put(self._first)
+        reader: queue.Queue[str | None] = queue.Queue(_WAITING)
+        reader.put(self._first)
         with self._lock:
             if self._last is not None:
-                mine.put(self._last)
-            self._readers.add(mine)
-        return mine
+                reader.put(self._last)
+            self._readers.add(reader)
+        return reader
 
-    def leave_reader(self, mine: queue.Queue[str | None]) -> None:
+    def leave_reader(self, reader: queue.Queue[str | None]) -> None:
         """Forget a browser that has disconnected."""
         with self._lock:
-            self._readers.discard(mine)
+            self._readers.discard(reader)
 
 
 def _put(reader: queue.Queue[str | None], event: str | None) -> None:
@@ -211,11 +217,11 @@ class _Handler(BaseHTTPRequestHandler):
         self._headers("text/event-stream")
         self.send_header("Connection", "close")
         self.end_headers()
-        mine = self.owner.join_reader()
+        reader = self.owner.join_reader()
         try:
             while True:
                 try:
-                    event = mine.get(timeout=_BEAT)
+                    event = reader.get(timeout=_BEAT)
                 except queue.Empty:
                     # detects that the browser has disconnected
                     event = ": still here\n\n"
@@ -226,7 +232,7 @@ class _Handler(BaseHTTPRequestHandler):
         except OSError:
             return
         finally:
-            self.owner.leave_reader(mine)
+            self.owner.leave_reader(reader)
             self.close_connection = True
 
     def log_message(self, format: str, *arguments: Any) -> None:

@@ -97,7 +97,7 @@ def _page(association: Association, each: list[Source], files: list[str], words:
             numbers[id(source), file] = len(views)
             views.append(source_view(source, file))
     owners = [numbers[id(source), file] for source, file in zip(each, files, strict=True)]
-    scans = [scan_view(s, n, one) for s, n, one in zip(each, owners, association.scans, strict=True)]
+    scans = [scan_view(s, n, scan) for s, n, scan in zip(each, owners, association.scans, strict=True)]
     drawn = [i for i, source in enumerate(each) if isinstance(source, Scene)]
     kept = thin(
         (scene_view(each[i], association.scans[i], views[owners[i]]["decimals"]) for i in drawn),  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ _MOST = 30_000
 
 
 def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
-    """Plots of each window, the aircraft's own plots as their truth, and the rates, in plain numbers."""
+    """Plots of each window, each aircraft's own plots as its truth, and the rates, as plain numbers."""
     recording = shown.recording
     places, aircraft = recording.positions, recording.aircraft
     few = len(recording) <= _MOST
@@ -27,12 +27,12 @@ def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
     if aircraft is not None:
         height = np.nan_to_num(recording.trusted_altitudes)
         for name in np.unique(aircraft[aircraft >= 0]).tolist():
-            own = np.flatnonzero(aircraft == name)
-            own = own[:: max(1, len(recording) // _MOST)]
-            columns = zip("xyz", (*places[own].T, height[own]), strict=True)
+            rows = np.flatnonzero(aircraft == name)
+            rows = rows[:: max(1, len(recording) // _MOST)]
+            columns = zip("xyz", (*places[rows].T, height[rows]), strict=True)
             path = {axis: plain_numbers(values, decimals) for axis, values in columns}
-            truth.append({"id": name, "t": plain_numbers(recording.times[own], 4), **path})
-    # plots are counted from their radar
+            truth.append({"id": name, "t": plain_numbers(recording.times[rows], 4), **path})
+    # positions of plots are relative to their radar
     radar = {"name": "radar", "place": [0, 0, 0]}
     return {"measured": measured, "truth": truth, "rates": _rates(shown), "sensors": [radar]}
 

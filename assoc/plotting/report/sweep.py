@@ -78,7 +78,7 @@ def write_sweep_report(
     used = {key: manifest[key] for key in ("seed", "time_limit")} | dict(manifest["gating"])
     sources = "".join(f"<li>{escape(source['name'])}</li>" for source in manifest["sources"])
     settings = f"{command}<h3>Sources</h3><ul>{sources}</ul><h3>Study</h3>{definitions(used)}"
-    settings += "".join(f"<h3>Parameters of {escape(one)}</h3>{definitions(same)}" for one, same in _fixed(frame))
+    settings += "".join(f"<h3>Parameters of {escape(solver)}</h3>{definitions(same)}" for solver, same in _fixed(frame))
     settings += f"<h3>Made with</h3>{definitions(made)}"
     name = Path(folder).resolve().name
     lead = f"Parameter study of {', '.join(map(str, frame['solver'].unique())) or 'nothing yet'}"

@@ -183,8 +183,8 @@ def _data(
         "sensors": []
         if scene is None
         else [
-            {"name": one.name or f"sensor {s + 1}", "place": plain_numbers(one.position, 1)}
-            for s, one in enumerate(scene.sensors)
+            {"name": sensor.name or f"sensor {s + 1}", "place": plain_numbers(sensor.position, 1)}
+            for s, sensor in enumerate(scene.sensors)
         ],
         **({} if plots is None else plot_data(plots, decimals)),
     }
@@ -232,8 +232,8 @@ def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
 def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]:
     """Summary of each track, with the target that it followed most if the truth is known."""
     pairs: dict[int, Counter[int]] = {}
-    for one in values:
-        for target, track in one.pairs.tolist():
+    for gospa in values:
+        for target, track in gospa.pairs.tolist():
             pairs.setdefault(int(track), Counter())[int(target)] += 1
     lives = []
     for number_of, track in _by_track(frame):

@@ -32,8 +32,8 @@ def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
     array = np.round(np.asarray(values, dtype=np.float64), decimals)
     if not np.isfinite(array).all():
         return [
-            plain_numbers(one, decimals) if np.ndim(one) else (float(one) if np.isfinite(one) else None)
-            for one in array
+            plain_numbers(value, decimals) if np.ndim(value) else (float(value) if np.isfinite(value) else None)
+            for value in array
         ]
     if decimals <= 0 and array.size and np.abs(array).max() < 2**53:
         array = array.astype(np.int64)

@@ -128,7 +128,7 @@ class ClusteredHypotheses(DeferringMethod):
         older = np.concatenate([own.window.history, np.zeros((1, own.window.history.shape[1]), dtype=np.int32)])
         older = older[growth.origin]
         given = [np.append(0, order + 1) for order in orders]
-        rows = np.stack([one[growth.rows[:, s]] for s, one in enumerate(given)], axis=1).astype(np.int32)
+        rows = np.stack([number[growth.rows[:, s]] for s, number in enumerate(given)], axis=1).astype(np.int32)
         history = np.concatenate([rows, older], axis=1)[:, : older.shape[1]]
         return Association(batch, (), Hypotheses(own.window.opened(progress.scan, history), tuple(clusters)))
 
@@ -204,7 +204,7 @@ def _by_value(scan: Scan, orders: list[Array]) -> Scan:
     """The scan with its measurements in these orders."""
 
     def sort(arrays: tuple[Array, ...] | None) -> tuple[Array, ...] | None:
-        return None if arrays is None else tuple(one[order] for one, order in zip(arrays, orders, strict=True))
+        return None if arrays is None else tuple(array[order] for array, order in zip(arrays, orders, strict=True))
 
     measurements = sort(scan.measurements)
     assert measurements is not None
@@ -259,9 +259,9 @@ def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
     label = linked(first, second, count + len(ids) + len(wants))
     found: list[Cluster] = []
     for group in own.clusters:
-        mine = label[group.branches]
-        together = len(mine) == 1 or bool((mine == mine[0]).all())
-        found += [group] if together else parts(group, mine, tracks.score[group.branches])
+        labels = label[group.branches]
+        together = len(labels) == 1 or bool((labels == labels[0]).all())
+        found += [group] if together else parts(group, labels, tracks.score[group.branches])
     return found
 
 

@@ -56,9 +56,9 @@ class StaticFusion(Method):
         track, which = [np.arange(count)], [np.full(count, -1)]
         lead = np.argmax(fused > 0, axis=1)
         for s, z in enumerate(progress.scan.measurements):
-            mine = np.flatnonzero(lead == s)
+            led = np.flatnonzero(lead == s)
             owner = np.full(len(z), -1)
-            owner[fused[mine, s] - 1] = mine
+            owner[fused[led, s] - 1] = led
             near, found = timed.near(s)
             track.append(near[owner[found] >= 0])
             which.append(owner[found][owner[found] >= 0])
@@ -70,11 +70,11 @@ class StaticFusion(Method):
         value = doubted_gain(scores[pairs[good]], gain[good])
         columns = np.stack([pairs[good] + 1, fused_of[good] + 1], axis=1)
         solution = progress.work.assign(AssignmentProblem(columns, -value, [count, len(fused)]))
-        mine = good[solution.indices[solution.indices < len(good)]]
-        mine = mine[np.argsort(pairs[mine])]
+        kept = good[solution.indices[solution.indices < len(good)]]
+        kept = kept[np.argsort(pairs[kept])]
         free = np.ones(len(fused) + 1, dtype=np.bool_)
-        free[fused_of[mine]] = False
-        return associated_in_order(progress, timed, looked, rows[mine], fused[free[:-1]])
+        free[fused_of[kept]] = False
+        return associated_in_order(progress, timed, looked, rows[kept], fused[free[:-1]])
 
 
 def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
@@ -85,10 +85,10 @@ def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
     track, which = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     lead = np.argmax(fused > 0, axis=1)
     for s, (z, sensor) in seen_by:
-        mine = np.flatnonzero(lead == s) if len(fused) else np.zeros(0, dtype=np.int64)
+        led = np.flatnonzero(lead == s) if len(fused) else np.zeros(0, dtype=np.int64)
         expected, gate = filter.expected(states, sensor), gate_of(sensor, probability)
-        near = near_pairs(expected, z[fused[mine, s] - 1], sensor.angular[: sensor.dim], gate)
-        track, which = np.append(track, near[0]), np.append(which, mine[near[1]])
+        near = near_pairs(expected, z[fused[led, s] - 1], sensor.angular[: sensor.dim], gate)
+        track, which = np.append(track, near[0]), np.append(which, led[near[1]])
     order = np.lexsort((which, track))
     track, which = track[order], which[order]
     require_states(states, len(track))

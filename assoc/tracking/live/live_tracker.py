@@ -300,7 +300,7 @@ class LiveTracker:
             if antenna.falls_silent(end, None if settings.turns is None else settings.turns[s]):
                 state.antennas[s] = antenna = antenna._replace(silent=True)
                 where = settings.name_of(s)
-                settings.tell(f"{where} says nothing since {antenna.last:g} s: it is treated as switched off")
+                settings.tell(f"{where} has sent nothing since {antenna.last:g} s: it is treated as switched off")
             sectors[s] = antenna.sector(end, interval, turn, len(now) > 0)
         state.pending = [plot for plot in state.pending if plot.time > end]
         begin = clock.perf_counter()
@@ -312,7 +312,7 @@ class LiveTracker:
             if step.refused:
                 self.counts["too old"] += step.refused
         except AssocError as error:
-            self.leave_out("steps failed", f"the plots up to {end:g} s could not be taken in: {error}")
+            self.leave_out("steps failed", f"the plots up to {end:g} s could not be processed: {error}")
         self.seconds.append(clock.perf_counter() - begin)
         too_old = end - settings.horizon - interval
         state.recent = {key: None for key in state.recent if key[1] >= too_old}

@@ -144,11 +144,11 @@ def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
     left_behind = whole.weight - whole.holds @ score
     found = []
     for number in np.unique(label):
-        own = np.flatnonzero(label == number)
-        holds, which = np.unique(whole.holds[:, own], axis=0, return_inverse=True)
+        members = np.flatnonzero(label == number)
+        holds, which = np.unique(whole.holds[:, members], axis=0, return_inverse=True)
         rest = np.full(len(holds), -np.inf)
         np.maximum.at(rest, which.ravel(), left_behind)
-        found.append(cluster(whole.branches[own], holds, holds @ score[own] + rest))
+        found.append(cluster(whole.branches[members], holds, holds @ score[members] + rest))
     return found
 
 

@@ -39,13 +39,13 @@ def generated(
         About rows of the missed branches, the pairs, and the births, in this order.
     """
     total, pairs = len(offers.missed), len(offers.branch)
-    own = np.repeat(np.arange(len(clusters)), [len(group.branches) for group in clusters])
-    label = linked(own[offers.branch], len(clusters) + offers.measurement, len(clusters) + count)
+    cluster_of = np.repeat(np.arange(len(clusters)), [len(group.branches) for group in clusters])
+    label = linked(cluster_of[offers.branch], len(clusters) + offers.measurement, len(clusters) + count)
     parts = int(label.max(initial=-1)) + 1
     members = grouped(label[: len(clusters)], parts)
     measurements = grouped(label[len(clusters) :], parts)
     by_measurement = np.lexsort((offers.branch, offers.measurement))
-    near = [by_measurement[pairs] for pairs in grouped(label[own[offers.branch[by_measurement]]], parts)]
+    near = [by_measurement[pairs] for pairs in grouped(label[cluster_of[offers.branch[by_measurement]]], parts)]
     birth, birth_row = np.full(count, -np.inf), np.zeros(count, dtype=np.int64)
     birth[born], birth_row[born] = offers.births.score, total + pairs + np.arange(len(born))
     # the most that a branch can add to a log-probability
@@ -118,11 +118,11 @@ def with_births(
     """
     width = int(sizes.max(initial=0)) + 1
     places = width * np.arange(len(sizes))
-    own = np.repeat(np.arange(len(clusters)), [len(group.branches) for group in clusters])
+    cluster_of = np.repeat(np.arange(len(clusters)), [len(group.branches) for group in clusters])
     branch, taken = np.nonzero(rows)
     birth, wanted = np.nonzero(births.rows)
     begin = len(clusters) + len(births.score)
-    first = np.append(own[branch], len(clusters) + birth)
+    first = np.append(cluster_of[branch], len(clusters) + birth)
     second = np.append((places[taken] + rows[branch, taken]), (places + births.rows)[birth, wanted])
     label = linked(first, begin + second, begin + width * len(sizes))
     parts = int(label[:begin].max(initial=-1)) + 1

@@ -1,4 +1,4 @@
-// The report of an association: slider, scene, tables and histories that follow one another.
+// The report of an association: slider, scene, tables and histories, all linked.
 const state = { scan: 0, chosen: null, space: false, zoom: null };
 const scanTable = byId('scan-table');
 
@@ -32,13 +32,13 @@ const drawScene = () => {
     plot.dataset.listens = 'yes';
     plot.on('plotly_click', (event) => {
       const target = event.points[0].customdata;
-      // a scene in space says "clicked" while it draws, and again in every drawing until the button is up
+      // a 3-D scene fires "clicked" while it draws, and again in every drawing until the button is up
       if (typeof target === 'number') window.setTimeout(() => { if (target !== state.chosen) chooseTarget(target); });
     });
   }
 };
 
-// One heading a sensor, under it the residuals of its measurement.
+// For each sensor a heading, and under it the residuals of its measurement.
 const residualTable = (rows, caption) => {
   const body = [];
   for (const [name, component, shown, sigmas] of rows) {
@@ -119,7 +119,7 @@ const drawScans = () => {
   const [name, title, label] = MEASURES.find((one) => one[0] === byId('measure').value);
   const x = data.scans.map((_, i) => i);
   const many = data.scans.length > 60;
-  // signs for thousands of scans cover one another, and drawing them takes a second
+  // markers of thousands of scans overlap, and drawing them takes a second
   const signs = data.scans.length <= 300;
   const traces = [{
     type: 'scatter', mode: signs ? 'lines+markers' : 'lines', name: title, x, y: valuesOf(name), line: { color: COLOURS[0], width: 1.2 }, marker: { size: many ? 4 : 7 },
@@ -132,7 +132,7 @@ const drawScans = () => {
   const here = { type: 'line', x0: state.scan, x1: state.scan, yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } };
   const layout = layoutOf(data.sources.length > 1 ? 'row' : 'scan', label, { hovermode: 'closest', shapes: [here], showlegend: name === 'cost' });
   if (data.sources.length === 1) {
-    // scans keep their own numbers when only some of them were solved
+    // scans keep their numbers when only some of them were solved
     const step = Math.max(1, Math.ceil(data.scans.length / 10));
     layout.xaxis.tickvals = x.filter((i) => i % step === 0);
     layout.xaxis.ticktext = layout.xaxis.tickvals.map((i) => String(data.scans[i].scan));
@@ -163,7 +163,7 @@ const showScan = (index) => {
   drawDetail();
   drawTargets();
   markRow(scanTable, index);
-  // the scene follows the slider at once, the histories when there is time
+  // the scene follows the slider at once, the histories when idle
   window.clearTimeout(pending);
   pending = window.setTimeout(() => { drawTrace(); drawScans(); showAnts(index); }, 30);
 };

@@ -1,8 +1,8 @@
-// What all reports share: numbers as text, tables that sort, a slider that walks, plots in one style.
+// Shared by all reports: numbers as text, sortable tables, the slider, the style of plots.
 const data = JSON.parse(document.getElementById('data').textContent);
 const byId = (id) => document.getElementById(id);
 
-// What follows the reader's choice of a light or a dark page; a reload follows a change of mind.
+// Colours of the light or dark page, as the reader prefers; a change takes effect after a reload.
 const DARK = window.matchMedia('(prefers-color-scheme: dark)').matches;
 const THEME = DARK
   ? { ink: '#e6edf3', soft: '#a3adb8', line: '#8b949e', grid: '#30363d', faint: '#3d444d', paper: '#161b22' }
@@ -14,7 +14,7 @@ const DASHES = ['solid', 'dash', 'dashdot', 'dot', 'longdash', 'longdashdot', '5
 const colourOf = (number) => COLOURS[number % COLOURS.length];
 const dashOf = (number) => DASHES[number % DASHES.length];
 
-// plotly reads tags and entities in its texts: names from files must show as they are
+// plotly parses tags and entities in texts: names from files must be escaped
 const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
 
 const short = (value, digits = 4) => {
@@ -26,7 +26,7 @@ const short = (value, digits = 4) => {
   return text.replace('-', '\u2212');
 };
 
-// Times as they are, without the digits that binary fractions add.
+// Times without the digits that binary fractions add.
 const exact = (value) => String(Number(value.toPrecision(9)));
 
 const element = (tag, content, attributes = {}) => {
@@ -37,7 +37,7 @@ const element = (tag, content, attributes = {}) => {
   return made;
 };
 
-// A table of texts; cells that start like a number are set flush right, and so are their headings.
+// A table of texts; cells that start like a number, and their headings, are right-aligned.
 const numberClass = (cell) => (/^[\u2212-]?[0-9]/.test(String(cell)) ? { class: 'number' } : {});
 const simpleTable = (headers, rows) => {
   const first = rows[0] || headers;
@@ -70,14 +70,14 @@ const makeSortable = (table) => {
       heads.forEach((one) => one.removeAttribute('aria-sort'));
       head.setAttribute('aria-sort', down ? 'descending' : 'ascending');
       const keyed = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
-      // what is unknown stays last in both directions
+      // unknown values stay last in both directions
       keyed.sort(([a], [b]) => (a === null || b === null ? compare(a, b) : (down ? -1 : 1) * compare(a, b)));
       body.append(...keyed.map(([, row]) => row));
     });
   });
 };
 
-// Mark a row and bring it into view inside its own box, without moving the page.
+// Mark a row and scroll to it inside its box, without scrolling the page.
 const markRow = (table, number) => {
   if (!table) return;
   for (const row of table.tBodies[0].rows) {
@@ -99,7 +99,7 @@ const onRow = (table, choose) => table.tBodies[0].addEventListener('click', (eve
   choose(Number(row.dataset.row));
 });
 
-// A button that is pressed or not; `draw` follows.
+// A toggle button; calls `draw` when it changes.
 const makeToggle = (button, pressed, draw) => {
   button.setAttribute('aria-pressed', String(pressed));
   button.addEventListener('click', () => {
@@ -108,7 +108,7 @@ const makeToggle = (button, pressed, draw) => {
   });
 };
 
-// A slider with its buttons; choose(i) moves it from elsewhere, and may say that it has another number of places now.
+// A slider with its buttons; choose(i) moves it from elsewhere, and may change its number of positions.
 const makeSlider = (places, label, show, prefix = '') => {
   let count = places;
   const range = byId(`${prefix}slider`);
@@ -148,7 +148,7 @@ const makeSlider = (places, label, show, prefix = '') => {
 
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13, color: THEME.ink };
 const AXIS = { zeroline: false, gridcolor: THEME.grid, linecolor: THEME.line, ticks: 'outside', automargin: true, tickcolor: THEME.line };
-// The data stay here: a chart has the buttons named below and no others, knows no server, and nothing opens a window.
+// The data stay here: charts have only the buttons named below, no server, and cannot open windows.
 window.open = () => null;
 const configOf = (...buttons) => ({ responsive: true, displaylogo: false, plotlyServerURL: '', displayModeBar: window.innerWidth < 820 ? false : 'hover', modeBarButtons: [['toImage'], buttons] });
 const CONFIG = configOf('zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d');
@@ -165,7 +165,7 @@ const layoutOf = (x, y, more = {}) => ({
   ...more,
 });
 
-// All axes of one value, or of values that differ by rounding alone, need some height.
+// Axes whose values are equal, up to rounding, need some extent.
 const rangeFor = (values) => {
   const known = values.filter((value) => value !== null);
   const low = Math.min(...known);

@@ -19,7 +19,7 @@ const componentText = (sensor, c, value) => {
   return { shown, sigmas: `${short(value / sensor.sigma[c], 2)} \u03c3` };
 };
 
-// What a tuple is and how well its measurements agree: text for hovering, rows for the panel.
+// Description and residuals of a tuple: text for hovering, rows for the panel.
 const residualRows = (source, scan, target) => {
   const rows = [];
   scan.tuples[target].forEach((index, s) => {
@@ -38,7 +38,7 @@ const residualRows = (source, scan, target) => {
 
 const tupleText = (scan, target) => `(${scan.tuples[target].join(', ')})`;
 
-// Degrees, where a scene says where it is on the earth.
+// Degrees, if the scene has an origin on the earth.
 const onEarth = (places, i) => (places ? [`${places[i][0].toFixed(5)}\u00b0, ${places[i][1].toFixed(5)}\u00b0`] : []);
 
 const targetHover = (source, scan, target) => {
@@ -86,10 +86,10 @@ const ellipse = (centre, [xx, xy, yy]) => {
   return points;
 };
 
-// All points of a source, for the unit and for axes that stay while the scans go by.
+// All points of a source, for the unit and for axes that are the same for all scans.
 const pointsOf = (number) => {
   const source = data.sources[number];
-  // a crowd fills the view; its sensors are a double click away
+  // many targets fill the view; a double click shows the sensors
   const crowded = data.scans.some((scan) => scan.source === number && scan.targets > 40);
   const points = crowded ? [] : source.sensors.map((sensor) => sensor.place);
   const far = [];
@@ -106,7 +106,7 @@ const boxOf = (points, far) => [0, 1, 2].map((axis) => {
   let low = Infinity;
   let high = -Infinity;
   for (const p of points) { low = Math.min(low, p[axis]); high = Math.max(high, p[axis]); }
-  // most of what was found and declared as well, but not the few farthest
+  // most targets and false alarms as well, but not the few farthest
   const sorted = far.map((p) => p[axis]).sort((a, b) => a - b);
   if (sorted.length) {
     low = Math.min(low, sorted[Math.floor(0.03 * sorted.length)]);
@@ -154,10 +154,10 @@ const sceneTraces = (index, space, chosen) => {
   const { unit } = frames[scan.source];
   const view = scan.view;
   const symbols = space ? SYMBOLS_IN_SPACE : SYMBOLS;
-  // many targets need smaller signs
+  // many targets need smaller markers
   const many = view.positions.length;
   const crowd = many > 150 ? 0.32 : many > 40 ? 0.6 : 1;
-  // where signs lie on one another, the denser place is the darker one
+  // overlapping markers: denser regions are darker
   const opacity = many > 150 ? 0.65 : 1;
   const stroke = many > 150 ? 1 : 2;
   const size = crowd * (space ? 0.55 : 1);
@@ -222,7 +222,7 @@ const sceneTraces = (index, space, chosen) => {
   return traces;
 };
 
-// The square around a target that holds its measurements, its ellipse, and some air.
+// The square around a target with its measurements, its ellipse, and a margin.
 const boxAround = (scan, target) => {
   const centre = scan.view.positions[target];
   const points = [...ellipse(centre, scan.view.ellipses[target])];
@@ -259,7 +259,7 @@ const sceneLayout = (number, space, zoom) => {
       yaxis: { ...IN_SPACE, title: { text: `y (${unit.name})` }, range: scaled(box[1]) },
       zaxis: { ...IN_SPACE, title: { text: `z (${unit.name})` }, range: scaled(box[2]) },
       aspectmode: 'manual',
-      // heights are stretched where they would be a line
+      // heights are stretched if they would look flat
       aspectratio: { x: (1.3 * reach[0]) / widest, y: (1.3 * reach[1]) / widest, z: Math.max(0.45, (1.3 * reach[2]) / widest) },
       camera: { eye: window.innerWidth < 820 ? { x: -1.5, y: -1.8, z: 1.2 } : { x: -1.1, y: -1.3, z: 0.9 } },
     },

@@ -26,7 +26,7 @@ const drawMap = (map, measure) => {
   Object.assign(layout.yaxis, { tickvals: map.ys.map((_, i) => i), ticktext: map.ys.map(plain), showgrid: false });
   Plotly.react('map-plot', [{
     type: 'heatmap', z: middle, colorscale: 'Cividis', colorbar: { title: { text: plain(data.measures[measure]), side: 'right' }, thickness: 14 },
-    // one value everywhere has no scale: it is said above
+    // equal values need no scale: the value is stated above
     ...(constant ? { zmin: least - 1, zmax: least + 1, showscale: false } : {}),
     text: middle.map((row, y) => row.map((value, x) => `${plain(map.across)} ${plain(map.xs[x])}, ${plain(map.up)} ${plain(map.ys[y])}<br>${withInterval(value, low[y][x], high[y][x])}`)),
     hovertemplate: '%{text}<extra></extra>',
@@ -64,7 +64,7 @@ const drawCurves = () => {
       hovertemplate: `${plain(data.settings[i].title)}<br>%{y:.4g}<extra></extra>`, legendrank: i,
     });
   });
-  // the best and the chosen lie on top
+  // the best and the chosen setting are drawn last, on top
   traces.sort((a, b) => a.line.width - b.line.width);
   const layout = layoutOf(column === 'seconds' ? 'time (ms)' : 'iteration (number)', window.innerWidth < 820 ? 'excess cost (nats)' : 'mean cost above the best known (nats)', { hovermode: 'closest' });
   layout.xaxis.type = 'log';
@@ -81,7 +81,7 @@ try {
     for (const [name, label] of Object.entries(data.measures)) byId('measure').append(element('option', label, { value: name }));
     data.maps.forEach((map, i) => byId('parameters').append(element('option', map.title, { value: `map ${i}` })));
     Object.keys(data.settings[0].values).forEach((name, i) => byId('parameters').append(element('option', `${name} alone`, { value: `one ${i}` })));
-    // begin with what the settings differ in
+    // begin with the parameters that vary
     const differs = Object.keys(data.measures).find((name) => new Set(data.settings.map((one) => one.means[name][0])).size > 1);
     if (differs) byId('measure').value = differs;
     byId('measure').addEventListener('change', drawParameters);

@@ -3,7 +3,7 @@ const TRAIL = 20;
 const now = { index: 0, track: null, zoom: null };
 const trackTable = byId('track-table');
 
-// Where hundreds fly, they fill the view, sensors around them or not, and signs shrink.
+// Hundreds of targets fill the view, without the sensors around them, and markers shrink.
 const most = Math.max(data.truth.length, data.tracks.length);
 const crowded = most > 60;
 const sign = (size) => Math.max(0.45, Math.min(1, Math.sqrt(60 / Math.max(most, 1)))) * size;
@@ -16,7 +16,7 @@ const near = (() => {
   data.truth.forEach((one) => one.x.forEach((x, i) => take(x, one.y[i])));
   if (!crowded) data.sensors.forEach((one) => take(one.place[0], one.place[1]));
   const points = data.tracks.flatMap((one) => one.x.map((x, i) => [x, one.y[i]]));
-  // most of the tracks as well, but not the few farthest
+  // most tracks as well, but not the few farthest
   [0, 1].forEach((axis) => {
     const sorted = points.map((p) => p[axis]).sort((a, b) => a - b);
     if (!sorted.length) return;
@@ -46,7 +46,7 @@ const linesOf = (parts) => {
   return { type: 'scatter', mode: 'lines', x, y, hoverinfo: 'skip' };
 };
 
-// A track or target is there at a time if a row of it is about as old as a step of the slider.
+// A track or target exists at a time if one of its rows is at most about a slider step old.
 const step = data.instants.length > 1 ? (data.instants[data.instants.length - 1] - data.instants[0]) / (data.instants.length - 1) : 1;
 const present = (path, time) => {
   const count = until(path, time);
@@ -114,7 +114,7 @@ const marker = () => ({ type: 'line', x0: data.instants[now.index], x1: data.ins
 const overTime = (id, curves, label) => {
   const layout = layoutOf('time (s)', label, { hovermode: 'closest', shapes: [marker()] });
   layout.yaxis.rangemode = 'tozero';
-  // a line of many says its name under the pointer: their legend would fill the plot
+  // with many lines, names appear under the pointer: a legend would fill the plot
   layout.showlegend = curves.length <= 12;
   Plotly.react(id, curves.map(([name, x, y], i) => ({ type: 'scatter', mode: 'lines', name, x, y, line: { color: colourOf(i), dash: dashOf(i), width: 1.8 } })), layout, CONFIG);
   const plot = byId(id);
@@ -141,7 +141,7 @@ const drawHistories = () => {
     overTime('rates-plot', ['CT', 'MT', 'IT'].map((name) => [name, data.rates.times, data.rates[name]]), 'percent');
   }
   if (byId('altitude-plot')) {
-    // the longest tracks: more lines than that nobody can tell apart
+    // only the longest tracks: more lines cannot be distinguished
     const told = data.tracks.filter((one) => one.h && one.h.some((h) => h !== null));
     const longest = [...told].sort((a, b) => b.t.length - a.t.length).slice(0, 30);
     overTime('altitude-plot', longest.map((one) => [`track ${one.id}`, one.t, one.h]), 'altitude (m)');
