@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from unittest import mock
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from assoc.simulation import simulate
 from assoc.solution import Solution
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
+from assoc.tracking.progress import Work
 from experiments.common.instances import scenes, synthetic
 from experiments.sdlib.recorded import WATCHES
 
@@ -113,27 +115,26 @@ def mixed(targets: int, seed: int) -> Scene:
     return Scene(sensors, [0.0], [measured], region=region, truth=Truth([np.arange(targets)], [truth], [sources]))
 
 
-class _Recorder:
-    """Keeps the problems that a tracker poses on a scene."""
+def _problems(kind: str, scene: Scene) -> list[AssignmentProblem]:
+    """Problems that a tracker poses on a scene."""
+    found: list[AssignmentProblem] = []
+    solve = Work.assign
 
-    def __init__(self, kind: str, scene: Scene) -> None:
-        self.problems: list[AssignmentProblem] = []
-        problems = self.problems
+    def listening(work: Work, problem: AssignmentProblem) -> Solution:
+        found.append(problem)
+        return solve(work, problem)
 
-        class Listening(TRACKERS[kind]):  # type: ignore[misc]
-            def _assign(self, problem: AssignmentProblem) -> Solution:
-                problems.append(problem)
-                return super()._assign(problem)  # type: ignore[no-any-return]
-
-        tracker = Listening(scene.sensors, make_filter("imm", scene.sensors, 20.0, 0), region=scene.region)
+    tracker = TRACKERS[kind](scene.sensors, make_filter("imm", scene.sensors, 20.0, 0), region=scene.region)
+    with mock.patch.object(Work, "assign", listening):
         for k in range(scene.num_scans):
             tracker.step(float(scene.times[k]), scene.measurements[k])
+    return found
 
 
 def _posed(kind: str, targets: int, seed: int) -> Callable[[], AssignmentProblem]:
     def make() -> AssignmentProblem:
         scene = simulate("crowd", seed, targets=targets, scans=8, interval=4.0, detection_probability=0.8)
-        return max(_Recorder(kind, scene).problems[-4:], key=lambda one: one.num_tuples)
+        return max(_problems(kind, scene)[-4:], key=lambda one: one.num_tuples)
 
     return make
 
