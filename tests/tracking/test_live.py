@@ -135,7 +135,7 @@ def test_the_silence_of_a_radar_is_no_miss(scene):
     assert len(pictures[-1].tracks) == 4
     name = scene.sensors[1].name
     assert [line.split(" ")[0:4] for line in told] == [
-        [*name.split(), "says", "nothing"],
+        [*name.split(), "has", "sent"],
         [*name.split(), "is", "back"],
     ]
 
