@@ -16,7 +16,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
 # costs above this many times the relevant ones are lowered; relevant costs below this are scaled up, for tolerances
-_FAR, _SMALL = 2.0**20, 2.0**-10
+_FAR, _SMALL = 2.0**12, 2.0**-10
 
 
 class Conditioned(NamedTuple):

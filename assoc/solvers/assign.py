@@ -93,7 +93,7 @@ def assign(
     -----
     AssocWarning
         No tuple costs less than its measurements as false alarms, so that no target can be found. Or the proof could
-        not be written.
+        not be written. Or costs are so large that rounding alone keeps the answer from being proved.
     """
     started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
@@ -121,6 +121,7 @@ def assign(
                 write_proof(proof, problem, solution)
             except ValueError as error:  # the answer is returned all the same
                 warn(f"proof: not written: {error}")
+    _warn_of_rounding(problem, solution)
     # checked only where nothing was found: every column of a problem with dummies is a target
     if advise and problem.dummy and len(solution.tuples) == problem.sizes.sum():
         for line in cost_warnings(problem):
@@ -166,6 +167,19 @@ def _answer(
     for other in others:
         outcome = _cheaper(given, prepared, outcome, other, run)
     return certify(problem, prepared, outcome, run, solver, chosen)
+
+
+def _warn_of_rounding(problem: AssignmentProblem, solution: Solution) -> None:
+    """Say so where large costs cancel, so that rounding alone is the gap of an answer."""
+    if solution.status == "optimal" or not problem.num_tuples:
+        return
+    chosen = np.append(solution.indices, problem.costs.argmin())
+    largest = int(chosen[np.abs(problem.costs[chosen]).argmax()])
+    if solution.gap <= 1e-9 * abs(problem.costs[largest]):
+        warn(
+            f"costs[{largest}] = {problem.costs[largest]:.6g}: too large for doubles beside differences below"
+            f" {solution.gap:.2g}; the solution may cost that much more than the best"
+        )
 
 
 def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packing: Packing) -> Callable[[Any], object]:
