@@ -175,7 +175,7 @@ def _warn_of_rounding(problem: AssignmentProblem, solution: Solution) -> None:
         return
     chosen = np.append(solution.indices, problem.costs.argmin())
     largest = int(chosen[np.abs(problem.costs[chosen]).argmax()])
-    if solution.gap <= 1e-9 * abs(problem.costs[largest]):
+    if solution.gap <= 1e-12 * abs(problem.costs[largest]):
         warn(
             f"costs[{largest}] = {problem.costs[largest]:.6g}: too large for doubles beside differences below"
             f" {solution.gap:.2g}; the solution may cost that much more than the best"

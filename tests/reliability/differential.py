@@ -192,7 +192,7 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "none of the .* tuples costs less", AssocWarning)
+            warnings.filterwarnings("ignore", "none of the .* tuples costs less|.* too large for doubles", AssocWarning)
             answers = way(problem)
     except InfeasibleError:
         if truth is not None:
@@ -231,7 +231,7 @@ def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], flo
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "none of the .* tuples costs less", AssocWarning)
+            warnings.filterwarnings("ignore", "none of the .* tuples costs less|.* too large for doubles", AssocWarning)
             found = marginals(problem, k)
     except InfeasibleError:
         if truth is not None:
