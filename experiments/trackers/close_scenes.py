@@ -3,6 +3,7 @@
 Twelve targets in nearly straight flight, 40 scans at 4 s, in a box of 60 x 60 x 12 km with the sensors around it.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,17 +52,19 @@ SETTINGS = {
 }
 
 
-def simulate(setting: Setting, seed: int, scans: int = SCANS) -> Scene:
-    """Simulate a scene of this kind, with its truth."""
+def simulate(setting: Setting, seed: int, scans: int = SCANS, sensors: Sequence[Sensor] | None = None) -> Scene:
+    """Simulate a scene of this kind, or its flights under other sensors, with its truth."""
     rng = np.random.default_rng(seed)
     times = INTERVAL * np.arange(scans)
     middle, velocity = _FLIGHTS[setting.flight](rng)
     paths = middle[None] + (times - INTERVAL * (SCANS - 1) / 2.0)[:, None, None] * velocity[None]
     ids = [np.arange(TARGETS)] * scans
-    return observe(_sensors(setting), times, ids, list(paths), rng, region=REGION, velocities=[velocity] * scans)
+    sensors = radars(setting) if sensors is None else sensors
+    return observe(sensors, times, ids, list(paths), rng, region=REGION, velocities=[velocity] * scans)
 
 
-def _sensors(setting: Setting) -> list[Sensor]:
+def radars(setting: Setting) -> list[Sensor]:
+    """The radars of a kind of scene, then its bearing sensors."""
     count = len(setting.noise) + setting.bearings
     sensors: list[Sensor] = []
     for number, place in enumerate(on_circle(np.zeros(3), _AROUND, count)):

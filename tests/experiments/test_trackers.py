@@ -8,6 +8,7 @@ from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, T
 from experiments.common.claims import Claim, load_json, save_json
 from experiments.pages import trackers as pages
 from experiments.trackers import (
+    as_they_are,
     asynchronous,
     bearings,
     benchmark,
@@ -87,6 +88,24 @@ def test_close_targets_and_the_oracle():
     low, high = claims["formations, mht: GOSPA"].interval
     assert low < mht.distances.mean() < high and low < oracle.distances.mean() < high
     assert claims["formations, mht: switches"].ours == mht.switches / 2
+
+
+@pytest.mark.parametrize("row", as_they_are.ROWS)
+def test_rows_of_sensors_as_they_are(row):
+    """Each row has its targets, with the source of each measurement."""
+    case = as_they_are.ROWS[row](3)
+    for scene in (case.declared, case.known or case.declared):
+        assert scene.num_scans >= 10 and len(np.unique(np.concatenate(scene.truth.target_ids))) >= 2
+        assert sum(int((one >= 0).sum()) for scan in scene.truth.sources for one in scan) > 100
+
+
+def test_the_table_of_sensors_as_they_are(capsys):
+    arguments = ["--seeds", "1", "--rows", "splitting,ships, radar and AIS", "--trackers", "oracle"]
+    assert as_they_are.program(arguments) == 0
+    shown = [line for line in capsys.readouterr().out.splitlines() if "+-" in line]
+    assert [line.split("oracle")[0] for line in shown] == ["splitting, ", "ships, radar and AIS, "]
+    with pytest.raises(SystemExit):
+        as_they_are.program(["--rows", "nothing"])
 
 
 def test_goals_hold_by_their_intervals():
