@@ -70,11 +70,11 @@ def pair_probabilities(
     probability = np.zeros(len(first))
     rounding = _ROUNDING + 8.0 * np.finfo(float).eps * sum(sizes) * float(np.abs(weight).max())
     if plan.kept.all():
-        swept(plan.steps, *_reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability)
+        swept(plan.steps, *reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability)
         low, high = probability - rounding, probability + rounding
         return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
     log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight))
-    swept(plan.steps, *_reduced(graph, weight, plan.kept, log_free, sizes[0]), probability)
+    swept(plan.steps, *reduced(graph, weight, plan.kept, log_free, sizes[0]), probability)
     free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
     free = np.clip(free, 0.0, 1.0)
     # left-out pairs, by their replacements at the first list's end
@@ -120,7 +120,7 @@ def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
     count = clusters = 0
     for v in range(vertices):
         while label[v] < 0:
-            size = _cluster(graph, kept, v, clusters, label, members)
+            size = cluster(graph, kept, v, clusters, label, members)
             own = members[:size]
             added = planned(graph, kept, own, most, steps[count:], work)
             if added >= 0:
@@ -141,7 +141,7 @@ def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
 
 
 @njit
-def _cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int, label: Ints, members: Ints) -> int:
+def cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int, label: Ints, members: Ints) -> int:
     """Label the cluster of a vertex and list its members; return how many."""
     members[0], label[start] = start, number
     size = 1
@@ -159,7 +159,7 @@ def _cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int,
     return size
 
 
-def _reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:
+def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:
     """Weights of edges and of unmatched vertices, reduced by the multipliers of the best event.
 
     The first ``rows`` vertices are those of the first list.

@@ -10,6 +10,9 @@ interval that certainly contains it. A track may be false: with existence probab
 and without a measurement the existence probability becomes p (1 - P_D) / (1 - p P_D). A track's score is the log odds
 of its existence, which the events update as well.
 
+States use the joint events without their permutations (JPDA*, `assoc.ranking.pairs.permutations`), or tracks side by
+side would be drawn together.
+
 Where measurements have times of their own, a track is merged at the end of the scan, not after each sensor. Until then
 it consists of parts, each with its own measurements, filtered in time order (`assoc.tracking.associate.track_parts`),
 and the density in a pair's weight is the average over the parts.
@@ -26,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -38,6 +41,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
+from assoc.ranking.pairs.permutations import without_permutations
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
@@ -47,6 +51,8 @@ from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
+
+Permutations = Literal["best", "all"]
 
 _SURE = 30.0
 """Scores are clipped here: exp(-30) is below the accuracy of the probabilities."""
@@ -63,6 +69,8 @@ class PairProbabilities:
         From 0.
     probability, lower, upper : arrays (K,)
         The probability, and an interval that certainly contains it.
+    share : array (K,)
+        The weight with which the track's state uses the measurement; see `permutations`.
     """
 
     track_id: Array
@@ -70,6 +78,7 @@ class PairProbabilities:
     probability: Array
     lower: Array
     upper: Array
+    share: Array
 
 
 class _Update(NamedTuple):
@@ -98,8 +107,11 @@ class JointProbabilistic(Method):
     nursery = TrackTrees()
 
     max_events: int = 4096
+    permutations: Permutations = "best"
 
     def __post_init__(self) -> None:
+        if self.permutations not in get_args(Permutations):
+            raise InvalidInputError(f"permutations must be 'best' or 'all', got {self.permutations!r}")
         if not is_whole(self.max_events, 1):
             raise InvalidInputError(f"max_events must be a whole number above 0, got {self.max_events!r}")
         object.__setattr__(self, "max_events", int(self.max_events))
@@ -132,7 +144,7 @@ class JointProbabilistic(Method):
             missed = np.full(len(tracks), terms.miss[s])
             scored = ScoredPairs(pairs.track, pairs.measurement, terms.detection[s] + pairs.log_likelihood)
             known, update = self._probabilities(tracks.track_id, tracks.existence, missed, scored, len(z))
-            tracks, hit = _take_in(tracks, pairs, known.probability, update, time)
+            tracks, hit = _take_in(tracks, pairs, known.share, update, time)
             ids, taken = _owners(known, len(z))
             free = np.flatnonzero(taken < 0.5)
             states, fit, positions, score = settings.births.singles(s, z[free])
@@ -161,7 +173,7 @@ class JointProbabilistic(Method):
             missed = looked[anchor, s] * terms.miss[s]
             count = len(timed.times[s])
             known, update = self._probabilities(track_id, odds, missed, grown.pairs, count)
-            of_pair = known.probability / update.after[grown.pairs.track]
+            of_pair = known.share / update.after[grown.pairs.track]
             parts = parts.after(grown, of_pair, update.missed / update.after, missed)
             ids, taken = _owners(known, count)
             free = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
@@ -202,13 +214,17 @@ class JointProbabilistic(Method):
         exists = 1.0 / (1.0 + np.exp(-np.clip(existence, -_SURE, _SURE)))
         unseen = 1.0 - exists * -np.expm1(missed)
         weight = (np.log(exists) - np.log(unseen))[track] + gain
-        known = pair_probabilities(track, measurement, weight, (len(exists), count), self.max_events)
+        sizes = len(exists), count
+        known = pair_probabilities(track, measurement, weight, sizes, self.max_events)
+        share = known.probability
+        if self.permutations == "best":
+            share = without_permutations(track, measurement, weight, sizes, share, self.max_events)
         detected = np.bincount(track, known.probability, len(exists))
         there = np.maximum(1.0 - detected, 0.0) * exists * np.exp(missed) / unseen
         # without detections this is existence + missed, exactly: no cancellation in 1 - (1 - probability)
         odds = existence + missed + np.log1p(detected / np.maximum(there, 1e-300))
         update = _Update(detected, there, np.clip(odds, -_SURE, _SURE))
-        return PairProbabilities(track_id[track], measurement, *known), update
+        return PairProbabilities(track_id[track], measurement, *known, share), update
 
 
 def _take_in(
@@ -226,9 +242,9 @@ def _take_in(
 
 
 def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
-    """The track with probability above 0.5 of each measurement, 0 for none, and the probability that it has any."""
+    """The track with a share above 0.5 of each measurement, 0 for none, and the probability that it has any."""
     ids = np.zeros(count, dtype=np.int64)
-    likely = pairs.probability > 0.5
+    likely = pairs.share > 0.5
     ids[pairs.measurement[likely]] = pairs.track_id[likely]
     return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
 
@@ -243,6 +259,10 @@ class JointProbabilisticTracker(Tracker):
     max_events : int
         Largest table of partially summed joint events for a cluster of tracks and measurements (4096). Where a cluster
         would need more entries, its least likely pairs are left out: larger tables give narrower intervals.
+    permutations : "best" or "all"
+        Which joint events that detect the same tracks by the same measurements determine the states: the best one
+        (JPDA*), or all (JPDA, which draws tracks side by side together). Existence and `probabilities` always come
+        from all.
     **options
         As for `Tracker`.
     """
