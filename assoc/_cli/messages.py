@@ -11,6 +11,7 @@ from typing import Any
 
 from assoc._cli.options import Given
 from assoc._files.output import STDOUT
+from assoc._system.compile_time import announcement
 from assoc._text.plain import one_line
 from assoc.errors import AssocWarning
 
@@ -22,6 +23,7 @@ def messages(given: Given) -> Iterator[None]:
         if given["quiet"]:
             nowhere = stack.enter_context(open(os.devnull, "w"))
             stack.enter_context(contextlib.redirect_stdout(nowhere))
+            stack.enter_context(announcement.silenced())
         elif STDOUT in [given[name] for name in given.outputs]:
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         yield

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from assoc._system.compile_time import is_compiling
+from assoc._system.compile_time import announcement, is_compiling
 from assoc._system.interrupts import end_is_asked
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class ProgressBar:
         self.done = 0
         """Number of items that are done."""
         self._progress: Any = None
+        self._said = contextlib.ExitStack()
         self._started = time.perf_counter()
         if shown and sys.stderr.isatty():
             # imported here: slow, and only needed on a terminal
@@ -96,6 +98,7 @@ class ProgressBar:
 
     def close(self) -> None:
         """Remove the bar."""
+        self._said.close()
         if self._progress is not None:
             self._progress.stop()
 
@@ -103,6 +106,7 @@ class ProgressBar:
         self._started = time.perf_counter()
         if self._progress is not None:
             self._progress.start()
+            self._said.enter_context(announcement.silenced())
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import sys
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any
@@ -30,6 +32,8 @@ with contextlib.suppress(ImportError, AttributeError):
 _CONFIG: Any = numba.config
 _EVENT: Any = event
 _loads = 0
+# seconds of compiling for which a deadline moves
+_NOTICED = 0.01
 
 
 def njit(
@@ -53,7 +57,7 @@ def njit(
     if private is None:
         return _plain(function)
     kernel = private.make(function, _may_wait, literal=literal)
-    compiled = _uninterrupted(kernel._compile_for_args)
+    compiled = _uninterrupted(kernel)
     kernel._compile_for_args = first_small(kernel, compiled, small, stand_in) if private.is_cached(kernel) else compiled
     return kernel
 
@@ -144,16 +148,19 @@ class _Passes(event.Listener):
 
     def on_start(self, event: Any) -> None:
         end_if_abandoned()
+        compile_time.announcement.begin()
 
     def on_end(self, event: Any) -> None:
         pass
 
 
-def _uninterrupted(compiled: Callable[..., Any]) -> Callable[..., Any]:
-    """Keep signal handlers from raising while kernels are compiled or loaded: inside LLVM that would crash.
+def _uninterrupted(kernel: Any) -> Callable[..., Any]:
+    """Keep signal handlers from raising while a kernel is compiled or loaded: inside LLVM that would crash.
 
-    The returned function gives None for a kernel that is in no cache and may be interpreted instead.
+    The returned function gives None for a kernel that is in no cache and may be interpreted instead. The call that it
+    was compiled for gets its deadline later by the time that this took.
     """
+    compiled = kernel._compile_for_args
 
     def aside(may_interpret: bool, arguments: tuple[Any, ...]) -> Any:
         thread.may_interpret = may_interpret
@@ -168,8 +175,21 @@ def _uninterrupted(compiled: Callable[..., Any]) -> Callable[..., Any]:
     def wait(*arguments: Any) -> Any:
         global _loads
         _loads += 1
-        may_interpret = thread.may_interpret
+        may_interpret, started = thread.may_interpret, time.perf_counter()
         with compile_time.loading():
-            return uninterrupted(lambda: aside(may_interpret, arguments))
+            found = uninterrupted(lambda: aside(may_interpret, arguments))
+            compile_time.announcement.end()
+        spent = time.perf_counter() - started
+        if found is None or spent < _NOTICED:
+            return found
+        names = [*inspect.signature(kernel.py_func).parameters]
+        return lambda *given: found(*(_later(*pair, spent) for pair in zip(names, given, strict=True)))
 
     return wait
+
+
+def _later(name: str, value: Any, seconds: float) -> Any:
+    """An argument of a kernel, or a record of them, with its deadline (clock.py) moved."""
+    if name == "deadline":
+        return value + seconds
+    return value._replace(deadline=value.deadline + seconds) if hasattr(value, "deadline") else value

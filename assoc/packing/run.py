@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,11 @@ _TRACE = 100_000
 _NEWS = 0.5
 
 
+def never() -> float:
+    """Return the deadline of a search without a run."""
+    return math.inf
+
+
 def memory_allows(needed: float) -> bool:
     """Whether there is memory for ``needed`` bytes more, for a search without a run."""
     return memory.fits(needed)
@@ -48,7 +54,7 @@ class Run:
     known : float
         The trace has ``inf`` for this cost and more: some costs were lowered (`assoc.packing.prepare.Conditioned`).
     time_limit : float or None
-        Seconds from ``started``.
+        Seconds from ``started``; those spent compiling do not count.
     callback : callable or None
         Called with each TracePoint; a true result stops the solver.
     reserve : float
@@ -60,7 +66,9 @@ class Run:
     watch : callable or None
         Called after each iteration by solvers with a state to show: `aco` passes its ``Cycle``.
     compiled : float
-        Seconds that this thread had spent compiling before the run.
+        Seconds that the thread of the run had spent compiling before it.
+    thread : int
+        The thread that began the run.
     """
 
     seed: int | np.random.SeedSequence | np.random.Generator
@@ -77,6 +85,7 @@ class Run:
     fallback: NDArray[np.integer] | None = None
     start: NDArray[np.integer] | None = None
     compiled: float = field(default_factory=compile_seconds)
+    thread: int = field(default_factory=get_ident)
     _rng: np.random.Generator | None = None
 
     @property
@@ -86,23 +95,21 @@ class Run:
             self._rng = np.random.default_rng(self.seed)
         return self._rng
 
-    def elapsed(self) -> float:
-        """Seconds since the start, including compiling; the time limit applies to these."""
-        return time.perf_counter() - self.started
+    def part(self, seed: np.random.Generator | int, time_limit: float | None) -> Run:
+        """Return a run with the same clock, for a part of the work."""
+        return Run(seed, time_limit=time_limit, started=self.started, compiled=self.compiled, thread=self.thread)
 
     def compile_time(self) -> float:
-        """Seconds of these spent compiling kernels, or loading kernels and the solver's modules."""
-        seconds = compile_seconds() - self.compiled
-        # a callback's thread may have compiled less than the thread that began the run
-        return seconds if seconds > 0.0 else 0.0
+        """Seconds since the start spent compiling kernels, or loading kernels and the solver's modules."""
+        return compile_seconds(self.thread) - self.compiled
 
     def runtime(self) -> float:
-        """Seconds of the search alone, as results report them."""
+        """Seconds since the start without those, as results report them; the time limit applies to these."""
         return time.perf_counter() - self.started - self.compile_time()
 
     def remaining(self) -> float:
         """Seconds left for a search; infinite without a time limit."""
-        return np.inf if self.time_limit is None else self.time_limit - self.reserve - self.elapsed()
+        return np.inf if self.time_limit is None else self.time_limit - self.reserve - self.runtime()
 
     def deadline(self) -> float:
         """The time limit for kernels, in seconds of `time.monotonic` (clock.py); infinite without one."""

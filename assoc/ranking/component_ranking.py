@@ -44,7 +44,7 @@ from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import Packing, PackingArrays
-from assoc.packing.run import memory_allows
+from assoc.packing.run import memory_allows, never
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
 from assoc.packing.simplex.program import Allowed, reduced_cost
 from assoc.ranking.enumeration import (
@@ -85,8 +85,8 @@ class ComponentRanking:
         Weights that differ by no more are ties.
     budget : int
         Decisions of enumeration at a node, beyond one for each row, before the node is branched.
-    deadline : float
-        Time limit by the kernels' clock (clock.py); the current node then stays open.
+    deadline : callable () -> float
+        Time limit by the kernels' clock (`Run.deadline`); the current node then stays open.
     memory_allows : callable, optional
         Whether the search may allocate this many bytes more (`Run.memory_allows`).
     """
@@ -100,13 +100,13 @@ class ComponentRanking:
         tolerance: float,
         *,
         budget: int = NODE_BUDGET,
-        deadline: float = np.inf,
+        deadline: Callable[[], float] = never,
         memory_allows: Callable[[float], bool] = memory_allows,
     ) -> None:
         self._packing = packing
         self._deadline = deadline
         self._memory_allows = memory_allows
-        self._wanted = Wanted(k, limit, tolerance, budget + packing.num_rows, deadline)
+        self._wanted = Wanted(k, limit, tolerance, budget + packing.num_rows, np.inf)
         self._store = new_store(packing.num_rows)
         self._root = plain_root(packing, duals)
         self._open = OpenNodes(self._root)
@@ -141,7 +141,7 @@ class ComponentRanking:
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
-        while not self.done and self.nodes < target and not is_over(self._deadline):
+        while not self.done and self.nodes < target and not is_over(self._deadline()):
             if self._work is None and not self._begin():
                 return
             if self._open.count == 0:
@@ -151,11 +151,16 @@ class ComponentRanking:
                 continue
             limit = min(target, max(self._split_at, self.nodes + 1))
             self._open.count, done, *store = _rank(
-                self._work, self._open.arrays, self._open.count, self._wanted, self._store, limit - self.nodes
+                self._work,
+                self._open.arrays,
+                self._open.count,
+                self._wanted._replace(deadline=self._deadline()),
+                self._store,
+                limit - self.nodes,
             )
             self._store = Store(*store)
             self.nodes += done
-            if self._open.count and self.nodes < limit and not is_over(self._deadline):
+            if self._open.count and self.nodes < limit and not is_over(self._deadline()):
                 self._open.grow(self._memory_allows)
 
     def _split(self) -> bool:
@@ -167,8 +172,8 @@ class ComponentRanking:
         needed = 2.0 * work_memory(most_rows(packing), packing.num_columns, packing.num_sensors)
         if not (cut < np.inf and self._open.given_up == np.inf and self._memory_allows(needed)):
             return False
-        root = root_with_cuts(packing, self._root.duals, cut, self._deadline)
-        leaves = split_on_counts(packing, root, cut, cut, self._deadline)
+        root = root_with_cuts(packing, self._root.duals, cut, self._deadline())
+        leaves = split_on_counts(packing, root, cut, cut, self._deadline())
         proven = self.proven
         if min((leaf.bound for leaf in leaves), default=cut) <= proven + _RAISED * (cut - proven):
             return False

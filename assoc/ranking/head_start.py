@@ -47,8 +47,8 @@ class HeadStart:
         run, packing = self._run, self._packing
         if run.should_stop() or packing.num_columns == 0:
             return
-        limit = None if run.time_limit is None else run.elapsed() + _SHARE * run.remaining()
-        ahead = Run(0, time_limit=limit, started=run.started)
+        limit = None if run.time_limit is None else run.runtime() + _SHARE * run.remaining()
+        ahead = run.part(0, limit)
         ahead.fallback = run.fallback
         try:
             outcome = search_to_the_end(packing, _NODES, _PATIENCE, ahead)

@@ -198,7 +198,7 @@ class Deepening:
             self._k,
             limit,
             self._tolerance,
-            deadline=self._run.deadline(),
+            deadline=self._run.deadline,
             memory_allows=self._run.memory_allows,
         )
         # about ten milliseconds of work between two checks of the clock

@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,11 +83,11 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     """
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
-    started, k, limit = time.perf_counter(), checked_k(k), checked_time_limit(time_limit)
+    k, clock = checked_k(k), Run(0, time_limit=checked_time_limit(time_limit))
     known: list[Solution] = []
     with interruptible():
         for version in conditioned(problem):
-            run = Run(0, time_limit=limit, started=started)
+            run = clock.part(0, clock.time_limit)
             found = [version.restored(problem, solution) for solution in rank(version.problem, k, None, run).solutions]
             listed = {solution.tuples.tobytes() for solution in known}
             new = [solution for solution in found if solution.tuples.tobytes() not in listed]
@@ -128,8 +127,7 @@ class Ranking:
 
 def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
     """Return the k best and a bound on the rest; a given run brings its own time limit."""
-    started = time.perf_counter()
-    run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
+    run = run or Run(0, time_limit=checked_time_limit(time_limit))
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
     prepared = prepare(problem)

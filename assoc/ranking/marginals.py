@@ -123,7 +123,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     prepare_fallback(prepare(problem).packing, run)
     tuples, index = distinct(problem.tuples)
     # a ranking prepares its columns before it checks the clock, which takes about as long as all this did
-    begin = run.elapsed() / max(problem.num_tuples, 1)
+    begin = run.runtime() / max(problem.num_tuples, 1)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
@@ -134,7 +134,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
             break
         waiting[which] = False
         # a cluster that is the whole problem has its greedy solution already
-        clock = run if cluster is problem else Run(0, time_limit=run.time_limit, started=run.started)
+        clock = run if cluster is problem else run.part(0, run.time_limit)
         shares, share, count = _of_cluster(cluster, k, clock)
         listed += count
         unseen = max(unseen, share)
@@ -237,7 +237,7 @@ def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, res
     for a in _EXPONENTS:
         if run.should_stop():
             break
-        log_all = log_partition(columns, a, deadline=run.deadline(), packing=packing)
+        log_all = log_partition(columns, a, deadline=run.deadline, packing=packing)
         # all in logarithms: counts of solutions overflow
         with np.errstate(over="ignore"):
             seen = float(np.exp(-a * (excess + rounding) - log_all).sum())

@@ -22,6 +22,7 @@ logarithms wherever their sum would underflow.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.packing import Packing
+from assoc.packing.run import never
 from assoc.ranking.columns import AllColumns
 
 # column visits for each component: about a tenth of a second in all for a hard one
@@ -69,7 +71,7 @@ def log_partition(
     columns: AllColumns,
     a: float,
     work: int = WORK,
-    deadline: float = math.inf,
+    deadline: Callable[[], float] = never,
     packing: Packing | None = None,
 ) -> float:
     """Return an upper bound on ln Z(a).
@@ -82,8 +84,8 @@ def log_partition(
         Inverse temperature >= 0; 0 counts the solutions.
     work : int
         Largest number of column visits for each component.
-    deadline : float
-        Time, in seconds of `time.monotonic`, after which no component is sharpened: the bound is valid, but weak.
+    deadline : callable () -> float
+        Gives the time (`Run.deadline`) after which no component is sharpened: the bound is valid, but weak.
     packing : Packing, optional
         ``columns.keep(inf)``, if already computed.
     """
@@ -109,7 +111,7 @@ def log_partition(
             own_alone,
             np.exp(own_alone),
         )
-        total += _log_sum_of_solutions(terms, work, deadline)
+        total += _log_sum_of_solutions(terms, work, deadline())
     return total
 
 

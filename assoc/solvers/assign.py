@@ -58,7 +58,7 @@ def assign(
     seed : int, SeedSequence, Generator or None, default 0
         Source of all randomness: the same seed gives the same solution; None: a random seed.
     time_limit : float, optional
-        Seconds, after which the best solution found is returned.
+        Seconds, after which the best solution found is returned; compiling kernels does not count.
     callback : callable, optional
         Called with each ``TracePoint``; if it returns a true value the solver stops.
     start : Solution, optional

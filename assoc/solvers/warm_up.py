@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.ahead import wait_for_kernels
+from assoc._system.compile_time import announcement
 from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
@@ -73,7 +74,7 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     branching = [name for name in names if name in _BRANCHING]
     if branching:
         compile_all_branching_ahead()
-    with compiled_only(), _Line() as say:
+    with compiled_only(), announcement.silenced(), _Line() as say:
         for name in names:
             if name not in branching:
                 say(name)

@@ -10,6 +10,7 @@ from assoc.packing.branching import counts
 from assoc.packing.branching.counts import begin_leaf
 from assoc.packing.branching.root import plain_root
 from assoc.packing.packing import assemble
+from assoc.packing.run import never
 from assoc.ranking import component_ranking
 from assoc.ranking.component_ranking import ComponentRanking
 from tests.packing.test_counts import random_packing, solutions
@@ -99,10 +100,10 @@ def test_a_split_that_time_ends_leaves_a_bound_that_holds(parts, monkeypatch):
     ranking.run(1)
     before = ranking.proven
     # time is over as soon as the search for cuts begins
-    ranking._deadline = -1.0
+    ranking._deadline = lambda: -1.0
     ranking._split()
     assert before <= ranking.proven <= every[0] + 1e-9
-    ranking._deadline = np.inf
+    ranking._deadline = never
     while not ranking.done:
         ranking.run(1)
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)

@@ -6,11 +6,14 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import assoc
+from assoc._system import compile_time
 from assoc._system.compile_time import compile_seconds, is_compiling, loading
+from assoc.packing.run import Run
 from assoc.simulation import simulate
 
 # one small kernel in place of a solver's many
@@ -30,7 +33,7 @@ for _ in range(2):
     run = Run(0)
     kernel(np.ones(9))
     runtime = run.runtime()
-    times.append([run.elapsed(), runtime, run.compile_time()])
+    times.append([time.perf_counter() - run.started, runtime, run.compile_time()])
 print(json.dumps(times))
 """
 # greedy: the solver with the fewest kernels
@@ -65,6 +68,70 @@ def test_a_first_process_and_a_second(text, tmp_path):
     assert warm[2] < 0.5 * compiling and warm[1] < 0.5
     for whole, runtime, compiling in (again, warm_again):
         assert compiling < 1e-3 and 0.0 < runtime <= whole
+
+
+_LIMIT = """
+import json, time
+from assoc._system.clock import is_over, now
+from assoc._system.compiled import njit
+from assoc.packing.run import Run
+from typing import NamedTuple
+
+class Limits(NamedTuple):
+    deadline: float
+
+@njit
+def kernel(deadline, limits):
+    return not is_over(deadline) and not is_over(limits.deadline)
+
+now()
+run = Run(0, time_limit=0.05)
+print(json.dumps([bool(kernel(run.deadline(), Limits(run.deadline()))), run.compile_time(), run.should_stop()]))
+"""
+
+
+@pytest.mark.slow
+def test_a_time_limit_begins_after_compiling(tmp_path):
+    """The kernel is compiled after its deadline was computed."""
+    program = tmp_path / "program.py"
+    program.write_text(_LIMIT)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "ASSOC_INTERPRET": "0"}
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
+    in_time, compiling, stopped = json.loads(done.stdout)
+    assert compiling > 0.05 and in_time and not stopped
+
+
+def test_a_run_and_its_parts_do_not_count_what_is_compiled():
+    run = Run(0, time_limit=5.0)
+    part = run.part(0, 5.0)
+    with loading():
+        time.sleep(0.05)
+    for one in (run, part, run.part(0, 5.0)):
+        assert one.remaining() > 4.97 and one.deadline() > time.monotonic() + 4.97
+    # a worker asks the clock of the run, whatever its own thread has compiled
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(run.remaining).result() > 4.97
+
+
+def test_compiling_is_announced_once(capsys, monkeypatch):
+    monkeypatch.setattr(compile_time, "_PATIENCE", 0.02)
+    one = compile_time.Announcement()
+    one.begin()
+    one.end()
+    assert capsys.readouterr().err == ""  # not yet
+    for _ in range(2):
+        one.begin()
+        time.sleep(0.1)
+        one.end()
+    assert capsys.readouterr().err == (
+        "assoc: compiling kernels, once after installation (assoc.warm_up() does it ahead)\n"
+    )
+    other = compile_time.Announcement()
+    with other.silenced():
+        other.begin()
+        time.sleep(0.1)
+        other.end()
+    assert capsys.readouterr().err == ""
 
 
 @pytest.fixture

@@ -90,12 +90,12 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     duals = np.zeros(packing.num_rows)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
     temperature = START * spread(arrays)
-    deadline = math.inf if run is None else run.deadline()
     done = -1
     while done < levels:
+        # an own check for systems where kernels cannot read the clock
+        late = run is not None and done >= 0 and run.remaining() <= 0.0
+        deadline = -math.inf if late else math.inf if run is None else run.deadline()
         done = _ascend(arrays, point, temperature, done, (levels, passes), deadline)
-        if run is not None and run.remaining() <= 0.0:
-            deadline = -math.inf  # for systems where kernels cannot read the clock
     return duals
 
 

@@ -22,7 +22,7 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
     chosen = []
     for c in range(packing.num_components):
         part = packing.component(c)
-        search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline(), run.memory_allows)
+        search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline, run.memory_allows)
         while search.columns is None and not search.done and search.nodes < _NODES and not run.should_stop():
             search.run(20)
         if search.columns is None and not search.done and not run.should_stop():

@@ -29,7 +29,7 @@ from assoc.packing.branching.node import Work, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.packing import Packing
-from assoc.packing.run import memory_allows
+from assoc.packing.run import memory_allows, never
 
 # the first and the last aim, as shares of the gap between the root's bound and the incumbent, and their growth
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
@@ -54,8 +54,8 @@ class BranchAndBound:
         Only solutions of less weight are searched for; ``inf`` if none is known.
     tolerance : float
         Least improvement that counts.
-    deadline : float
-        Time limit by the kernels' clock (clock.py); the current node then stays open.
+    deadline : callable () -> float
+        Time limit by the kernels' clock (`Run.deadline`); the current node then stays open.
     memory_allows : callable, optional
         Whether the search may allocate this many bytes more (`Run.memory_allows`).
     to_the_end : bool
@@ -70,7 +70,7 @@ class BranchAndBound:
         duals: Floats,
         incumbent: float,
         tolerance: float,
-        deadline: float = np.inf,
+        deadline: Callable[[], float] = never,
         memory_allows: Callable[[float], bool] = memory_allows,
         *,
         to_the_end: bool = False,
@@ -79,7 +79,7 @@ class BranchAndBound:
         self._packing = packing
         self.tolerance = tolerance
         self.weight = incumbent
-        self.deadline = deadline
+        self._deadline = deadline
         self.columns: NDArray[np.int32] | None = None
         self.nodes = 0
         self._memory_allows = memory_allows
@@ -119,7 +119,7 @@ class BranchAndBound:
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
-        while not self.done and self.nodes < target and not is_over(self.deadline):
+        while not self.done and self.nodes < target and not is_over(self._deadline()):
             if self._work is None and not self._begin():
                 return
             if self._open.count and self._splits():
@@ -127,7 +127,7 @@ class BranchAndBound:
                 self._floor = self._searched
                 self._begin_pass()
                 continue
-            limits = Limits(self.tolerance, self._aim, target - self.nodes, self.deadline)
+            limits = Limits(self.tolerance, self._aim, target - self.nodes, self._deadline())
             self._open.count, self.weight, count, done = search_depth_first(
                 self._work, self._open.arrays, self._open.count, self.weight, limits
             )
@@ -135,7 +135,7 @@ class BranchAndBound:
             if count >= 0:
                 assert self._work is not None
                 self.columns = self._work.found[:count].copy()
-            if not self.done and self.nodes < target and not is_over(self.deadline):
+            if not self.done and self.nodes < target and not is_over(self._deadline()):
                 if self._open.count:
                     self._open.grow(self._memory_allows)
                 elif self._least_waiting < min(self._aim, self.weight - self.tolerance):
@@ -151,7 +151,7 @@ class BranchAndBound:
         wait_for_kernels()
         root = self._root
         if self._to_the_end:
-            root = root_with_cuts(self._packing, root.duals, self.weight - self.tolerance, self.deadline)
+            root = root_with_cuts(self._packing, root.duals, self.weight - self.tolerance, self._deadline())
             self._root = root
             self._open = OpenNodes(root)
             self._set_aim()
@@ -206,7 +206,7 @@ class BranchAndBound:
             return False
         cutoff, bound = self.weight - self.tolerance, self._root_bound
         goal = min(bound + _FARTHER * (self._aim - bound), cutoff)
-        leaves = split_on_counts(self._packing, self._root, cutoff, goal, self.deadline)
+        leaves = split_on_counts(self._packing, self._root, cutoff, goal, self._deadline())
         least = min((leaf.bound for leaf in leaves), default=cutoff)
         if least < bound + _RAISED * (goal - bound):
             return False

@@ -44,7 +44,7 @@ class Branching:
             component.duals,
             component.weight,
             component.tolerance,
-            run.deadline(),
+            run.deadline,
             run.memory_allows,
             to_the_end=to_the_end,
             floor=component.proven,

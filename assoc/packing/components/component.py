@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +44,8 @@ class Component(Priced):
         Owner of each row in the best complete cover known.
     weight : float
         Its weight; ``inf`` when none is known.
-    deadline : float
-        Time limit by the kernels' clock (clock.py).
+    run : Run or None
+        The run whose time limit holds.
     refinement : str
         What improves covers (`SearchParameters`).
     proven : float
@@ -60,7 +59,7 @@ class Component(Priced):
     origin: NDArray[np.int64]
     best: Owner | None = None
     weight: float = np.inf
-    deadline: float = np.inf
+    run: Run | None = None
     refinement: str = "full"
     proven: float = -np.inf
     worker: int = 0
@@ -92,9 +91,14 @@ class Component(Priced):
         return min(max(self.bound, self.proven), self.weight)
 
     @property
+    def deadline(self) -> float:
+        """Time limit by the kernels' clock (clock.py), which compiling has moved on."""
+        return np.inf if self.run is None else self.run.deadline()
+
+    @property
     def late(self) -> bool:
         """Whether time is over."""
-        return self.deadline < np.inf and time.monotonic() > self.deadline
+        return self.run is not None and self.run.remaining() < 0.0
 
     @property
     def inserts(self) -> bool:

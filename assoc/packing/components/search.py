@@ -49,13 +49,12 @@ def search_components(
         A component has no complete cover, or none was found.
     """
     # the bound gets only a share of the time: without a solution at the time limit there would be nothing to return
-    share = Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
+    share = run.part(run.rng, run.time_limit and 0.3 * run.time_limit)
     duals = dual_bound(packing, run=share)
     components = split_components(packing, duals, np.arange(packing.num_columns))
-    deadline = run.deadline()
     parts: list[Component] = []
     for component in components:
-        component.deadline, component.refinement = deadline, parameters.refinement
+        component.run, component.refinement = run, parameters.refinement
         component.offer_greedy()
         if not component.closed:
             component.offer_start(run)

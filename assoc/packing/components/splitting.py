@@ -60,7 +60,7 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     rounding = 1e-12 * (sum(abs(one.weight) for one in components) + abs(whole.weight))
     for one in components:
         one.iterations, one.stalled = whole.iterations, whole.stalled
-        one.deadline, one.refinement = whole.deadline, whole.refinement
+        one.run, one.refinement = whole.run, whole.refinement
         one.proven = whole.proven - (whole.weight - one.weight) - rounding
     return components
 

@@ -73,7 +73,8 @@ class Team:
             best = None if component.best is None else component.best.copy()
             member = replace(component, best=best, worker=number, _cluster_search=None, _diver=None)
             # a separate run: the same clock, another generator
-            member_run = Run(rng, time_limit=run.time_limit, started=run.started, reserve=run.reserve)
+            member_run = run.part(rng, run.time_limit)
+            member_run.reserve = run.reserve
             self._members.append((member, make(member, rng), member_run))
 
     def iterate(self) -> None:

@@ -148,11 +148,10 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     if tasks:
         # report what is known before the search of hard components, which may take long
         searches.record(tasks)
-    deadline = run.deadline()
     done: list[_Task] = []
     left: list[_Task] = []
     for task in tasks:
-        task.component.deadline = deadline
+        task.component.run = run
         if task.branch_shortly():
             done.append(task)
         else:

@@ -47,7 +47,7 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     # gaps with another cause, or below the rounding error, cannot be closed so
     if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
         return outcome
-    search = BranchAndBound(packing, dual_bound(packing, run=run), weight, wanted, run.deadline(), run.memory_allows)
+    search = BranchAndBound(packing, dual_bound(packing, run=run), weight, wanted, run.deadline, run.memory_allows)
     most = max(50, _VISITS // packing.num_columns)
     while not search.done and search.nodes < most and not run.should_stop():
         search.run(max(1, 20_000 // packing.num_columns))

@@ -54,7 +54,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     if run.time_limit is not None:
         # computed first: at the time limit it would be too late
         columns = _quick(packing, run)
-        duals = dual_bound(packing, run=Run(run.rng, time_limit=0.3 * run.time_limit, started=run.started))
+        duals = dual_bound(packing, run=run.part(run.rng, 0.3 * run.time_limit))
         bound = certified_bound(packing, duals)
     answer = _solve_in_time(packing, parameters, run)
     if answer.infeasible:
