@@ -1,9 +1,9 @@
 """A clock that kernels can read, so that time limits hold inside kernels.
 
 Kernels that can take longer than some hundredths of a second take a deadline, in seconds of `time.monotonic`
-(``inf``: none), by the name ``deadline`` or in a record's field of that name, and check it regularly: the call that a
-kernel is compiled for gets its deadline later by the time that this took (compiled.py). A late kernel stops at the next point where its result is valid, even if it is
-not the best.
+(``inf``: none), and check it regularly. A late kernel stops at the next point where its result is valid, even if it is
+not the best. It comes by the name ``deadline``, or in a field of that name of a record: the call that a kernel is
+compiled for gets it later by the time that this took (compiled.py).
 """
 
 from __future__ import annotations
