@@ -21,6 +21,7 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc._cli.track.plot_lines import Lines
     from assoc.plotting.live import LivePage
+    from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.tracking import LiveTracker, Picture
 
@@ -38,13 +39,13 @@ def _live(words: list[str]) -> None:
 
     scene = Scene.load(given["file"])
     tracker = _tracker(scene, given, settings)
-    page = _page(scene, given)
+    page = _page(scene, given, heights=len(tracker.positions) > 2)
     lines = Lines(given["udp"]) if given["replay"] is None else None
     if lines is not None and lines.port is not None:
         _say(given, f"plots: udp 127.0.0.1:{lines.port}")
     if given["verbose"]:
         _say(given, ", ".join(f"{name} {value}" for name, value in settings.items()))
-    outputs = _Outputs(given["output"], page, tracker.positions)
+    outputs = _Outputs(given["output"], page, tracker.positions, scene.origin)
     losing = False
 
     def show(pictures: Iterable[Picture]) -> None:
@@ -84,12 +85,12 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
     return tracker
 
 
-def _page(scene: Scene, given: Given) -> LivePage | None:
+def _page(scene: Scene, given: Given, heights: bool) -> LivePage | None:
     if given["page"] is None:
         return None
     from assoc.plotting.live import LivePage
 
-    page = LivePage(scene, given["page"], scene.name)
+    page = LivePage(scene, given["page"], scene.name, heights=heights)
     _say(given, f"page: {page.address}")
     return page
 
@@ -117,7 +118,9 @@ def _take_plots(
 class _Outputs:
     """Outputs of pictures: lines to a file or stdout, and the page if there is one."""
 
-    def __init__(self, path: str | None, page: LivePage | None, positions: Sequence[int]) -> None:
+    def __init__(
+        self, path: str | None, page: LivePage | None, positions: Sequence[int], origin: Origin | None
+    ) -> None:
         from assoc._cli.track.plot_lines import TrackWriter
 
         self._page = page
@@ -126,7 +129,7 @@ class _Outputs:
         if path not in (None, STDOUT):
             self._stream = open(path, "w", encoding="utf-8", newline="\n")
         with self._writing():
-            self._writer = TrackWriter(self._stream, positions)
+            self._writer = TrackWriter(self._stream, positions, origin)
 
     def show(self, picture: Picture) -> None:
         """Write the changes."""

@@ -35,6 +35,7 @@ from assoc._cli.track.options import (
 from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
+from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -290,7 +291,9 @@ def _write_rates(path: str, plots: PlotTracks) -> None:
     lines = ["window,time,plots,ct,mt,it"]
     for number_of, row in zip(plots.rates.windows.tolist(), plots.rates.per_window.tolist(), strict=True):
         cells = ["" if math.isnan(value) else f"{value:.2f}" for value in row]
-        lines.append(f"{number_of + 1},{plots.ends[number_of]:g},{len(plots.windows[number_of])},{','.join(cells)}")
+        lines.append(
+            f"{number_of + 1},{decimals(plots.ends[number_of], 6)},{len(plots.windows[number_of])},{','.join(cells)}"
+        )
     write_text(path, "\n".join(lines) + "\n")
 
 

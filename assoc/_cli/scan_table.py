@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from assoc._cli.lines import print_lines
 from assoc._cli.table import GrowingTable
 from assoc._system.compile_time import compile_seconds
+from assoc._text.times import moment
 
 if TYPE_CHECKING:
     from assoc.tracking import Tracker
@@ -18,7 +19,7 @@ Item = TypeVar("Item")
 
 _SHOWN = 20
 _HEADERS = ("scan", "time", "measurements", "tracks", "tentative", "ms")
-_WIDTHS = {"time": 8, "ms": 8}
+_WIDTHS = {"time": 10, "ms": 8}
 
 
 def with_scan_table(
@@ -47,7 +48,7 @@ def with_scan_table(
             at, sizes = describe(scan)
             reported = [track.reported for track in tracker.tracks]
             measurements = " ".join(map(str, sizes))
-            cells = [str(number), f"{at:g}", measurements, str(sum(reported)), str(reported.count(False))]
+            cells = [str(number), moment(at), measurements, str(sum(reported)), str(reported.count(False))]
             table.add([[*cells, f"{1e3 * spent:.2f}"]])
     if number >= _SHOWN:
         print_lines(f"... and {number + 1 - _SHOWN} more scans")

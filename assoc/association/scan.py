@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._text.shown import Shown
+from assoc._text.times import moment
 from assoc.solution import Solution
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ class ScanAssociation(Shown):
         return content
 
     def __repr__(self) -> str:
-        when = "" if self.time is None else f", t = {self.time:g} s"
+        when = "" if self.time is None else f", t = {moment(self.time)}"
         return (
             f"ScanAssociation({self.scan}{when}: {' + '.join(map(str, self.sizes))} measurements, "
             f"{len(self.targets)} targets, {self.false_alarms} false alarms, {self.solution!r})"

@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._files.output import write_json, write_text
 from assoc._text.plain import printable
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Trajectories, gospa_over_time
@@ -119,7 +120,7 @@ def _kml(tracks: pd.DataFrame) -> str:
         mark = ElementTree.SubElement(document, "Placemark")
         ElementTree.SubElement(mark, "name").text = name
         first, last = rows["time"].iloc[0], rows["time"].iloc[-1]
-        ElementTree.SubElement(mark, "description").text = f"{first:.10g} s to {last:.10g} s, {len(rows)} rows"
+        ElementTree.SubElement(mark, "description").text = f"{moment(first)} to {moment(last)}, {len(rows)} rows"
         owner = ElementTree.SubElement(mark, "MultiGeometry")
         for part in _lines(rows):
             line = ElementTree.SubElement(owner, "LineString" if len(part) > 1 else "Point")

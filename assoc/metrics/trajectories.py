@@ -9,6 +9,7 @@ import numpy as np
 
 from assoc._system.door import doors
 from assoc._text.shown import Shown
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
@@ -94,7 +95,7 @@ class Trajectories(Shown):
         return len(self.times)
 
     def __repr__(self) -> str:
-        span = f", {self.times[0]:g} to {self.times[-1]:g} s" if len(self) else ""
+        span = f", {moment(self.times[0])} to {moment(self.times[-1])}" if len(self) else ""
         return f"Trajectories({len(np.unique(self.ids))} identities, {len(self)} rows{span})"
 
 

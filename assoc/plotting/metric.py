@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.door import door
+from assoc._text.times import UNIX
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import DASHES, colour, marker
@@ -39,13 +40,15 @@ def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None
     """
     ax = axes_or_new(ax, (7.0, 3.5))
     at = np.asarray(times, dtype=np.float64)
+    dated = at.size > 0 and bool(at.min() > UNIX)
+    axis = (1e3 * at).round().astype("datetime64[ms]") if dated else at
     named = values.items() if isinstance(values, Mapping) else [("", values)]
     for number, (label, one) in enumerate(named):
         series = np.asarray(one, dtype=np.float64)
         if series.shape != at.shape or at.ndim != 1:
             raise InvalidInputError(f"values: expected the shape of times, {at.shape}, got {series.shape}")
         ax.plot(
-            at,
+            axis,
             series,
             linestyle=DASHES[number % len(DASHES)],
             color=colour(number),
@@ -55,7 +58,7 @@ def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None
             linewidth=1.4,
             label=label or None,
         )
-    ax.set_xlabel("time (s)")
+    ax.set_xlabel("time (UTC)" if dated else "time (s)")
     ax.set_ylabel(f"{name} ({unit})")
     ax.grid(alpha=0.25, linewidth=0.6)
     legend(ax, bbox_to_anchor=(0.5, -0.2))

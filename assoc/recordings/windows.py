@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._parameters import is_number
 from assoc._system.door import door
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -69,7 +70,7 @@ class Window:
         return len(self.times)
 
     def __repr__(self) -> str:
-        span = f", {self.times[0]:g} to {self.times[-1]:g} s" if len(self) else ""
+        span = f", {moment(self.times[0])} to {moment(self.times[-1])}" if len(self) else ""
         return f"Window({self.number}, {len(self)} plots{span})"
 
 

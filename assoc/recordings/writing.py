@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._files.output import write_text
 from assoc._system.door import door
+from assoc._text.times import decimals
 from assoc._types import Array
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
@@ -33,11 +34,11 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     known = recording.sources is not None
     writer.writerow(["time", "range_nmi", "bearing_deg", "mode3", "altitude_fl", *(["aircraft"] if known else [])])
     columns = [
-        [_short(value, 6) for value in recording.times],
-        [_short(value, 6) for value in recording.ranges / NAUTICAL_MILE],
-        [_short(value, 8) for value in np.degrees(recording.bearings)],
+        [decimals(value, 6) for value in recording.times],
+        [decimals(value, 6) for value in recording.ranges / NAUTICAL_MILE],
+        [decimals(value, 8) for value in np.degrees(recording.bearings)],
         recording.identities.tolist(),
-        ["" if math.isnan(value) else _short(value, 3) for value in recording.altitudes / FLIGHT_LEVEL],
+        ["" if math.isnan(value) else decimals(value, 3) for value in recording.altitudes / FLIGHT_LEVEL],
     ]
     if recording.sources is not None:
         columns.append(recording.sources.tolist())
@@ -60,10 +61,5 @@ def write_tracks(path: str | os.PathLike[str], ids: Array, times: Array, positio
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["track_id", "time", "x", "y", "z", "vx", "vy", "vz"])
     for target, time, position, velocity in zip(ids.tolist(), times, positions, velocities, strict=True):
-        writer.writerow([target, _short(time, 6), *(_short(value, 3) for value in (*position, *velocity))])
+        writer.writerow([target, decimals(time, 6), *(decimals(value, 3) for value in (*position, *velocity))])
     write_text(path, text.getvalue())
-
-
-def _short(value: float, digits: int) -> str:
-    """Text of a number without zeros at its end."""
-    return f"{value:.{digits}f}".rstrip("0").rstrip(".")

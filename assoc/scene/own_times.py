@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array
@@ -42,7 +43,7 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
         what = f"{where} of sensor {s}"
         array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, what, (len(z),))
         if len(array) and array.max() > end:
-            raise InvalidInputError(f"{what} must not be after the scan's time, {end:g} s, got {array.max():g}")
+            raise InvalidInputError(f"{what} must not be after the scan's, {moment(end)}, got {moment(array.max())}")
         result.append(array)
     return tuple(result)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._text.times import moment
 from assoc._types import Array
 
 
@@ -81,4 +82,4 @@ class Scan:
 
     def __repr__(self) -> str:
         sizes = " + ".join(str(len(z)) for z in self.measurements)
-        return f"Scan({self.index}, t = {self.time:g} s, {sizes} measurements)"
+        return f"Scan({self.index}, t = {moment(self.time)}, {sizes} measurements)"

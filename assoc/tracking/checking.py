@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from assoc._parameters import is_number
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors import Sensor
@@ -24,7 +25,7 @@ def checked_time(time: object, last: float | None) -> float:
         raise InvalidInputError(f"time must be a finite number of seconds, got {time!r}")
     when = float(time)  # type: ignore[arg-type]
     if last is not None and when < last:
-        raise InvalidInputError(f"time must not run backwards: got {when:g} s after {last:g} s")
+        raise InvalidInputError(f"time must not run backwards: got {moment(when)} after {moment(last)}")
     return when
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.interrupts import interruptible
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.tracks.own_times import PairEvidence, TimedScan
 from assoc.errors import InvalidInputError, warn
@@ -73,8 +74,8 @@ def advance(settings: TrackerSettings, state: TrackerState, scan: Scan) -> tuple
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         dt = 0.0 if state.time is None else scan.time - state.time
         raise InvalidInputError(
-            f"the scan at {scan.time:g} s, {dt:g} s after the last, leads to numbers out of range ({error}); expected "
-            "seconds, metres and radians"
+            f"the scan at {moment(scan.time)}, {dt:g} s after the last, leads to numbers out of range ({error}); "
+            "expected seconds, metres and radians"
         ) from error
     assert progress.step is not None
     return progress.state._replace(rng=rng_of(settings)), progress.step
@@ -113,7 +114,7 @@ def _checked_stamps(
     for s, array in enumerate(checked):
         if len(array) and array.min() < early:
             raise InvalidInputError(
-                f"times of sensor {s} must lie from the last step's time, {early:g} s, to {when:g} s, "
+                f"times of sensor {s} must lie from the last step's time, {moment(early)}, to {moment(when)}, "
                 f"got {array.min():g}"
             )
     return checked

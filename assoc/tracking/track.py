@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from assoc._text.shown import Shown
+from assoc._text.times import moment
 from assoc._types import Array
 
 
@@ -64,7 +65,7 @@ class Track(Shown):
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)
         kind = "confirmed" if self.confirmed else "tentative"
-        return f"Track({self.track_id}, {kind}, ({place}) m at {self.time:g} s, score {self.score:.4g})"
+        return f"Track({self.track_id}, {kind}, ({place}) m at {moment(self.time)}, score {self.score:.4g})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,7 +92,9 @@ class Decision(Shown):
     def __repr__(self) -> str:
         sizes = " + ".join(str(len(ids)) for ids in self.assigned)
         tracks = len({int(i) for ids in self.assigned for i in ids if i > 0})
-        return f"{type(self).__name__}(scan {self.scan}, t = {self.time:g} s: {sizes} measurements, {tracks} tracks)"
+        return (
+            f"{type(self).__name__}(scan {self.scan}, t = {moment(self.time)}: {sizes} measurements, {tracks} tracks)"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._parameters import checked_time_limit, whole_seed
 from assoc._system.door import doors
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
@@ -264,5 +265,5 @@ class Tracker:
 
     def __repr__(self) -> str:
         state = self.state
-        when = "not started" if state.time is None else f"{state.scan} scans, {state.time:g} s"
+        when = "not started" if state.time is None else f"{state.scan} scans, {moment(state.time)}"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.settings.solver}, {when})"

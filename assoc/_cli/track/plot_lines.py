@@ -12,9 +12,12 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
+from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
+from assoc.exports.maps import COORDINATES, coordinates
 
 if TYPE_CHECKING:
+    from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Picture
@@ -34,7 +37,8 @@ COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "event", "score", "hits", "started", "last_detection",
     "sigma_x", "sigma_y", "sigma_z",
 )  # fmt: skip
-"""Columns of the tracks; an event is new, update or end."""
+"""Columns of the tracks; an event is new, update or end. With an origin those of `assoc.exports.maps` follow."""
+_TIMES = ("time", "started", "last_detection")
 
 
 class Plot(NamedTuple):
@@ -240,10 +244,10 @@ def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
 class TrackWriter:
     """Writes a line of CSV for each track that is new, was detected, or has ended."""
 
-    def __init__(self, stream: IO[str], positions: Sequence[int]) -> None:
-        self._stream, self._positions = stream, list(positions)
+    def __init__(self, stream: IO[str], positions: Sequence[int], origin: Origin | None = None) -> None:
+        self._stream, self._positions, self._origin = stream, list(positions), origin
         self._known: dict[int, Any] = {}
-        stream.write(",".join(COLUMNS) + "\n")
+        stream.write(",".join(COLUMNS if origin is None else (*COLUMNS, *COORDINATES)) + "\n")
         stream.flush()
 
     def write(self, picture: Picture) -> None:
@@ -263,7 +267,16 @@ class TrackWriter:
         sigma = [0.0, 0.0, 0.0]
         for axis, k in enumerate(self._positions):
             sigma[axis] = math.sqrt(max(float(track.covariance[k, k]), 0.0))
-        numbers = [when, *track.position.tolist(), *track.velocity.tolist()]
-        rest = [track.score, track.hits, track.started, track.last_detection, *sigma]
-        row = [track.track_id, *(f"{number:.10g}" for number in numbers), event, *(f"{number:.10g}" for number in rest)]
-        self._stream.write(",".join(map(str, row)) + "\n")
+        state = *track.position.tolist(), *track.velocity.tolist()
+        life = track.score, track.hits, track.started, track.last_detection
+        row = dict(zip(COLUMNS, (track.track_id, when, *state, event, *life, *sigma), strict=True))
+        cells = [
+            decimals(value, 6) if name in _TIMES else f"{value:.10g}" if isinstance(value, float) else str(value)
+            for name, value in row.items()
+        ]
+        if self._origin is not None:
+            latitude, longitude, altitude = coordinates(track.position, self._origin)[0]
+            # a planar track has no height
+            known = f"{altitude:.2f}" if len(self._positions) > 2 else ""
+            cells += [f"{latitude:.8f}", f"{longitude:.8f}", known]
+        self._stream.write(",".join(cells) + "\n")

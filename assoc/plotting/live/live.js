@@ -55,7 +55,7 @@ function draw() {
     const [a, b] = place(x, y), [c, d] = place(x + LEADER * vx, y + LEADER * vy);
     g.beginPath(); g.moveTo(a, b); g.lineTo(c, d); g.stroke();
     g.beginPath(); g.arc(a, b, 4, 0, 2 * Math.PI); g.fill();
-    if (show.labels) { g.fillStyle = ink; g.fillText(id + "  " + Math.round(z) + " m", a + 7, b - 7); }
+    if (show.labels) { g.fillStyle = ink; g.fillText(z === null ? String(id) : id + "  " + Math.round(z) + " m", a + 7, b - 7); }
   }
 }
 
@@ -78,9 +78,14 @@ function take(picture) {
   say(); redraw();
 }
 
+// Unix times as UTC.
+function moment(time) {
+  return time > 1e9 ? new Date(Math.round(1e3 * time)).toISOString().replace("T", " ").replace(/\.?0*Z$/, "Z") : Number(time.toFixed(3)) + " s";
+}
+
 function say(word) {
   const count = plots.length ? plots[0].length : 0;
-  state.textContent = (word ? word + ": " : "") + time.toFixed(1) + " s, " + tracks.length + " tracks, " + count + " plots";
+  state.textContent = (word ? word + ": " : "") + moment(time) + ", " + tracks.length + " tracks, " + count + " plots";
 }
 
 const events = new EventSource("/events");

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from assoc.errors import InvalidInputError
+from assoc.exports.maps import coordinates
 from assoc.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from assoc.tracking import Picture
+    from assoc.tracking import Picture, Track
 
 _FOLDER = Path(__file__).parent
 _FILES = {
@@ -49,6 +50,8 @@ class LivePage:
     port : int
         Port on 127.0.0.1; 0: any free port.
     title : str
+    heights : bool
+        Whether tracks have heights. They are shown above the ellipsoid where the scene has an origin.
 
     Raises
     ------
@@ -56,7 +59,8 @@ class LivePage:
         The port is not available.
     """
 
-    def __init__(self, scene: Scene, port: int = 0, title: str = "") -> None:
+    def __init__(self, scene: Scene, port: int = 0, title: str = "", *, heights: bool = True) -> None:
+        self._origin, self._heights = scene.origin, heights
         first = {
             "title": title,
             "region": scene.region.tolist(),
@@ -89,17 +93,20 @@ class LivePage:
 
     def show(self, picture: Picture) -> None:
         """Push a picture to all connected browsers."""
-        tracks = [
-            [
-                track.track_id,
-                *np.round(track.position, _DIGITS).tolist(),
-                *np.round(track.velocity[:2], _DIGITS).tolist(),
-            ]
-            for track in picture.tracks
-        ]
+        tracks = [self._row(track) for track in picture.tracks]
         plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
         content = {"time": picture.time, "tracks": tracks, "plots": plots, "sensors": picture.sensors.tolist()}
         self._push(_event("picture", content | {"ended": picture.ended}))
+
+    def _row(self, track: Track) -> list[Any]:
+        """Id, x, y, height, vx, vy; with an origin latitude and longitude, too."""
+        x, y, height = track.position.tolist()
+        earth = [] if self._origin is None else coordinates(track.position, self._origin)[0].tolist()
+        if earth:
+            height = earth.pop()
+        known = round(height, _DIGITS) if self._heights else None
+        plane = np.round([x, y, *track.velocity[:2]], _DIGITS).tolist()
+        return [track.track_id, *plane[:2], known, *plane[2:], *(round(angle, 6) for angle in earth)]
 
     def _push(self, event: str) -> None:
         with self._lock:

@@ -8,6 +8,7 @@ from typing import Any
 
 from assoc._system.door import door
 from assoc._text.html import escape, warning_list
+from assoc._text.times import moment
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source, warnings_of
@@ -158,7 +159,7 @@ def _scans_table(scans: Sequence[ScanAssociation], files: Sequence[str], titles:
     timed = any(scan.time is not None for scan in scans)
     known = any(scan.true_tuples is not None for scan in scans)
     ranked = max((len(scan.ranked) for scan in scans), default=0) > 1
-    headers = ["scan", *(["file"] if several else []), *(["time, s"] if timed else []), "measurements", "targets"]
+    headers = ["scan", *(["file"] if several else []), *(["time"] if timed else []), "measurements", "targets"]
     headers += ["false alarms", "cost", "lower bound", "gap", "status", "ms", *(["correct"] if known else [])]
     headers += ["to the second best"] if ranked else []
     rows = []
@@ -166,7 +167,7 @@ def _scans_table(scans: Sequence[ScanAssociation], files: Sequence[str], titles:
         solution, gap = scan.solution, closed_gap(scan)
         row: list[tuple[str, Any]] = [(str(scan.scan), scan.scan)]
         row += [(file, file)] if several else []
-        row += [("" if scan.time is None else f"{scan.time:g}", scan.time)] if timed else []
+        row += [("" if scan.time is None else moment(scan.time), scan.time)] if timed else []
         row += [
             (" + ".join(map(str, scan.sizes)), sum(scan.sizes)),
             (str(len(scan.targets)), len(scan.targets)),

@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._text.html import escape, warning_list
+from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
@@ -258,17 +259,21 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
 
 
 def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
-    columns = [("track", "track", "d"), ("started", "started, s", "g"), ("first", "first row, s", "g")]
-    columns += [("detected", "last detection, s", "g"), ("last", "last row, s", "g"), ("rows", "rows", "d")]
+    columns = [("track", "track", "d"), ("started", "started", "t"), ("first", "first row", "t")]
+    columns += [("detected", "last detection", "t"), ("last", "last row", "t"), ("rows", "rows", "d")]
     columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
     columns += [("heading", "last heading, deg", ".0f"), ("altitude", "last altitude, m", ".0f")]
     columns += [("target", "target followed", "d"), ("share", "share of its rows", ".0%")] if known else []
     used = [column for column in columns if any(life[column[0]] is not None for life in lives) or column[0] == "track"]
     rows = [
-        [("" if life[key] is None else format(life[key], style), life[key]) for key, _, style in used] for life in lives
+        [("" if life[key] is None else _shown(life[key], style), life[key]) for key, _, style in used] for life in lives
     ]
     note = '<p class="note">No track was made.</p>' if not lives else ""
     return note + sortable_table("track-table", [header for _, header, _ in used], rows, link="track")
+
+
+def _shown(value: Any, style: str) -> str:
+    return moment(value) if style == "t" else format(value, style)
 
 
 def _summary(frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float, plots: PlotTracks | None) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from assoc._parameters import positive
 from assoc._system.door import doors
+from assoc._text.times import moment
 from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scene import Scene
@@ -204,7 +205,7 @@ class LiveTracker:
         plot, state = SoundPlot(s, time, z, known), self.state
         # a repetition of a doubted plot does not confirm its time
         if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
-            self.leave_out("repeated", f"{where} repeats a plot of {time:g} s: left out")
+            self.leave_out("repeated", f"{where} repeats a plot of {moment(time)}: left out")
             return []
         return self._timed(plot)
 
@@ -219,11 +220,11 @@ class LiveTracker:
             state.ahead.append(plot)
             return self._jump() if len(state.ahead) >= _AGREE else []
         if time < state.end - settings.interval - settings.horizon:
-            self.leave_out("too old", f"plot of {time:g} s is more than {settings.horizon:g} s late: left out")
+            self.leave_out("too old", f"plot of {moment(time)} is more than {settings.horizon:g} s late: left out")
             state.behind.add(plot.key)
             if len(state.behind) < _AGREE:
                 return []
-            settings.tell(f"the clock went back from {state.newest:g} s to {time:g} s: tracks begin anew")
+            settings.tell(f"the clock went back from {moment(state.newest)} to {moment(time)}: tracks begin anew")
             pictures = self.finish()
             self._restart()
             return [*pictures, *self._timed(plot)]
@@ -268,7 +269,7 @@ class LiveTracker:
         """Accept the plots that were ahead: the clock has jumped."""
         plots, self.state.ahead = self.state.ahead, []
         first = min(plot.time for plot in plots)
-        self.settings.tell(f"the clock jumped from {self.state.newest:g} s to {first:g} s: tracks begin anew")
+        self.settings.tell(f"the clock jumped from {moment(self.state.newest)} to {moment(first)}: tracks begin anew")
         pictures = self._rest()
         self._restart()
         for plot in sorted(plots, key=lambda plot: plot.time):
@@ -280,7 +281,7 @@ class LiveTracker:
         s, time, z, _ = plot
         turn, sensor = self.settings.turn_of(s), self.settings.scene.sensors[s]
         if self.state.antennas[s].silent:
-            self.settings.tell(f"{self.settings.name_of(s)} is back at {time:g} s")
+            self.settings.tell(f"{self.settings.name_of(s)} is back at {moment(time)}")
         azimuth = 0.0 if turn is None else float(z[sensor.components.index("azimuth")])
         self.state.antennas[s] = self.state.antennas[s].after(time, azimuth, turn)
 
@@ -300,7 +301,7 @@ class LiveTracker:
             if antenna.falls_silent(end, None if settings.turns is None else settings.turns[s]):
                 state.antennas[s] = antenna = antenna._replace(silent=True)
                 where = settings.name_of(s)
-                settings.tell(f"{where} has sent nothing since {antenna.last:g} s: it is treated as switched off")
+                settings.tell(f"{where} has sent nothing since {moment(antenna.last)}: it is treated as switched off")
             sectors[s] = antenna.sector(end, interval, turn, len(now) > 0)
         state.pending = [plot for plot in state.pending if plot.time > end]
         begin = clock.perf_counter()
@@ -312,7 +313,7 @@ class LiveTracker:
             if step.refused:
                 self.counts["too old"] += step.refused
         except AssocError as error:
-            self.leave_out("steps failed", f"the plots up to {end:g} s could not be processed: {error}")
+            self.leave_out("steps failed", f"the plots up to {moment(end)} could not be processed: {error}")
         self.seconds.append(clock.perf_counter() - begin)
         too_old = end - settings.horizon - interval
         state.recent = {key: None for key in state.recent if key[1] >= too_old}

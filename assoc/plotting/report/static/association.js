@@ -5,7 +5,7 @@ const scanTable = byId('scan-table');
 const scanLabel = (index) => {
   const scan = data.scans[index];
   const several = data.sources.length > 1 ? `${data.sources[scan.source].title}, ` : '';
-  return `${several}scan ${scan.scan}${scan.time === null ? '' : `, t = ${exact(scan.time)} s`} (${index + 1} of ${data.scans.length})`;
+  return `${several}scan ${scan.scan}${scan.time === null ? '' : `, t = ${moment(scan.time)}`} (${index + 1} of ${data.scans.length})`;
 };
 
 const drawScene = () => {

@@ -26,8 +26,11 @@ const short = (value, digits = 4) => {
   return text.replace('-', '\u2212');
 };
 
-// Times without the digits that binary fractions add.
-const exact = (value) => String(Number(value.toPrecision(9)));
+// A time to the millisecond; from 1e9 s on a Unix time, as UTC.
+const UNIX = 1e9;
+const moment = (time) => (time > UNIX ? new Date(Math.round(1e3 * time)).toISOString().replace('T', ' ').replace(/\.?0*Z$/, 'Z') : `${Number(time.toFixed(3))} s`);
+// Times as plotly's axes take them.
+const onAxis = (times) => (times.length && times[0] > UNIX ? times.map((time) => new Date(1e3 * time).toISOString().slice(0, -1)) : times);
 
 const element = (tag, content, attributes = {}) => {
   const made = document.createElement(tag);

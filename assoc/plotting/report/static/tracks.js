@@ -53,7 +53,7 @@ const present = (path, time) => {
   return count > 0 && (path.t[count - 1] > time - 0.75 * step || (count < path.t.length && path.t[count] - path.t[count - 1] > step)) ? count - 1 : -1;
 };
 
-const trackHover = (track, i) => [`<b>track ${track.id}</b>, t ${exact(track.t[i])} s`,
+const trackHover = (track, i) => [`<b>track ${track.id}</b>, t ${moment(track.t[i])}`,
   ...['x', 'y', 'z'].map((axis) => `${axis} ${short(track[axis][i] * unit.factor, 5)} ${unit.name}`),
   ...(track.lat ? [`${track.lat[i].toFixed(5)}\u00b0, ${track.lon[i].toFixed(5)}\u00b0`] : []),
   ...(track.target ? [`follows ${plain(track.target)}`] : [])].join('<br>');
@@ -109,19 +109,20 @@ const drawTracks = () => {
   byId('detail').textContent = `${live.length} tracks${data.truth.length ? `, ${here.length} targets` : ''} at this time${now.track === null ? '' : `; chosen: track ${data.tracks[now.track].id}`}`;
 };
 
-const marker = () => ({ type: 'line', x0: data.instants[now.index], x1: data.instants[now.index], yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } });
+const marker = (at = onAxis(data.instants)[now.index]) => ({ type: 'line', x0: at, x1: at, yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } });
 
 const overTime = (id, curves, label) => {
-  const layout = layoutOf('time (s)', label, { hovermode: 'closest', shapes: [marker()] });
+  const layout = layoutOf(data.instants[0] > UNIX ? 'time (UTC)' : 'time (s)', label, { hovermode: 'closest', shapes: [marker()] });
   layout.yaxis.rangemode = 'tozero';
   // with many lines, names appear under the pointer: a legend would fill the plot
   layout.showlegend = curves.length <= 12;
-  Plotly.react(id, curves.map(([name, x, y], i) => ({ type: 'scatter', mode: 'lines', name, x, y, line: { color: colourOf(i), dash: dashOf(i), width: 1.8 } })), layout, CONFIG);
+  Plotly.react(id, curves.map(([name, x, y], i) => ({ type: 'scatter', mode: 'lines', name, x: onAxis(x), y, line: { color: colourOf(i), dash: dashOf(i), width: 1.8 } })), layout, CONFIG);
   const plot = byId(id);
   if (!plot.dataset.listens) {
     plot.dataset.listens = 'yes';
     plot.on('plotly_click', (event) => {
-      const time = event.points[0].x;
+      const [{ curveNumber, pointNumber }] = event.points;
+      const time = curves[curveNumber][1][pointNumber];
       const off = data.instants.map((one) => Math.abs(one - time));
       choose(off.indexOf(Math.min(...off)));
     });
@@ -167,7 +168,7 @@ const showTime = (index) => {
 let choose = () => {};
 try {
   if (data.instants.length) {
-    choose = makeSlider(data.instants.length, (i) => `t = ${exact(data.instants[i])} s (${i + 1} of ${data.instants.length})`, showTime);
+    choose = makeSlider(data.instants.length, (i) => `t = ${moment(data.instants[i])} (${i + 1} of ${data.instants.length})`, showTime);
     byId('nearer').addEventListener('click', () => {
       const one = data.tracks[now.track];
       const range = (values) => {
