@@ -34,7 +34,7 @@ from experiments.common.command import main
 
 WORKERS = 2
 GOAL = "goal chosen by us"
-GOALS = {"one process": 1.0, "joblib": 1.0, "dask": 5.0}
+GOALS = {"one process": 1.0, "two processes": 1.0, "dask": 5.0}
 KINDS = {"greedy": Setting("greedy", {}), "ant colony": Setting("aco", {"mode": "paper"})}
 
 

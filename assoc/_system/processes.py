@@ -1,20 +1,20 @@
-"""Work spread over processes: results in order, and no process left after an interruption."""
+"""Work spread over processes of this machine, which all end with this one, however it ends."""
 
 from __future__ import annotations
 
-import multiprocessing
+import functools
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+import traceback
+from collections.abc import Callable, Generator, Iterable, Sequence, Sized
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from itertools import islice
 from typing import Any
 
 from assoc._system import memory, temporary
@@ -23,219 +23,178 @@ from assoc.errors import InvalidInputError, LimitExceededError
 
 # bytes of a process with numpy, scipy, compiled kernels and a small task
 _PROCESS = 100e6
-
-_task: Callable[[Any], Any] | None = None
-_problem = ""
-
-
-def require_processes(jobs: int) -> None:
-    """Refuse more processes than fit into memory."""
-    memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
+# seconds; a waiting main thread hears of a signal that another thread received only when it wakes up
+_POLL = 0.05
+_DIED = "a worker process died: it was killed or ran out of memory; fewer processes take less memory"
 
 
-def not_sent(reason: object) -> InvalidInputError:
-    """Return the error for a task that cannot be sent to other processes, with the reason."""
-    return InvalidInputError(
-        "jobs: other processes can only use functions and classes at the top level of a module that they can import; "
-        f"define your solver or function there ({reason})"
-    )
+def start_python(
+    module: str, *words: str, path: Sequence[str] | None = None, **options: Any
+) -> subprocess.Popen[bytes]:
+    """Start a process that calls ``serve(*words)`` of a module.
+
+    It is written to through its stdin and prints nothing by default. It imports from ``path``; by default that is the
+    path of this process without the current folder.
+    """
+    path = path_without() if path is None else path
+    code = f"import sys; sys.path[:] = {path!r}; from {module} import serve; serve(*sys.argv[1:])"
+    quiet = subprocess.DEVNULL
+    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": quiet, "stderr": quiet}
+    return subprocess.Popen([sys.executable, "-c", code, *words], **(streams | options))
 
 
-def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[Any]:
-    """Yield ``task(item)`` for each item, in order.
+def parallel_map(
+    task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True
+) -> Generator[Any]:
+    """Yield ``task(item)`` for each item.
 
     Parameters
     ----------
     task : callable
-        Sent once to each process, so it may hold data that all items share; must be picklable if jobs > 1.
-    items : sequence
-        Small and picklable.
+        Sent once to each process, so it may hold data that all items share.
+    items : iterable
+        Small. If the results need no order, it is read only as far as the processes need.
     jobs : int
-        Number of processes; 1 works in this process. They are spawned: forking would copy the locks of threads.
+        Number of processes; 1 works in this process.
+    ordered : bool
+        Whether results come in the order of the items, or as they arrive.
 
     Raises
     ------
     LimitExceededError
-        A process died, or memory does not suffice for ``jobs`` processes.
+        A process died or could not start, or memory does not suffice for ``jobs`` processes.
     InvalidInputError
-        The folder for temporary files is full or missing.
+        The task cannot be sent to another process, or its result cannot be sent back.
     """
-    jobs = min(jobs, len(items))
+    if isinstance(items, Sized):
+        jobs = min(jobs, len(items))
     if jobs <= 1:
-        for item in items:
-            yield task(item)
+        yield from map(task, items)
         return
-    require_processes(jobs)
-    before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")
-    path = _written(task)
-    with safe_path():
-        executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path, os.getpid()))
-    # start all at once: the executor miscounts if one dies while it starts another on demand
-    executor._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]
-    try:
-        # signals wait until all are started: a half-started process could not be ended
-        with signals_as_they_are(), safe_path(), ThreadPoolExecutor(1) as starter:
-            waiting = starter.submit(_submit, executor, items).result()
-        for future in waiting:
-            yield future.result()
-    except BrokenProcessPool:
-        # also the processes that the executor had not registered yet
-        _end(before)
-        raise LimitExceededError(
-            "a worker process died: it was killed, ran out of memory, or could not start (a script that uses several "
-            'processes must guard its start by if __name__ == "__main__"); fewer processes take less memory'
-        ) from None
-    except BaseException:
-        # interrupted, or an item failed: the remaining items are not needed and may take long
-        executor.shutdown(wait=False, cancel_futures=True)
-        _end(before)
-        raise
-    finally:
-        executor.shutdown()
-        temporary.remove(path)
+    memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
+    content = _packed(task)
+    workers: list[subprocess.Popen[bytes]] = []
+    idle: queue.SimpleQueue[subprocess.Popen[bytes]] = queue.SimpleQueue()
 
+    def introduce(worker: subprocess.Popen[bytes]) -> None:
+        with suppress(OSError):  # it died, which its first item will find
+            _write(worker.stdin, content)
+        idle.put(worker)
 
-def _submit(executor: ProcessPoolExecutor, items: Sequence[Any]) -> list[Future[Any]]:
-    """Submit all items, which starts the processes."""
-    try:
-        return [executor.submit(_run, item) for item in items]
-    except OSError as error:
-        # the system refused a process; or one died, and the queue was closed while another started
-        raise BrokenProcessPool(str(error)) from error
-
-
-def _end(before: set[multiprocessing.process.BaseProcess]) -> None:
-    """End all processes that were started since; a second signal does ended ones no harm."""
-    for child in set(multiprocessing.active_children()) - before:
-        child.kill()
-
-
-def _written(task: object) -> str:
-    """Write a task into a file that only this user can access.
-
-    If it went through a pipe, a process that died before reading a large task would leave this one blocked for ever.
-    """
-    try:
-        with temporary.lock:
-            handle, path = tempfile.mkstemp(prefix="assoc-task-")
-            temporary.add(path)
+    def ask(item: Any) -> Any:
+        question = _packed(item)
+        worker = idle.get()
         try:
-            with os.fdopen(handle, "wb") as file:
-                pickle.dump(task, file, pickle.HIGHEST_PROTOCOL)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            temporary.remove(path)
-            raise not_sent(error) from None
-        except BaseException:
-            temporary.remove(path)
-            raise
+            _write(worker.stdin, question)
+            answer = pickle.load(worker.stdout)  # type: ignore[arg-type]
+        except (OSError, EOFError, pickle.UnpicklingError):
+            raise LimitExceededError(_DIED) from None
+        finally:
+            idle.put(worker)
+        value, failed = pickle.loads(answer)
+        if failed:
+            raise value
+        return value
+
+    # a thread for each process waits for its answers
+    threads = ThreadPoolExecutor(jobs)
+    running: list[Future[Any]] = []
+    left = iter(items)
+    try:
+        _start(workers, jobs)
+        for worker in workers:
+            threads.submit(introduce, worker)
+        while True:
+            room = None if ordered else 2 * jobs - len(running)
+            running += [threads.submit(ask, item) for item in islice(left, room)]
+            if not running:
+                return
+            done, _ = wait(running[:1] if ordered else running, _POLL, FIRST_COMPLETED)
+            for future in done:
+                running.remove(future)
+                yield future.result()
+    finally:
+        # after an interruption or an error, nobody needs what they still do
+        for worker in workers:
+            worker.kill()
+        threads.shutdown(cancel_futures=True)
+        for worker in workers:
+            worker.communicate()
+
+
+def _start(workers: list[subprocess.Popen[bytes]], jobs: int) -> None:
+    """Start processes that do not receive Ctrl-C, which only this one reports."""
+    held = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if held else ()
+    try:
+        for _ in range(jobs):
+            workers.append(start_python(__name__, path=sys.path, stdout=subprocess.PIPE, stderr=None))
     except OSError as error:
-        raise InvalidInputError(
-            f"the folder for temporary files cannot be written ({error.strerror or error}); several processes need "
-            "it: set TMPDIR to another one, or work with one process"
-        ) from error
-    return path
-
-
-def start_python(module: str, *words: str, **options: Any) -> subprocess.Popen[bytes]:
-    """Start a process that calls ``serve(*words)`` of a module, with the search path for modules of this process.
-
-    It reads lines from its stdin, prints nothing, and never imports from the current folder.
-    """
-    code = f"import sys; sys.path[:] = {path_without()!r}; from {module} import serve; serve(*sys.argv[1:])"
-    quiet = subprocess.DEVNULL
-    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": quiet, "stderr": quiet}
-    return subprocess.Popen([sys.executable, "-c", code, *words], **streams, **options)
-
-
-# any text means yes; this one marks that the package set it, not the user
-_SAFE_PATH, _OWN = "PYTHONSAFEPATH", "assoc"
-_lock = threading.Lock()
-_starting = 0
-
-
-@contextmanager
-def safe_path() -> Iterator[None]:
-    """Keep Python processes that are started within from importing from the current folder.
-
-    Libraries send them the ``sys.path`` of this process only after they have imported some modules.
-    """
-    global _starting
-    with _lock:
-        if not os.environ.get(_SAFE_PATH):
-            os.environ[_SAFE_PATH] = _OWN
-        _starting += 1
-    try:
-        yield
+        raise LimitExceededError(f"jobs: {jobs} processes cannot be started ({error.strerror}); take fewer") from None
     finally:
-        with _lock:
-            _starting -= 1
-            if not _starting:
-                forget_safe_path()
+        if held:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def forget_safe_path() -> None:
-    """Restore the search path for processes that the user's own code starts."""
-    if os.environ.get(_SAFE_PATH) == _OWN:
-        del os.environ[_SAFE_PATH]
+def _packed(content: object) -> bytes:
+    # also functions and classes of a script or a notebook, which other processes cannot import
+    import cloudpickle
 
-
-@contextmanager
-def signals_as_they_are() -> Iterator[None]:
-    """Keep blocked signals blocked: starting processes unblocks Ctrl-C and similar signals."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        return cloudpickle.dumps(content)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InvalidInputError(f"jobs: cannot be sent from one process to another ({error})") from None
 
 
-def end_with_parent(parent: int, *paths: str) -> None:
-    """End this worker process soon after its parent, even if the parent was killed.
-
-    Parameters
-    ----------
-    parent : int
-        Process id of the parent.
-    paths : str
-        Files to remove, which a killed parent cannot remove itself.
-    """
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        for path in paths:
-            with suppress(OSError):
-                os.unlink(path)
-        os._exit(1)
-
-    # a backend's thread in the parent process itself needs no watch
-    if os.getpid() != parent:
-        threading.Thread(target=watch, name="parent", daemon=True).start()
+def _write(pipe: Any, content: bytes) -> None:
+    pickle.dump(content, pipe, pickle.HIGHEST_PROTOCOL)
+    pipe.flush()
 
 
-def _start(path: str, parent: int) -> None:
-    global _task, _problem
-    forget_safe_path()
-    # Ctrl-C reaches the whole group, but only the parent reports it
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def serve() -> None:
+    """Answer the parent: it sends the task, then one item after the other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
-        # programs wait for the signal in a thread and block it, and their processes inherit the block
+        # programs block it, and their processes inherit that
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    end_with_parent(parent, path)
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    # what a task reads or prints must not reach the pipes
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 0)
+    os.dup2(2 if sys.stderr else nowhere, 1)
+    sys.stdout = sys.stderr
+    received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def listen() -> None:
+        with suppress(OSError, EOFError, pickle.UnpicklingError):
+            while True:
+                received.put(pickle.load(questions))
+        # the parent is gone
+        temporary.end_process(1)
+
+    threading.Thread(target=listen, name="parent", daemon=True).start()
+    task = received.get()
+    # until the parent ends this process, or is gone itself
+    with suppress(OSError):
+        while True:
+            _write(answers, _answer(task, received.get()))
+
+
+@functools.cache
+def _loaded(task: bytes) -> Any:
     try:
-        with open(path, "rb") as file:
-            _task = pickle.load(file)
+        return pickle.loads(task)
     except (ImportError, AttributeError) as error:
-        # a worker that died here would give no reason: the first item raises the error instead
-        _problem = str(error)
+        raise InvalidInputError(f"jobs: a function or class cannot be imported by other processes ({error})") from None
 
 
-def _run(item: Any) -> Any:
-    if _problem:
-        raise not_sent(_problem)
-    assert _task is not None
-    return _task(item)
+def _answer(task: bytes, item: bytes) -> bytes:
+    """Return the packed result of an item and False, or an error and True."""
+    try:
+        return _packed((_loaded(task)(pickle.loads(item)), False))
+    except BaseException as error:
+        error.add_note(traceback.format_exc())
+        try:
+            return _packed((error, True))
+        except InvalidInputError as unsent:
+            return _packed((unsent, True))

@@ -39,8 +39,7 @@ def associate(
     time_limit : float, optional
         Seconds for each scan; when they are over the best solution found is taken.
     jobs : int, default 1
-        Number of processes. A script that asks for more than one must guard its own start by
-        ``if __name__ == "__main__"``, because the processes are spawned.
+        Number of processes.
     gating : mapping, optional
         Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``speed``, ``target_density``,
         ``all_tuples``.

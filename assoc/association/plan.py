@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assoc._parameters import whole_seed
 from assoc._system.compile_time import compile_seconds
-from assoc._system.processes import ordered_map
+from assoc._system.processes import parallel_map
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
 from assoc.association.gate_loss import bound_without_gates
@@ -156,7 +156,7 @@ class Plan:
         """Associate scans one after the other, or several at once in processes; results in order."""
         if isinstance(jobs, bool) or not isinstance(jobs, (int, np.integer)) or jobs < 1:
             raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
-        return ordered_map(self, items, int(jobs))
+        return parallel_map(self, items, int(jobs))
 
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""

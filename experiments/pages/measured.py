@@ -145,7 +145,7 @@ def overhead() -> str:
     rows = [
         [f"{kind}, {backend}", *(_judged(r[f"{kind}, {backend}: {part}"], 2) for part in parts)]
         for kind in ("greedy", "ant colony")
-        for backend in ("one process", "joblib", "dask")
+        for backend in ("one process", "two processes", "dask")
     ]
     return table(["ms", *parts], rows)
 

@@ -103,13 +103,10 @@ def test_killed_at_any_moment_it_goes_on(run, long_scene, tmp_path, jobs):
     process.send_signal(signal.SIGKILL)
     process.communicate(timeout=30)
     assert not [*(tmp_path / "temporary").glob("assoc*")]
-    # as if the workers had been killed, too, before they could take it away
-    (tmp_path / "study" / ".job-0").write_bytes(b"")
     kept = len(load(tmp_path / "study"))
     assert 0 < kept < 3200
     short = [*GRID, "ants=60", "--repeats", 1, "-o", "study", "--jobs", jobs]
     done = run("assoc.sweep", long_scene, *short, cwd=tmp_path)
-    assert jobs == 1 or not [*(tmp_path / "study").glob(".job*")]
     assert (done.returncode, done.stderr) == (0, "") and "160 runs in study" in done.stdout
     frame = load(tmp_path / "study")
     assert len(frame[frame["repeat"] == 0]) == 160 and len(frame) >= kept

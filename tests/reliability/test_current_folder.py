@@ -11,7 +11,7 @@ import pytest
 
 from assoc.simulation import simulate
 
-DEPENDENCIES = {"joblib", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy", "shtab"}
+DEPENDENCIES = {"cloudpickle", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy", "shtab"}
 PLANTED = "import os, sys\nos.write(2, b'executed ' + __name__.encode() + b'\\n')\nos._exit(77)\n"
 SWEEP = ["-m", "assoc.sweep", "scene.npz", "--solver", "greedy", "--repeats", "3", "-o", "study", "--jobs", "2"]
 PLAIN = "import assoc\nif __name__ == '__main__':\n    {}\n"
@@ -25,7 +25,7 @@ WAYS = {
     "solve, kernels compiled beside": ["-m", "assoc.solve", "scene.npz"],
     "solve, processes": ["-m", "assoc.solve", "scene.npz", "--solver", "greedy", "--jobs", "2"],
     "the command": [Path(sys.executable).with_name("assoc"), "solve", "scene.npz"],
-    "sweep, joblib": SWEEP,
+    "sweep, processes": SWEEP,
     "library, processes": PLAIN.format(ASSOCIATE),
     "library, kernels compiled ahead": PLAIN.format(AHEAD),
 }

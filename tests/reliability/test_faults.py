@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import resource
 import signal
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ import pytest
 from assoc._files import npz
 from assoc._files.npz import save_npz
 from assoc._files.output import write_atomically
+from assoc._system.processes import parallel_map
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
@@ -141,7 +144,7 @@ def children(pid):
     found = []
     for task in Path(f"/proc/{pid}/task").iterdir():
         found += [int(child) for child in (task / "children").read_text().split()]
-    return [child for child in found if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+    return [child for child in found if b"_system.processes" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
@@ -163,33 +166,40 @@ def test_a_killed_worker_is_one_clear_line(tmp_path):
 
 
 def test_a_worker_that_dies_is_an_error_of_the_library():
-    from assoc._system.processes import ordered_map
-
     with pytest.raises(LimitExceededError, match="worker process died"):
-        list(ordered_map(os._exit, [1, 1], 2))
+        list(parallel_map(os._exit, [1, 1], 2))
 
 
-def test_a_worker_that_dies_while_another_is_started(monkeypatch):
-    """The executor on its own then waits without end, or says that a handle is closed."""
-    from assoc._system import processes
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
+def test_a_worker_that_dies_before_it_has_read_a_large_task():
+    large = partial(operator.getitem, bytes(10**8))
+    killed = []
 
-    class Slow(processes.ProcessPoolExecutor):
-        def _spawn_process(self):
-            if self._processes:
-                os.kill(next(iter(self._processes)), signal.SIGKILL)
-                time.sleep(1.0)
-            super()._spawn_process()
+    def kill():
+        while not killed:
+            for child in children(os.getpid()):
+                os.kill(child, signal.SIGKILL)
+                killed.append(child)
 
-    said = []
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with pytest.raises(LimitExceededError, match="worker process died"):
+        list(parallel_map(large, [1, 2], 2))
+    killer.join()
 
-    def work():
-        try:
-            list(processes.ordered_map(abs, [1, 2], 2))
-        except LimitExceededError as error:
-            said.append(str(error))
 
-    monkeypatch.setattr(processes, "ProcessPoolExecutor", Slow)
-    worker = threading.Thread(target=work, daemon=True)
-    worker.start()
-    worker.join(30.0)
-    assert not worker.is_alive() and "worker process died" in said[0]
+def test_functions_of_a_script_and_what_they_print(tmp_path):
+    """A script needs no guard, and its functions no module; stdout is the script's own."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from assoc._system.processes import parallel_map\n"
+        "print([*parallel_map(lambda item: print('said') or 2 * item, range(5), 2)])\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[0, 2, 4, 6, 8]\n", "said\n" * 5)
+
+
+def test_an_error_comes_back_with_where_it_came_from():
+    with pytest.raises(ZeroDivisionError) as raised:
+        list(parallel_map(partial(operator.floordiv, 1), [1, 0], 2))
+    assert "_answer" in raised.value.__notes__[0]

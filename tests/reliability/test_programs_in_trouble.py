@@ -7,11 +7,15 @@ import os
 import shutil
 import signal
 import subprocess
+import threading
 import time
+from operator import methodcaller
 from pathlib import Path
 
 import pytest
 
+from assoc._system.processes import parallel_map
+from assoc.errors import InvalidInputError
 from assoc.simulation import simulate
 from tests.reliability.test_faults import PYTHON, children
 
@@ -168,24 +172,11 @@ def alive(pid):
         return False
 
 
-def test_no_folder_for_temporary_files(tmp_path, monkeypatch):
-    import tempfile
-
-    from assoc._system.processes import ordered_map
-    from assoc.errors import InvalidInputError
-
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    with pytest.raises(InvalidInputError, match="set TMPDIR to another one, or work with one process"):
-        list(ordered_map(abs, [1, 2], 2))
-
-
-def test_a_task_that_cannot_be_sent_leaves_no_file(tmp_path, monkeypatch):
-    import tempfile
-
-    from assoc._system.processes import ordered_map
-    from assoc.errors import InvalidInputError
-
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with pytest.raises(InvalidInputError, match="top level of a module"):
-        list(ordered_map(lambda item: item, [1, 2], 2))
-    assert os.listdir(tmp_path) == []
+@pytest.mark.parametrize(
+    ("task", "item"),
+    [(threading.Lock().acquire, True), (abs, threading.Lock()), (methodcaller("Lock"), threading)],
+    ids=["task", "item", "result"],
+)
+def test_what_cannot_be_sent_is_one_clear_line(task, item):
+    with pytest.raises(InvalidInputError, match="jobs: cannot be sent from one process to another"):
+        list(parallel_map(task, [item, item], 2))

@@ -183,18 +183,16 @@ def test_ended_in_the_middle_of_writing(tmp_path, name, code, said):
     assert os.listdir(tmp_path) == ["out"] and (tmp_path / "out").read_text() == "old"
 
 
-def test_a_study_goes_on_when_the_disk_has_room_again(disk, monkeypatch):
+def test_a_study_goes_on_when_the_disk_has_room_again(disk):
     from assoc.simulation import simulate
     from assoc.sweeps import Study, grid
-    from assoc.sweeps.backends import local
     from assoc.sweeps.sources import StudySource
 
-    monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.02)
     scene = StudySource(simulate("three-radar", 2, scans=5), "scene")
     study = Study([scene], grid("greedy"), 60)
     (disk / "filler").write_bytes(bytes(200 * 1024 - 5 * 4096))
     with pytest.raises(InvalidInputError, match="No space left on device.*the same command goes on from there"):
-        study.run(disk / "s")
+        study.run(disk / "s", batch_seconds=0.02)
     kept = len(load(disk / "s"))
     (disk / "filler").unlink()
     assert mount("-o", "remount,size=4m", disk)

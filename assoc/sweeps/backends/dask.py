@@ -1,20 +1,18 @@
-"""Batches run by the workers of a dask.distributed scheduler."""
+"""Work spread over the workers of a dask.distributed scheduler."""
 
 from __future__ import annotations
 
 import queue
 import sys
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
 from assoc.errors import AssocError, InvalidInputError
-from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
-SECONDS_OF_A_BATCH = 0.5
 _LOST = "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
 _ATTEMPTS = 5
-_BATCHES_PER_THREAD = 3
+_ITEMS_PER_THREAD = 3
 
 
 def connect(address: str, timeout: float = 10.0) -> Any:
@@ -48,43 +46,28 @@ def _quiet() -> None:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-class DaskWorkers:
-    """The workers of a scheduler, for one job.
+class _Workers:
+    """The workers of a scheduler, for one task."""
 
-    The data that all runs share are sent to every worker once. Workers may come and go: the batches of a lost worker
-    are repeated by another, with the same results, because seeds belong to runs.
-
-    Parameters
-    ----------
-    client : distributed.Client
-    job : Job
-    """
-
-    def __init__(self, client: Any, job: Job) -> None:
+    def __init__(self, client: Any, task: Callable[[Any], Any]) -> None:
         self._client = client
-        self._job = job
+        self._task = task
         self._shared: Any = None
         self._finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._running: dict[Any, tuple[Batch, int]] = {}
+        self._running: dict[Any, tuple[Any, int]] = {}
 
-    def run(self, batches: Iterator[Batch]) -> Iterator[Result]:
-        """Run batches and yield results as they arrive.
-
-        Raises
-        ------
-        InvalidInputError
-            The connection is lost, or workers were lost in several attempts at a batch.
-        """
+    def map(self, items: Iterator[Any]) -> Iterator[Any]:
+        """Yield the results of the items as they arrive."""
         self._wait_for_workers()
         self._share()
         left = True
         while left or self._running:
             while left and len(self._running) < self._room():
-                batch = next(batches, None)
-                if batch is None:
+                item = next(items, None)
+                if item is None:
                     left = False
                 else:
-                    self._submit(batch, 1)
+                    self._submit(item, 1)
             try:
                 future = self._finished.get(timeout=1.0)
             except queue.Empty:
@@ -93,27 +76,27 @@ class DaskWorkers:
             yield from self._results_of(future)
 
     def _room(self) -> int:
-        return _BATCHES_PER_THREAD * max(1, sum(self._client.nthreads().values()))
+        return _ITEMS_PER_THREAD * max(1, sum(self._client.nthreads().values()))
 
     def _share(self) -> None:
-        self._shared = self._client.scatter(self._job, broadcast=True, hash=False)
+        self._shared = self._client.scatter(self._task, broadcast=True, hash=False)
 
-    def _submit(self, batch: Batch, attempt: int) -> None:
-        future = self._client.submit(run_batch, self._shared, batch, pure=False)
-        self._running[future] = batch, attempt
+    def _submit(self, item: Any, attempt: int) -> None:
+        future = self._client.submit(_call, self._shared, item, pure=False)
+        self._running[future] = item, attempt
         future.add_done_callback(self._finished.put)
 
-    def _results_of(self, future: Any) -> Iterator[Result]:
+    def _results_of(self, future: Any) -> Iterator[Any]:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
-        batch, attempt = self._running.pop(future)
+        item, attempt = self._running.pop(future)
         try:
             yield future.result()
         except AssocError:
             raise
         except (FutureCancelledError, KilledWorker) as error:
-            # the workers that held the job are lost, or the batch killed them
+            # the workers that held the task are lost, or the item killed them
             if attempt == _ATTEMPTS:
                 raise InvalidInputError(
                     f"--scheduler: {attempt} attempts at a batch ended with the loss of workers "
@@ -123,7 +106,7 @@ class DaskWorkers:
             self._wait_for_workers()
             if self._shared.status != "finished":
                 self._share()
-            self._submit(batch, attempt + 1)
+            self._submit(item, attempt + 1)
         except Exception as error:
             # for example a worker that cannot import this package
             self._check_scheduler()
@@ -145,17 +128,23 @@ class DaskWorkers:
             time.sleep(0.2)
 
 
-def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator[Result]:
-    """Run batches on the workers of the scheduler at ``address``.
+def _call(task: Callable[[Any], Any], item: Any) -> Any:
+    return task(item)
+
+
+def dask_map(task: Callable[[Any], Any], items: Iterable[Any], address: str) -> Generator[Any]:
+    """Yield ``task(item)`` for each item as results arrive, from the workers of the scheduler at ``address``.
+
+    The task is sent to every worker once. Workers may come and go: the items of a lost worker are repeated by another.
 
     Raises
     ------
     InvalidInputError
-        See `connect` and `DaskWorkers.run`.
+        See `connect`; the connection is lost, or workers were lost in several attempts at an item.
     """
     client = connect(address)
     try:
-        yield from DaskWorkers(client, job).run(batches)
+        yield from _Workers(client, task).map(iter(items))
     except OSError:  # includes timeouts and closed connections
         raise InvalidInputError(_LOST) from None
     finally:
