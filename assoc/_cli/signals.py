@@ -11,7 +11,6 @@ exit code is that of shells: 128 plus the number of the signal.
 from __future__ import annotations
 
 import _thread
-import multiprocessing
 import signal
 import sys
 import threading
@@ -84,20 +83,13 @@ class Interruption:
                 _end_at_the_latest(self.code, f"{self.line()}\n")
             raise KeyboardInterrupt
 
-        def unraisable(problem: Any) -> None:
-            # compilers call Python from places that discard exceptions
-            if self.code and problem.exc_type is KeyboardInterrupt:
-                _thread.interrupt_main()
-            else:
-                sys.__unraisablehook__(problem)
-
         def end(number: int) -> None:
             self.word, self.code = ending[number], 128 + number
             _thread.interrupt_main()
             time.sleep(_CLEAN_UP_SECONDS)
             temporary.end_process(self.code, f"{self.line()}\n")
 
-        sys.unraisablehook = unraisable
+        _if_discarded(lambda: self.code != 0, _thread.interrupt_main)
         # the thread takes one signal: a second one must not interrupt cleaning up
         _wait_for_signals(ending, handler=interrupt, waiter=end)
 
@@ -164,6 +156,7 @@ class EarlyEnd:
             end(number)
             leave(signal.sigwait(ending))
 
+        _if_discarded(lambda: self._working and self._signal != 0, self._interrupt)
         # the handler is for signals that a library unblocks
         _wait_for_signals(ending, handler=end, waiter=wait)
 
@@ -172,12 +165,15 @@ class EarlyEnd:
         while time.monotonic() < last and not is_compiling(_LOADING_SECONDS):
             time.sleep(0.05)
         while self._working:
-            with self._lock:
-                if self._working:
-                    self._insists = True
-                    _thread.interrupt_main()
-            # Python discards exceptions of destructors
+            self._interrupt()
+            # in case that a library has discarded it
             time.sleep(_AGAIN_SECONDS)
+
+    def _interrupt(self) -> None:
+        with self._lock:
+            if self._working:
+                self._insists = True
+                _thread.interrupt_main()
 
     @contextmanager
     def work(self, patience: float) -> Iterator[None]:
@@ -210,8 +206,6 @@ class EarlyEnd:
 
 def _leave(code: int, line: str) -> NoReturn:
     """End the process and its child processes; a compiling thread may not be waited for."""
-    for child in multiprocessing.active_children():
-        child.kill()
     temporary.end_process(code, line)
 
 
@@ -236,6 +230,18 @@ def _end_at_the_latest(code: int, text: str) -> None:
     timer = threading.Timer(_CLEAN_UP_SECONDS, temporary.end_process, (code, text))
     timer.daemon = True
     timer.start()
+
+
+def _if_discarded(interrupted: Callable[[], bool], again: Callable[[], object]) -> None:
+    """Interrupt the main thread again where Python discards the exception: in destructors and callbacks of C."""
+
+    def unraisable(problem: Any) -> None:
+        if problem.exc_type is KeyboardInterrupt and interrupted():
+            again()
+        else:
+            sys.__unraisablehook__(problem)
+
+    sys.unraisablehook = unraisable
 
 
 def _wait_for_signals(

@@ -11,6 +11,7 @@ import pickle
 import queue
 import subprocess
 import threading
+import time
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -19,6 +20,7 @@ from assoc._system import compile_time, interpreted
 from assoc._system.beside import LEAVE, call_beside
 from assoc._system.compiled import is_kept
 
+_POLL = 0.02
 # nice value of the process that compiles what is interpreted meanwhile
 _NICE = 10
 
@@ -60,7 +62,10 @@ def wait_for_kernels() -> None:
     """Wait for the kernels that are compiled ahead: compiling them here as well would take longer."""
     while _under_way:
         with compile_time.loading():
-            _under_way.pop().wait()
+            helper = _under_way.pop()
+            # an endless wait would not end when another thread receives a signal
+            while helper.poll() is None:
+                time.sleep(_POLL)
 
 
 def serve(*call: str) -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from assoc.simulation import simulate
+from assoc.sweeps import load
 
 LIBRARY = "import assoc\nfor scan in range(4):\n    assoc.assign(assoc.build_problem(assoc.load({!r}), scan), {!r})\n"
 WAYS = {
@@ -32,7 +33,8 @@ WAYS = {
     "library, exact": ["-c", LIBRARY.format("ghosts.npz", "exact")],
     "library, warm_up": ["-c", "import assoc\nassoc.warm_up()"],
 }
-OUTPUTS = ("o.json", "t.csv")
+RADAR_SCANS = 12
+OUTPUTS = ("o.json", "t.csv", "study/runs.jsonl")
 # a program that compiles is to end within a second, and the library after a step of the compiler; on a busy machine
 PATIENCE = 120.0
 BUSY = 4.0
@@ -47,7 +49,7 @@ class Trial(NamedTuple):
 
 def folder_of_scenes(folder: Path) -> Path:
     """Write the scenes that all trials use."""
-    simulate("three-radar", 2, scans=12).save(folder / "radars.npz")
+    simulate("three-radar", 2, scans=RADAR_SCANS).save(folder / "radars.npz")
     simulate("bearing-only", 2, targets=12, scans=4).save(folder / "ghosts.npz")
     return folder
 
@@ -67,7 +69,7 @@ def trial(way: str, after: float, scenes: Path) -> Trial:
             process.communicate()
             return Trial("done before" if process.returncode == 0 else "failed before", 0.0)
         process.send_signal(signal.SIGINT)
-        sent = time.monotonic()
+        sent, clock = time.monotonic(), time.time()
         try:
             _, errors = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
@@ -78,12 +80,15 @@ def trial(way: str, after: float, scenes: Path) -> Trial:
         # a helper that is starting ends when it has started
         time.sleep(BUSY)
         left = _end_processes_with(f"{name}/kernels")
-        if process.returncode == 0:
-            return Trial("done before" if seconds < 1.0 else "lost", seconds)
         lines = errors.splitlines()
-        if not lines and any((Path(name) / one).exists() for one in OUTPUTS):
-            # all is written, Python was at its end, and the helper may finish its kernel
-            return Trial("done before", seconds)
+        if not lines and not library:
+            # all was written, Python was at its end, and the helper may finish its kernel
+            written = [path.stat().st_mtime for one in OUTPUTS if (path := Path(name) / one).exists()]
+            whole = way != "sweep" or (written and len(load(f"{name}/study")) == RADAR_SCANS)
+            if written and whole and max(written) < clock:
+                return Trial("done before", seconds)
+        if process.returncode == 0:
+            return Trial("done before" if library and seconds < 1.0 else "exit 0 after the signal", seconds)
         if library:
             # Python itself says 1 where the interrupt came in code that it did not compile from a text
             good = process.returncode in (1, -signal.SIGINT, 130) and lines[-1:] == ["KeyboardInterrupt"]

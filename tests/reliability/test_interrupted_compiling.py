@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import random
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -52,3 +54,60 @@ assert uninterrupted(lambda: 3) == 3
 def test_a_signal_is_heard_at_once_and_work_ends_between_two_steps():
     done = subprocess.run([sys.executable, "-c", COMPILING], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n[False, False]\n", "")
+
+
+SLOW = """
+import sys, time
+from assoc._cli.signals import EarlyEnd, Interruption
+from assoc._system.ahead import compile_ahead, wait_for_kernels
+from assoc._system.compiled import njit
+from assoc._system.in_time import uninterrupted
+
+
+@njit
+def kernel(x):
+    return x
+
+
+def prepare():
+    time.sleep(600)
+
+
+def work():
+    print("at work", flush=True)
+    if sys.argv[2] == "here":
+        uninterrupted(prepare)
+    else:
+        assert compile_ahead(kernel, prepare, anyway=True)
+        wait_for_kernels()
+
+
+if sys.argv[1] == "early end":
+    early = EarlyEnd("slow")
+    early.on_signals()
+    with early.work(0.0):
+        work()
+else:
+    interruption = Interruption("slow")
+    interruption.interrupt_on_signals()
+    with interruption.reported(lambda: None):
+        work()
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+@pytest.mark.parametrize("where", ["here", "in another process"])
+@pytest.mark.parametrize("kind", ["early end", "interruption"])
+def test_programs_do_not_wait_for_the_compiler(kind, where, tmp_path):
+    (tmp_path / "slow.py").write_text(SLOW)
+    code = f"import sys; sys.path.append({str(tmp_path)!r}); import slow"
+    command = [sys.executable, "-c", code, kind, where]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "at work\n"
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=10)
+        finally:
+            process.kill()
+    assert (process.returncode, errors) == (130, "slow: interrupted\n")
