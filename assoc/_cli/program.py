@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from assoc._cli.messages import warnings_as_lines
 from assoc._cli.options import BAD_INPUT
-from assoc._cli.signals import Interruption
+from assoc._cli.signals import Interruption, end_early
 from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
@@ -43,7 +43,10 @@ class Program:
         """Run the program as the whole process; returns its exit code."""
         prepare_streams()
         self.listen()
-        return self.main(arguments)
+        code = self.main(arguments)
+        if code == INTERRUPTED or (self.interruption is not None and self.interruption.code):
+            end_early(code)
+        return code
 
     def main(self, arguments: Sequence[str] | None = None) -> int:
         """Run the program in this process; returns its exit code."""

@@ -21,7 +21,6 @@ from typing import Any, NoReturn
 
 from assoc._system import temporary
 from assoc._system.compile_time import is_compiling
-from assoc._system.in_time import threads_left
 from assoc._system.interrupts import ask_to_end
 
 _CLEAN_UP_SECONDS = 5.0
@@ -109,7 +108,7 @@ class Interruption:
             if not (isinstance(error, KeyboardInterrupt) or self.code):
                 raise
             clean_up()
-            _leave_in_order(self.code or 128 + signal.SIGINT, f"{self.line()}\n")
+            end_early(self.code or 128 + signal.SIGINT, f"{self.line()}\n")
 
 
 class EarlyEnd:
@@ -138,7 +137,7 @@ class EarlyEnd:
         words = {number: f"{self._name}: {word}\n" for number, word in ending.items()}
 
         def leave(number: int) -> None:
-            _leave(128 + number, words[number])
+            temporary.end_process(128 + number, words[number])
 
         def end(number: int, frame: object = None) -> None:
             with self._lock:
@@ -201,25 +200,17 @@ class EarlyEnd:
         """If there was a signal, end the program with its name and with what was kept."""
         if self._signal:
             line = "; ".join(filter(None, [f"{self._name}: {ending_signals()[self._signal]}", kept]))
-            _leave_in_order(128 + self._signal, f"{line}\n")
+            end_early(128 + self._signal, f"{line}\n")
 
 
-def _leave(code: int, line: str) -> NoReturn:
-    """End the process and its child processes; a compiling thread may not be waited for."""
-    temporary.end_process(code, line)
-
-
-def _leave_in_order(code: int, line: str) -> NoReturn:
-    """End the process normally, but wait for no thread that is compiling."""
-    ask_to_end()
+def end_early(code: int, line: str = "") -> NoReturn:
+    """Write what was printed, and end the process: Python would wait for threads, and take compiled code apart."""
     # the reader of the output may have stopped
-    _end_at_the_latest(code, "")
-    with suppress(OSError, ValueError):
-        sys.stdout.flush()
-    if threads_left():
-        _leave(code, line)
-    print(line, end="", file=sys.stderr, flush=True)
-    raise SystemExit(code)
+    _end_at_the_latest(code, line)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    temporary.end_process(code, line)
 
 
 def _end_at_the_latest(code: int, text: str) -> None:

@@ -122,11 +122,6 @@ def _keep_until_exit(thread: threading.Thread) -> None:
     _left[:] = [other for other in _left if other.is_alive()] + [thread]
 
 
-def threads_left() -> bool:
-    """Whether abandoned work is still running."""
-    return any(thread.is_alive() for thread in _left)
-
-
 def _join_at_exit() -> None:
     for thread in _left:
         if thread.is_alive():

@@ -82,6 +82,13 @@ def work():
         wait_for_kernels()
 
 
+class Slow:
+    # as Python's own end, when it takes compiled code apart
+    def __del__(self):
+        prepare()
+
+
+slow = Slow()
 if sys.argv[1] == "early end":
     early = EarlyEnd("slow")
     early.on_signals()
