@@ -70,7 +70,7 @@ def _live(words: list[str]) -> None:
 
 def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracker:
     from assoc.tracking import LiveTracker, Tracker
-    from assoc.tracking.filter_choice import pace_of
+    from assoc.tracking.filter_choice import height_note, pace_of
 
     given["filter"] = given["filter"] or "imm-cv"
     name, turns = given["tracker"] or "multi-sensor", given["turns"]
@@ -82,6 +82,9 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
 
     tracker = LiveTracker(scene, make, turns=turns, tell=_print, **given.some(("interval", "horizon", "wait")))
     tracker.warm_up()
+    note = height_note(scene.sensors, len(tracker.positions))
+    if note is not None:
+        _say(given, note)
     return tracker
 
 

@@ -314,6 +314,8 @@ def _print_rates(plots: PlotTracks, identity: str | None) -> None:
 
 
 def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float) -> None:
+    from assoc.tracking.filter_choice import height_note
+
     tracker, rows = found.tracker, found.table
     _, ids, _ = rows.arrays()
     name = "stdout" if output == STDOUT else printable(output)
@@ -323,6 +325,9 @@ def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
+    note = height_note(tracker.sensors, len(tracker.filter.motion.position))
+    if note is not None:
+        print_lines(note)
 
 
 def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:

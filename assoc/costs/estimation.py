@@ -200,7 +200,7 @@ def _locate(members: Array, middle: Three, half: Three) -> tuple[float, float, f
         full_ones += 1 if tall else 0
         tall_ones += 1 if tall or code == RADAR2D else 0
         located_ones += 1 if code != BEARING else 0
-        slant_ones += 1 if code == RADAR2D else 0
+        slant_ones += 1 if code == RADAR2D and not tall else 0
     full, flat = full_ones > 0, tall_ones == 0
     at = ahead = (0.0, 0.0, 0.0)
     if located_ones == 0:

@@ -84,7 +84,11 @@ def height_start(members: Array, middle: Three, half: Three, all_slant: bool) ->
     """
     least, at = math.inf, (0.0, 0.0, 0.0)
     for m in range(len(members)):
-        if members[m, CODE] != RADAR2D or (all_slant and members[m, MEASURED] > _FAR * half[2]):
+        if (
+            members[m, CODE] != RADAR2D
+            or members[m, FULL] > 0.0
+            or (all_slant and members[m, MEASURED] > _FAR * half[2])
+        ):
             continue
         for height in (members[m, SITE + 2], middle[2] - half[2]):
             there = at_height(members, m, height)

@@ -53,6 +53,8 @@ def places(sensor: Sensor, measurements: Array, heights: Array | float, distance
     if isinstance(sensor, BearingSensor):
         ground, azimuth = np.broadcast_to(np.asarray(distances, dtype=np.float64), (len(z),)), z[:, 0]
     elif isinstance(sensor, Radar2D):
+        if sensor.dim == 3:
+            height = z[:, 2]
         # a height above the slant range gives no ground distance: the target is drawn above the radar
         ground, azimuth = np.sqrt(np.maximum(z[:, 0] ** 2 - (height - sensor.position[2]) ** 2, 0.0)), z[:, 1]
     else:

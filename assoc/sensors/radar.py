@@ -87,25 +87,32 @@ class Radar3D(Sensor):
 class Radar2D(Sensor):
     """A radar that measures slant range (m) and azimuth (rad), and leaves the height open.
 
-    Azimuth is counted from +x towards +y. See `Sensor` for the parameters; the components of `noise` and
-    `field_of_view` are range, azimuth.
+    On request it measures heights (m, the target's z), too, as secondary radars do that ask for Mode C. Azimuth is
+    counted from +x towards +y. See `Sensor` for the parameters; the components of `noise` and `field_of_view` are
+    range, azimuth and, with a third, height.
     """
 
     kind = "radar2d"
-    components = ("range", "azimuth")
-    angular = (False, True)
+    components = ("range", "azimuth", "height")
+    angular = (False, True, False)
+
+    @classmethod
+    def _allowed_dims(cls) -> tuple[int, ...]:
+        return (2, 3)
 
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
-        """Noise-free range, azimuth, shape (n, 2); see `Sensor.measure`."""
-        d = self._places(positions) - self.position
+        """Noise-free range, azimuth (and height), shape (n, d); see `Sensor.measure`."""
+        at = self._places(positions)
+        d = at - self.position
         slant = np.hypot(np.hypot(d[:, 0], d[:, 1]), d[:, 2])
-        return np.stack([slant, np.arctan2(d[:, 1], d[:, 0])], axis=1)
+        return np.stack([slant, np.arctan2(d[:, 1], d[:, 0]), at[:, 2]][: self.dim], axis=1)
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
-        """Derivatives by the position, shape (n, 2, 3); see `Sensor.jacobian`."""
+        """Derivatives by the position, shape (n, d, 3); see `Sensor.jacobian`."""
         d = self._places(positions) - self.position
         ground = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST)
-        result = np.zeros((len(d), 2, 3))
+        result = np.zeros((len(d), self.dim, 3))
+        result[:, 2:, 2] = 1.0
         result[:, 0] = d / np.hypot(ground, d[:, 2])[:, None]
         result[:, 1, 0] = -d[:, 1] / ground**2
         result[:, 1, 1] = d[:, 0] / ground**2

@@ -12,7 +12,7 @@ from assoc import filters
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
-from assoc.sensors import PositionSensor, Radar3D, Sensor
+from assoc.sensors import Radar2D, Sensor
 
 PROCESS_NOISE = 30.0
 """Process noise of filters with one motion model: root of the acceleration's spectral density, m/s^1.5."""
@@ -66,9 +66,42 @@ def manoeuvre_noise(pace: float) -> float:
     return MANOEUVRE_NOISE / math.sqrt(max(pace, 1.0))
 
 
-def planar(sensors: Sequence[Sensor]) -> bool:
-    """Whether no sensor measures heights, so that two-dimensional states suffice."""
-    return not any(isinstance(sensor, (Radar3D, PositionSensor)) and sensor.dim >= 3 for sensor in sensors)
+def measures_heights(sensors: Sequence[Sensor]) -> bool:
+    """Whether any sensor measures heights or elevations."""
+    return any(sensor.dim >= 3 or "elevation" in sensor.components[: sensor.dim] for sensor in sensors)
+
+
+def open_heights(sensors: Sequence[Sensor]) -> bool:
+    """Whether slant ranges depend on heights that no sensor measures."""
+    return not measures_heights(sensors) and any(isinstance(sensor, Radar2D) for sensor in sensors)
+
+
+def planar(sensors: Sequence[Sensor], region: Array | None = None) -> bool:
+    """Whether two-dimensional states suffice.
+
+    A planar state cannot fit slant ranges from several places, or one and other measurements. It suffices where only
+    one place measures slant ranges and nothing is known of heights, or where those of the region (3, 2) change a slant
+    range by less than its noise; and without slant ranges, if no sensor measures heights.
+    """
+    if not open_heights(sensors):
+        return not measures_heights(sensors)
+    if not all(isinstance(sensor, Radar2D) for sensor in sensors) or len({tuple(s.position) for s in sensors}) > 1:
+        return False
+    if region is None:
+        return True
+    reach = max(float(sensor.field_of_view[0, 1]) for sensor in sensors)
+    least = min(float(sensor.covariance[0, 0]) for sensor in sensors)
+    highest = float(np.abs(region[2] - sensors[0].position[2]).max())
+    return math.hypot(reach, highest) - reach < math.sqrt(least)
+
+
+def height_note(sensors: Sequence[Sensor], axes: int) -> str | None:
+    """How tracks in so many dimensions get their heights, a line for people; None where that needs no word."""
+    if not open_heights(sensors):
+        return None
+    if axes < 3:
+        return "heights are not measured: tracks are flat (z = 0), slant ranges are taken for ground ranges"
+    return "heights are not measured: z comes from slant ranges and the region's heights, sigma_z says how well"
 
 
 def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:
@@ -106,7 +139,12 @@ FILTERS = tuple(_MAKERS)
 
 
 def make_filter(
-    name: str, sensors: Sequence[Sensor], process_noise: float | None = None, seed: int = 0, pace: float = 1.0
+    name: str,
+    sensors: Sequence[Sensor],
+    process_noise: float | None = None,
+    seed: int = 0,
+    pace: float = 1.0,
+    region: Array | None = None,
 ) -> Filter[Any]:
     """Make a filter with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
 
@@ -115,7 +153,7 @@ def make_filter(
     name : str
         One of `FILTERS`.
     sensors : sequence of Sensor
-        If none measures heights, states are planar.
+        They decide, with the region, whether states are `planar`.
     process_noise : float, optional
         Root of the acceleration's spectral density, m/s^1.5; for imm-cv that of its manoeuvring model, for imm and
         fuzzy the acceleration, m/s^2. Default: `manoeuvre_noise` of the pace for imm-cv, 30 for all others.
@@ -123,6 +161,8 @@ def make_filter(
         Seed of the ensemble filter's noise.
     pace : float
         Seconds from scan to scan.
+    region : array (3, 2), optional
+        Bounds of x, y, z of the targets, metres.
 
     Raises
     ------
@@ -133,7 +173,7 @@ def make_filter(
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
     if process_noise is None:
         process_noise = manoeuvre_noise(pace) if name == "imm-cv" else PROCESS_NOISE
-    made = _MAKERS[name](process_noise, planar(sensors), seed)
+    made = _MAKERS[name](process_noise, planar(sensors, region), seed)
     for sensor in sensors:
         made.observe(sensor)
     return made

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from assoc._parameters import is_number, is_whole
 from assoc.costs.tracks.scores import ScoreTerms, score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
+from assoc.filters.measurement import LinearMeasurement
 from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.new_tracks import NewTracks
+from assoc.tracking.filter_choice import open_heights
 from assoc.tracking.identity_evidence import IdentityParameters
 from assoc.tracking.life_cycle import LifeCycle
+
+_CLIMB = 0.1
+"""Usual climb of a target as a share of its usual speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +71,10 @@ class TrackerSettings:
         if not isinstance(self.initiation, Initiation):
             raise InvalidInputError(f"initiation must be an Initiation, got {type(self.initiation).__name__}")
         self.initiation.prior(self.filter.motion)  # refuses what does not suit the filter
+        if self.height is not None and isinstance(self.initiation.speed, float):
+            # heights that are hardly observable must not drift: few targets climb as fast as they fly
+            speed = self.initiation.speed
+            object.__setattr__(self, "initiation", replace(self.initiation, speed=(speed, speed, _CLIMB * speed)))
         make_parameters(self.solver, self.solver_parameters)
         if not is_number(self.gate_probability) or not 0 < self.gate_probability < 1:
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {self.gate_probability!r}")
@@ -84,6 +95,18 @@ class TrackerSettings:
     def angles_alone(self) -> bool:
         """Whether no sensor measures distances, so that none starts a track alone."""
         return all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
+
+    @cached_property
+    def height(self) -> LinearMeasurement | None:
+        """The region's heights as a measurement of states, where slant ranges depend on heights that are not measured.
+
+        None elsewhere, and for planar states.
+        """
+        motion = self.filter.motion
+        if len(motion.position) < 3 or not open_heights(self.sensors):
+            return None
+        half = float(np.diff(self.place.region[2])[0]) / 2.0
+        return LinearMeasurement(np.eye(motion.dim)[[motion.position[2]]], np.array([[max(half, 1.0) ** 2]]))
 
     @cached_property
     def sensors(self) -> tuple[Sensor, ...]:

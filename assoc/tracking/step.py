@@ -20,6 +20,7 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import PairEvidence, TimedScan
 from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import predict_each
+from assoc.filters.batches import concatenate
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
@@ -44,6 +45,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         predict,
         associate,
         live,
+        *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_nursery] if nursing else []),
         *([remember_identities] if settings.identity is not None else []),
         excuse,
@@ -193,6 +195,20 @@ def live(progress: Progress) -> Progress:
     """Confirm tracks, report decisions, delete tracks."""
     done: Progress = progress.settings.method.life_cycle(progress, progress.found)
     return done
+
+
+def within_heights(progress: Progress) -> Progress:
+    """Give tracks whose height has become less certain than the region's heights these as a measurement."""
+    settings, tracks = progress.settings, progress.state.tracks
+    height, axis = settings.height, settings.filter.motion.position[2]
+    assert height is not None
+    wide = tracks.states.covariance[:, axis, axis] > height.covariance[0, 0]
+    if not wide.any():
+        return progress
+    middle = np.full((np.count_nonzero(wide), 1), settings.place.region[2].mean())
+    known = settings.filter.update(tracks.states[wide], middle, height).state
+    order = np.argsort(np.argsort(~wide, kind="stable"))
+    return progress.with_state(tracks=tracks.moved(concatenate([known, tracks.states[~wide]])[order]))
 
 
 def remember_identities(progress: Progress) -> Progress:

@@ -16,6 +16,7 @@ CIRCLE = [-math.pi, math.pi]
 MAKERS = {
     "R": lambda place: Radar3D(position=place, noise=[50, 2e-3, 2e-3], field_of_view=[[0, 2e5], CIRCLE, [-0.5, 1.5]]),
     "r": lambda place: Radar2D(position=place, noise=[50, 2e-3], field_of_view=[[0, 2e5], CIRCLE]),
+    "h": lambda place: Radar2D(position=place, noise=[50, 2e-3, 60], field_of_view=[[0, 2e5], CIRCLE, [0, 2e4]]),
     "b": lambda place: BearingSensor(position=place, noise=[5e-3]),
     "P": lambda place: PositionSensor(position=place, noise=[100, 200, 300], field_of_view=REGION),
     "p": lambda place: PositionSensor(position=place, noise=[[1e4, 5e3], [5e3, 2e4]], field_of_view=REGION[:2]),

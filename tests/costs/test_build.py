@@ -49,7 +49,9 @@ def found_candidates(problem):
 
 @pytest.mark.parametrize("brute", [True, False])
 @sample("probability", [0.9, 0.999, 1.0], every=3)
-@pytest.mark.parametrize("kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb"])
+@pytest.mark.parametrize(
+    "kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb", "hhr", "hb"]
+)
 def test_candidates_are_those_of_an_exhaustive_search(kinds, probability, brute, monkeypatch):
     monkeypatch.setattr(pairs, "_BRUTE", 10**9 if brute else -1)
     for seed in range(4):

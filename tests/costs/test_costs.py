@@ -19,7 +19,7 @@ from tests.costs.reference import (
 )
 from tests.sizes import sample
 
-MIXES = ["RRR", "PPP", "ppp", "bbb", "rrr", "RrP", "RPb", "PbP", "pRb", "bbbb", "rrrb"]
+MIXES = ["RRR", "PPP", "ppp", "bbb", "rrr", "RrP", "RPb", "PbP", "pRb", "bbbb", "rrrb", "hhh", "hrb"]
 
 
 @pytest.mark.parametrize("kinds", MIXES)
@@ -43,7 +43,7 @@ def test_costs_are_equation_5_at_the_position_scipy_finds(kinds, seed):
     assert compared >= 3
 
 
-@pytest.mark.parametrize("kinds", ["RRR", "RR", "PPP", "RPb", "RPr"])
+@pytest.mark.parametrize("kinds", ["RRR", "RR", "PPP", "RPb", "RPr", "hh", "RPh"])
 def test_position_and_covariance_are_those_of_the_likelihood(kinds):
     scene, truth = make_scene(kinds, 5, targets=1, false_alarms=0.0)
     one = np.array([[min(1, len(z)) for z in scene.measurements[0]]])

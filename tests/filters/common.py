@@ -16,7 +16,10 @@ RADAR = Radar3D(
 FLAT = Radar2D(position=[100.0, -200.0, 10.0], noise=[30.0, 2e-3], field_of_view=[[0.0, 1e6], CIRCLE])
 BEARING = BearingSensor(position=[100.0, -200.0, 10.0], noise=[2e-3])
 PLACE = PositionSensor(position=np.zeros(3), noise=[50.0, 40.0, 30.0], field_of_view=[[-1e6, 1e6]] * 3)
-SENSORS = [RADAR, FLAT, BEARING, PLACE]
+MODE_C = Radar2D(
+    position=[100.0, -200.0, 10.0], noise=[30.0, 2e-3, 40.0], field_of_view=[[0.0, 1e6], CIRCLE, [0.0, 1e5]]
+)
+SENSORS = [RADAR, FLAT, MODE_C, BEARING, PLACE]
 
 MOTION = ConstantVelocity(2.0)
 

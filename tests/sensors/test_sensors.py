@@ -19,6 +19,7 @@ SENSORS = {
         field_of_view=[[0, 1e5], CIRCLE, [0, 1]],
     ),
     "radar2d": Radar2D(position=[100, -200, 30], noise=[50, 1e-3], field_of_view=[[0, 1e5], CIRCLE]),
+    "height": Radar2D(position=[100, -200, 30], noise=[50, 1e-3, 40], field_of_view=[[0, 1e5], CIRCLE, [0, 1e4]]),
     "bearing": BearingSensor(position=[100, -200, 30], noise=[5e-3]),
     "position": PositionSensor(position=[0, 0, 0], noise=[1, 2, 3], field_of_view=[[-1, 1], [-2, 2], [0, 4]]),
     "plane": PositionSensor(position=[0, 0, 0], noise=[[2, 1], [1, 3]], field_of_view=[[-1, 1], [-2, 2]]),
@@ -94,7 +95,7 @@ def test_volume_and_view_of_a_radar():
 def test_noise_is_standard_deviations_or_a_covariance():
     np.testing.assert_allclose(SENSORS["radar3d"].covariance, np.diag([2500, 1e-6, 4e-6]))
     np.testing.assert_allclose(SENSORS["plane"].covariance, [[2, 1], [1, 3]])
-    assert [s.dim for s in SENSORS.values()] == [3, 2, 1, 3, 2]
+    assert [s.dim for s in SENSORS.values()] == [3, 2, 3, 1, 3, 2]
     # a circle that was turned: rounding leaves other numbers than 0 on both sides of the diagonal
     turned = np.array([[25.0, -3.1e-16], [-7.5e-16, 25.0]])
     assert np.array_equal(dataclasses.replace(SENSORS["plane"], noise=turned).covariance, turned)

@@ -277,6 +277,6 @@ def make_tracker(
     from assoc.tracking.filter_choice import make_filter
 
     parsed.check_use(_OF_TRACKERS, tracker=name)
-    made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace)
+    made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace, region)
     of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
     return KINDS[name](sensors, made, region=region, **settings, **of_tracker)

@@ -158,7 +158,7 @@ def adapt(
         known = ", ".join(kind.__name__ for kind in (*_KNOWN, LinearGaussian))
         raise InvalidInputError(f"measurement model {type(model).__name__} is not known here; known: {known}")
     noise = np.asarray(model.covar(), dtype=np.float64)[np.ix_(order, order)]
-    options["field_of_view"] = _full_view(kind, max_range) if field_of_view is None else field_of_view
+    options["field_of_view"] = _full_view(kind, len(order), max_range) if field_of_view is None else field_of_view
     sensor = kind(noise=noise, **options)
     return AdaptedSensor(model, sensor, order, turn, mapping)
 
@@ -177,7 +177,7 @@ def _place(model: Any) -> tuple[Array, float]:
     return place, float(rotation[2])
 
 
-def _full_view(kind: type[Sensor], max_range: float | None) -> Array | None:
+def _full_view(kind: type[Sensor], dim: int, max_range: float | None) -> Array | None:
     if kind is BearingSensor:
         return None
     if kind is PositionSensor:
@@ -185,4 +185,4 @@ def _full_view(kind: type[Sensor], max_range: float | None) -> Array | None:
     if max_range is None or not math.isfinite(max_range):
         raise InvalidInputError("max_range: expected a finite range in metres (or give field_of_view)")
     view = [(0.0, float(max_range)), (-math.pi, math.pi), (-math.pi / 2, math.pi / 2)]
-    return np.array(view[: len(kind.components)])
+    return np.array(view[:dim])

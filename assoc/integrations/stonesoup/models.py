@@ -80,5 +80,7 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
             raise InvalidInputError("Radar3D: range rate is not handed to Stone Soup; leave the fourth component out")
         return CartesianToElevationBearingRange(**common)
     if isinstance(sensor, Radar2D):
+        if sensor.dim == 3:
+            raise InvalidInputError("Radar2D: heights are not handed to Stone Soup; leave the third component out")
         return CartesianToSlantRangeBearing(**common)
     raise InvalidInputError(f"{type(sensor).__name__}: Stone Soup has no measurement model for this kind of sensor")

@@ -18,6 +18,7 @@ from assoc.sensors.kernels.radar import (
     add_radar3d,
     convert_radar2d,
     convert_radar3d,
+    convert_with_height,
     linearise_radar3d,
     linearise_range_azimuth,
     linearise_range_rate,
@@ -41,6 +42,8 @@ def linearise(code: int, dim: int, position: Array, x: float, y: float, z: float
         linearise_radar3d(dx, dy, dz, h, H)
     else:
         linearise_range_azimuth(dx, dy, dz, h, H)
+        if dim == 3:
+            h[2], H[2, 2] = z, 1.0
 
 
 @njit
@@ -56,6 +59,8 @@ def measure(code: int, dim: int, position: Array, x: float, y: float, z: float, 
     flat = measure_range_azimuth(dx, dy, dz, h)
     if code == RADAR3D:
         h[2] = math.atan2(dz, flat)
+    elif dim == 3:
+        h[2] = z
 
 
 @njit
@@ -145,4 +150,6 @@ def convert_one(
         return convert_position(dim, measured, R, heights[1])
     if code == RADAR3D:
         return convert_radar3d(measured, position, R, reach, least)
+    if dim == 3:
+        return convert_with_height(measured, position, R, reach, least)
     return convert_radar2d(measured, position, R, heights, reach, least)

@@ -120,14 +120,26 @@ def add_radar2d(W: Six, position: Three, measured: Three, at: Three, sums: Infor
     flat = max(flat, 1e-5 * slant, NEAREST)
     r0, r1, r2 = dx / slant, dy / slant, dz / slant
     t0, t1 = -dy / (flat * flat), dx / (flat * flat)
-    w0, w1 = W[0] * v0 + W[1] * v1, W[1] * v0 + W[3] * v1
-    chi += v0 * w0 + v1 * w1
-    g0, g1, g2 = g0 + r0 * w0 + t0 * w1, g1 + r1 * w0 + t1 * w1, g2 + r2 * w0
-    p0, p1, p2 = W[0] * r0 + W[1] * t0, W[0] * r1 + W[1] * t1, W[0] * r2
-    q0, q1, q2 = W[1] * r0 + W[3] * t0, W[1] * r1 + W[3] * t1, W[1] * r2
+    # weights of a height that is not measured are 0
+    v2 = measured[2] - at[2]
+    w0, w1 = W[0] * v0 + W[1] * v1 + W[2] * v2, W[1] * v0 + W[3] * v1 + W[4] * v2
+    w2 = W[2] * v0 + W[4] * v1 + W[5] * v2
+    chi += v0 * w0 + v1 * w1 + v2 * w2
+    g0, g1, g2 = g0 + r0 * w0 + t0 * w1, g1 + r1 * w0 + t1 * w1, g2 + r2 * w0 + w2
+    p0, p1, p2 = W[0] * r0 + W[1] * t0, W[0] * r1 + W[1] * t1, W[0] * r2 + W[2]
+    q0, q1, q2 = W[1] * r0 + W[3] * t0, W[1] * r1 + W[3] * t1, W[1] * r2 + W[4]
     a0, a1, a2 = a0 + r0 * p0 + t0 * q0, a1 + r0 * p1 + t0 * q1, a2 + r0 * p2 + t0 * q2
-    a3, a4, a5 = a3 + r1 * p1 + t1 * q1, a4 + r1 * p2 + t1 * q2, a5 + r2 * p2
+    a3, a4, a5 = a3 + r1 * p1 + t1 * q1, a4 + r1 * p2 + t1 * q2, a5 + r2 * p2 + W[2] * r2 + W[5]
     return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
+
+
+@inner_njit
+def convert_with_height(measured: Three, position: Three, R: Six, reach: float, least: float) -> Converted:
+    """Range, azimuth and height: as without a height, but only heights near the measured one are sought."""
+    slack = math.sqrt(reach * R[5])
+    heights = (measured[2] - slack, measured[2], measured[2] + slack)
+    at, (xx, xy, _, yy, _, _) = convert_radar2d(measured, position, R, heights, reach, least)
+    return at, (xx, xy, 0.0, yy, 0.0, 2.0 * reach * R[5] / least)
 
 
 @inner_njit
