@@ -6,8 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
+import assoc
 from assoc.errors import InfeasibleError
+from assoc.packing.bounds.matched import matched
 from assoc.packing.kernels.matching import match
+from assoc.packing.prepare import prepare
 
 
 def _sparse(matrix, keep):
@@ -92,3 +95,47 @@ def test_parallel_edges():
     assert found.cost == -1.0
     found = match([0, 2, 4], [0, 0, 0, 0], [-1.0, -1.0, -3.0, -2.0], [0.0, 0.0], [0.0])
     assert found.row_edge.tolist() == [-1, 2]
+
+
+@pytest.mark.parametrize("dummy", [True, False])
+@pytest.mark.parametrize("kind", ["sparse", "whole numbers", "wide"])
+def test_two_lists_are_solved_and_proved_by_one_matching(kind, dummy):
+    rng = np.random.default_rng(["sparse", "whole numbers", "wide"].index(kind))
+    n, m = (150, 260) if kind == "wide" else (60, 60)
+    matrix = rng.integers(-4, 5, (n, m)) * 1.0 if kind == "whole numbers" else rng.normal(size=(n, m))
+    keep = (rng.random((n, m)) < (1.0 if kind == "wide" else 0.15)) | np.eye(n, m, dtype=bool)
+    row_slack = np.where(rng.random(n) < 0.5, rng.normal(size=n), 0.0) if dummy else np.full(n, np.inf)
+    column_slack = np.zeros(m)
+    tuples, costs = np.argwhere(keep) + 1, matrix[keep]
+    if dummy:
+        alone = np.stack([np.arange(1, n + 1), np.zeros(n, dtype=int)], axis=1)
+        tuples, costs = np.concatenate([tuples, alone]), np.concatenate([costs, row_slack])
+    elif n == m:
+        column_slack = row_slack
+    answer = assoc.assign(assoc.AssignmentProblem(tuples, costs, (n, m), dummy=dummy), nodes=1, advise=False)
+    assert answer.cost == pytest.approx(_expected(matrix, keep, row_slack, column_slack), abs=1e-8)
+    assert answer.status == "optimal"
+
+
+def test_large_lists_need_no_branching():
+    """Ten candidates each, tied many times: branching took a minute for ten thousand."""
+    rng = np.random.default_rng(7)
+    n = 2000
+    tuples = np.stack([np.repeat(np.arange(n), 10), rng.integers(0, n, 10 * n)], axis=1) + 1
+    problem = assoc.AssignmentProblem(tuples, rng.integers(-9, 3, 10 * n) * 0.1, (n, n))
+    answer = assoc.assign(problem, nodes=1)
+    assert answer.status == "optimal" and answer.iterations == 1
+
+
+def test_what_two_sensors_decide_is_matched():
+    """Three sensors, but no tuple of three: a component whose rows have two sides, or not."""
+    problem = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [0, 2, 1], [2, 2, 0]], [-3.0, -4.0, -3.0, -1.0], (2, 2, 1))
+    assert matched(prepare(problem).packing).weight == -6.0
+    odd = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [-3.0, -4.0, -3.0], (1, 1, 1))
+    assert matched(prepare(odd).packing) is None and assoc.assign(odd).cost == -4.0
+
+
+def test_lists_that_cannot_be_matched():
+    problem = assoc.AssignmentProblem([[1, 1], [2, 1], [3, 2], [3, 3]], [1.0, 1.0, 1.0, 1.0], (3, 3), dummy=False)
+    with pytest.raises(InfeasibleError, match="no choice of tuples"):
+        assoc.assign(problem)

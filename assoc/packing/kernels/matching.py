@@ -30,6 +30,10 @@ from assoc.errors import InfeasibleError
 from assoc.packing.kernels.heap import doubled, pop, push
 
 
+# edges from which a dense problem is searched without a heap
+_MANY = 20_000
+
+
 class Matching(NamedTuple):
     """A two-dimensional assignment and the multipliers that prove it.
 
@@ -132,6 +136,9 @@ def match_sparse(
         if column_slack[j] < np.inf:
             largest = max(largest, abs(column_slack[j]))
     price = 4.0 * largest * (min(n, m) + 1.0) + 1.0
+    if n == m and np.all(row_slack == np.inf):
+        # matching all rows matches all columns: no price, which would take digits from the duals
+        price = 0.0
     base = np.empty(m)
     for j in range(m):
         base[j] = column_slack[j] if column_slack[j] < np.inf else price
@@ -239,13 +246,15 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     tree_distance = np.empty(m + 1)
     heap_key = np.empty(64)
     heap_column = np.empty(64, np.int64)
+    # with many edges a column the nearest one is found faster by looking at all than in a heap
+    scans = indices.size > _MANY and 4 * indices.size > m * (indptr.size - 1)
     edge_row = np.empty(indices.size, np.int64)
     for i in range(indptr.size - 1):
         for k in range(indptr[i], indptr[i + 1]):
             edge_row[k] = i
     for at in range(num_pending):
         start = pending[at]
-        num_reached = 0
+        num_reached, num_closed = 0, 0
         num_tree = 0
         size = 0
         sink_distance, sink_row, sink_column = np.inf, -1, -1
@@ -256,24 +265,39 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
             num_tree += 1
             if d + row_slack[i] - u[i] < sink_distance:
                 sink_distance = d + row_slack[i] - u[i]
-                sink_row = i
+                sink_row, sink_column = i, -1
             for k in range(indptr[i], indptr[i + 1]):
                 j = indices[k]
                 if closed[j]:
                     continue
                 value = d + max(0.0, costs[k] - base[j] - u[i] - v[j])
                 if value < distance[j] and value < sink_distance:
-                    if distance[j] == np.inf:
+                    if distance[j] == np.inf and owner[j] >= 0:
                         reached[num_reached] = j
                         num_reached += 1
-                    distance[j] = value
                     previous[j] = k
+                    if owner[j] < 0:
+                        # a path may end here: nothing farther away counts from now on
+                        sink_distance, sink_column = value, j
+                        continue
+                    distance[j] = value
+                    if scans:
+                        continue
                     if size == heap_key.size:
                         heap_key = doubled(heap_key)
                         heap_column = doubled(heap_column)
                     push(heap_key, heap_column, size, value, j)
                     size += 1
             found = False
+            if num_closed < num_reached and scans:
+                best = num_closed
+                for t in range(num_closed + 1, num_reached):
+                    if distance[reached[t]] < distance[reached[best]]:
+                        best = t
+                j = reached[best]
+                reached[best], reached[num_closed] = reached[num_closed], j
+                d, found = distance[j], True
+                num_closed += 1
             while size > 0:
                 d = heap_key[0]
                 j = heap_column[0]
@@ -285,9 +309,6 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
             if not found or d >= sink_distance:
                 break
             closed[j] = True
-            if owner[j] < 0:
-                sink_distance, sink_column = d, j
-                break
             i = owner[j]
         if sink_distance == np.inf:
             return False

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.bounds.matched import matched
+from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.branching.compiling import compile_branching_ahead
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_component
 from assoc.packing.components.turns import Turns
+from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
@@ -84,12 +87,15 @@ class _Task:
         """Tasks for the parts of the component: in one search the nodes of independent parts would multiply."""
         # branching should start with as few columns as the incumbent allows
         share = 0.9 if self.branching is None and not self._improves else 2 / 3
-        return [_Task(part, self.all) for part in split_component(self.component, share) or ()]
+        parts = split_component(self.component, share) or ()
+        for part in parts:
+            _match(part)
+        return [_Task(part, self.all) for part in parts]
 
     def branch_shortly(self) -> bool:
         """Branch at once; returns whether that closed it: small components mostly close before a better bound would."""
         component, nodes = self.component, min(_SHORT, self.all.nodes_left)
-        if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
+        if _match(component) or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
             return component.closed
         self.branching = Branching(component, self.all.run, to_the_end=False)
         return self._branch(self.branching, nodes) or component.closed
@@ -136,6 +142,9 @@ class _Task:
 
 def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
+    found = _by_matching(packing, run) if packing.num_sensors == 2 else None
+    if found is not None:
+        return found
     if packing.num_columns > _HARD:
         compile_branching_ahead(surely=packing.num_columns > _DENSE * packing.num_rows)
     searches = _Searches(run=run, node_limit=node_limit, patience=patience)
@@ -164,6 +173,30 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     if cut_off and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if searches.out_of_memory else "iterations"
     return searches.outcome(None if components else reduction.proof)
+
+
+def _by_matching(packing: Packing, run: Run) -> Outcome | None:
+    """The answer for two lists; None if rounding leaves a gap that branching may close."""
+    found = matched(packing)
+    if found is None:
+        return None
+    if found.weight == math.inf:
+        raise infeasible(packing)
+    bound = certified_bound(packing, found.duals)
+    if found.weight - bound > TOLERANCE * max(1.0, abs(bound)):
+        return None
+    run.record(1, found.weight, bound)
+    return Outcome(chosen_columns(packing.arrays.cols, found.owner), 1, bound, found.duals)
+
+
+def _match(component: Component) -> bool:
+    """Close a component whose columns join two sides; return whether it is closed."""
+    if not component.closed:
+        found = matched(component.packing)
+        if found is not None and found.weight < math.inf:
+            component.take_over(found.duals)
+            component.offer(found.owner, found.weight)
+    return component.closed
 
 
 def _sharpen(component: Component, run: Run) -> list[Component]:
