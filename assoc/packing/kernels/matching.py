@@ -29,7 +29,6 @@ from assoc._types import Floats, Ints
 from assoc.errors import InfeasibleError
 from assoc.packing.kernels.heap import doubled, pop, push
 
-
 # edges from which a dense problem is searched without a heap
 _MANY = 20_000
 
