@@ -9,7 +9,7 @@ from assoc._system import first_import as _first_import  # noqa: F401
 
 from typing import TYPE_CHECKING
 
-from assoc._system.lazy import lazy_names
+from assoc._system.imports import lazy_names
 from assoc._version import __version__
 from assoc.errors import AssocError, AssocWarning, InfeasibleError, InvalidInputError, LimitExceededError
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from assoc._files.output import STDOUT, is_stream
-from assoc._system.extras import check_extra
+from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
 Kind = Callable[[str, str], Any]

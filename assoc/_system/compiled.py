@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -20,8 +21,9 @@ import numpy as np
 from numba.core import event
 
 from assoc._system import compile_time
-from assoc._system.in_time import end_if_abandoned, uninterrupted
-from assoc._system.interpreted import SMALL, SMALL_SEARCH, compiled_only, first_small, thread
+from assoc._system.helpers import call_beside
+from assoc._system.interpreted import SMALL, compiled_only, first_small, may_use_processes, thread
+from assoc._system.interrupts import end_if_abandoned, uninterrupted
 
 private: Any = None
 with contextlib.suppress(ImportError, AttributeError):
@@ -62,11 +64,6 @@ def njit(
     return kernel
 
 
-def search_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that searches a tree: `njit`, but only calls with very small arrays are interpreted."""
-    return njit(function, small=SMALL_SEARCH)
-
-
 def literal_njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled."""
     return njit(function, literal=True)
@@ -91,6 +88,52 @@ def inner_njit(function: Callable[..., Any]) -> Any:
 def is_kept(kernel: Any) -> bool:
     """Whether compiled code of a kernel, for any types, is in this process, on disk, or shipped with the package."""
     return bool(_CONFIG.DISABLE_JIT or private is None or private.is_kept(kernel))
+
+
+_under_way: list[subprocess.Popen[bytes]] = []
+# kernels known to be compiled: looking for their code takes longer than a small problem
+_kept: set[Any] = set()
+
+
+def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> bool:
+    """Let another process call ``prepare``, if the disk holds no compiled code of a kernel.
+
+    On two cores this halves the wait at the first hard problem after an installation.
+
+    Parameters
+    ----------
+    kernel : Dispatcher
+    prepare : callable
+        A function at the top level of a module, which calls the kernel.
+    anyway : bool
+        Also where this thread interprets nothing, so that all it needs must be compiled.
+
+    Returns
+    -------
+    bool
+        Whether another process was started.
+    """
+    if _under_way or kernel in _kept or not (anyway or may_use_processes()):
+        return False
+    if is_kept(kernel):
+        _kept.add(kernel)
+        return False
+    try:
+        _under_way.append(call_beside(prepare))
+    except OSError:
+        # no process could be started: this one compiles
+        return False
+    return True
+
+
+def wait_for_kernels() -> None:
+    """Wait for the kernels that are compiled ahead: compiling them here as well would take longer."""
+    while _under_way:
+        with compile_time.loading():
+            helper = _under_way.pop()
+            # an endless wait would not end when another thread receives a signal
+            while helper.poll() is None:
+                time.sleep(0.02)
 
 
 def compile_for(kernel: Any, *arguments: Any) -> None:

@@ -20,11 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.beside import beside, has_room
+from assoc._system.helpers import beside, has_room
 
-# total elements of a call's arrays up to which it may be interpreted; and the same for kernels that search a tree,
-# whose work grows faster than their arrays
-SMALL, SMALL_SEARCH = 6000, 4800
+# total elements of a call's arrays up to which it may be interpreted
+SMALL = 6000
 # processor seconds for which a kernel is interpreted, over all calls: about what compiling takes
 PATIENCE = 6.0
 # seconds between two checks whether the kernel is in the cache

@@ -18,7 +18,7 @@ from itertools import islice
 from typing import Any
 
 from assoc._system import memory, temporary
-from assoc._system.first_import import path_without
+from assoc._system.compile_time import announcement
 from assoc.errors import InvalidInputError, LimitExceededError
 
 # bytes of a process with numpy, scipy, compiled kernels and a small task
@@ -28,19 +28,10 @@ _POLL = 0.05
 _DIED = "a worker process died: it was killed or ran out of memory; fewer processes take less memory"
 
 
-def start_python(
-    module: str, *words: str, path: Sequence[str] | None = None, **options: Any
-) -> subprocess.Popen[bytes]:
-    """Start a process that calls ``serve(*words)`` of a module.
-
-    It is written to through its stdin and prints nothing by default. It imports from ``path``; by default that is the
-    path of this process without the current folder.
-    """
-    path = path_without() if path is None else path
-    code = f"import sys; sys.path[:] = {path!r}; from {module} import serve; serve(*sys.argv[1:])"
-    quiet = subprocess.DEVNULL
-    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": quiet, "stderr": quiet}
-    return subprocess.Popen([sys.executable, "-c", code, *words], **(streams | options))
+def start_python(path: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    """Start a process that serves (`serve`), and imports from the folders of ``path`` alone."""
+    code = f"import sys; sys.path[:] = {path!r}; from {__name__} import serve; serve()"
+    return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, **options)
 
 
 def parallel_map(
@@ -128,12 +119,22 @@ def _start(workers: list[subprocess.Popen[bytes]], jobs: int) -> None:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if held else ()
     try:
         for _ in range(jobs):
-            workers.append(start_python(__name__, path=sys.path, stdout=subprocess.PIPE, stderr=None))
+            workers.append(start_python(sys.path, stdout=subprocess.PIPE))
     except OSError as error:
         raise LimitExceededError(f"jobs: {jobs} processes cannot be started ({error.strerror}); take fewer") from None
     finally:
         if held:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def send(process: subprocess.Popen[bytes], content: object) -> None:
+    """Send a process that serves (`serve`) its task, or an item."""
+    _write(process.stdin, _packed(content))
+
+
+def leave(process: subprocess.Popen[bytes]) -> None:
+    """Let a process that serves end after what it was sent."""
+    _write(process.stdin, b"")
 
 
 def _packed(content: object) -> bytes:
@@ -152,7 +153,7 @@ def _write(pipe: Any, content: bytes) -> None:
 
 
 def serve() -> None:
-    """Answer the parent: it sends the task, then one item after the other."""
+    """Answer the parent: it sends a task, then items, each of which the task is called with."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         # programs block it, and their processes inherit that
@@ -166,18 +167,20 @@ def serve() -> None:
     received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def listen() -> None:
-        with suppress(OSError, EOFError, pickle.UnpicklingError):
-            while True:
-                received.put(pickle.load(questions))
-        # the parent is gone
-        temporary.end_process(1)
+        try:
+            while question := pickle.load(questions):
+                received.put(question)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            # the parent ended this process, or is gone itself
+            temporary.end_process(1)
+        received.put(b"")
 
     threading.Thread(target=listen, name="parent", daemon=True).start()
     task = received.get()
-    # until the parent ends this process, or is gone itself
-    with suppress(OSError):
-        while True:
-            _write(answers, _answer(task, received.get()))
+    with announcement.silenced(), suppress(OSError):
+        while item := received.get():
+            _write(answers, _answer(task, item))
+    temporary.end_process(0)
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from assoc._system.lazy import lazy_names
+from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
     from assoc.plotting.convergence import plot_convergence

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._system.extras import load_extra
+from assoc._system.imports import load_extra
 from assoc._types import Array
 
 _KILOMETRES_FROM = 3_000.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from assoc._system.door import door
-from assoc._system.extras import load_extra
+from assoc._system.imports import load_extra
 from assoc.association.association import Association
 from assoc.costs import build_problem
 from assoc.errors import InvalidInputError

@@ -12,7 +12,7 @@ import numpy as np
 
 from assoc._files.output import write_atomically
 from assoc._files.reading import check_regular
-from assoc._system.extras import load_extra
+from assoc._system.imports import load_extra
 from assoc.errors import InvalidInputError
 from assoc.plotting.colours import DASHES, colour
 from assoc.plotting.heat_map import LABELS, cells, colour_limits, draw_cells, is_constant, short_text

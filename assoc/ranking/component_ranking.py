@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit, search_njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.node import (
@@ -258,7 +258,7 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
     return (one, two), NEITHER, True
 
 
-@search_njit
+@njit
 def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store, node_limit: int) -> Any:
     """Search depth first; the number of open nodes, the nodes done, and the arrays of the store.
 
@@ -317,7 +317,7 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
     return num_open, nodes, store.key, store.slot, store.marks, store.columns, store.num
 
 
-@search_njit
+@njit
 def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, wanted: Wanted) -> Any:
     """Enumerate the k lightest solutions of each component of a packing.
 

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, search_njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
@@ -115,7 +115,7 @@ def log_partition(
     return total
 
 
-@search_njit
+@njit
 def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     """Bound ln Z(a) of one component by splitting the part of the largest product first."""
     cols, row_ptr, row_cols, log_weights, _, log_alone, _ = terms

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from assoc._parameters import Parameters
-from assoc._system.lazy import lazy_names
+from assoc._system.imports import lazy_names
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.registry import names, parameters, register
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.ahead import wait_for_kernels
 from assoc._system.compile_time import announcement
+from assoc._system.compiled import wait_for_kernels
 from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from assoc._system.lazy import lazy_names
+from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
     from assoc.sweeps.design import grid, random_settings, settings_from

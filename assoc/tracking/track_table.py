@@ -132,7 +132,7 @@ class TrackTable(Shown):
             pyarrow is not installed.
         """
         from assoc._files.output import write_atomically
-        from assoc._system.extras import check_extra
+        from assoc._system.imports import check_extra
 
         check_extra("pyarrow", "parquet")
         frame = self.to_frame()

@@ -8,13 +8,12 @@ import sys
 
 import pytest
 
-from assoc._system import ahead
+from assoc._system import compiled
 
 _SEARCH = """
 import numpy as np
 import pytest
 
-from assoc._system import ahead
 import assoc
 from numba.core import event
 from assoc._system.interpreted import compiled_only
@@ -42,30 +41,24 @@ def test_it_is_what_a_hard_problem_needs():
 
 
 _AHEAD = """
-import subprocess
-from assoc._system import ahead
+from assoc._system import compiled
 from assoc._system.clock import is_over
 from assoc._system.interpreted import compiled_only
 
 started = []
 
 
-class Process(subprocess.Popen):
-    def __init__(self, words, **options):
-        started.append(words[-2:])
-        super().__init__(words, **options)
-
-
-ahead.subprocess.Popen = Process
+call_beside = compiled.call_beside
+compiled.call_beside = lambda function: started.append(function) or call_beside(function)
 with compiled_only():
-    ahead.compile_ahead(is_over, prepare_clock)
+    compiled.compile_ahead(is_over, prepare_clock)
 assert not started
-ahead.compile_ahead(is_over, prepare_clock)
-assert started == [["prepares", "prepare_clock"]]
-ahead.wait_for_kernels()
+compiled.compile_ahead(is_over, prepare_clock)
+assert started == [prepare_clock]
+compiled.wait_for_kernels()
 assert not is_over.signatures
 # what is on disk now is not compiled once more
-ahead.compile_ahead(is_over, prepare_clock)
+compiled.compile_ahead(is_over, prepare_clock)
 assert len(started) == 1
 assert not is_over(float("inf")) and sum(is_over.stats.cache_hits.values()) == 1
 """
@@ -85,11 +78,11 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
 def test_what_is_compiled_is_looked_for_once(monkeypatch):
     """Searching the cache takes longer than solving most problems."""
     looked = []
-    monkeypatch.setattr(ahead.interpreted, "may_use_processes", lambda: True)
-    monkeypatch.setattr(ahead, "is_kept", lambda kernel: looked.append(kernel) or True)
-    monkeypatch.setattr(ahead, "_kept", set())
+    monkeypatch.setattr(compiled, "may_use_processes", lambda: True)
+    monkeypatch.setattr(compiled, "is_kept", lambda kernel: looked.append(kernel) or True)
+    monkeypatch.setattr(compiled, "_kept", set())
     for _ in range(3):
-        ahead.compile_ahead("a kernel", print)
+        compiled.compile_ahead("a kernel", print)
     assert looked == ["a kernel"]
 
 

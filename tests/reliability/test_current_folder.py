@@ -17,9 +17,9 @@ SWEEP = ["-m", "assoc.sweep", "scene.npz", "--solver", "greedy", "--repeats", "3
 PLAIN = "import assoc\nif __name__ == '__main__':\n    {}\n"
 ASSOCIATE = "print(len(assoc.associate(assoc.load('scene.npz'), jobs=2).scans))"
 AHEAD = (
-    "from assoc._system.ahead import compile_ahead, wait_for_kernels\n    from assoc._system.clock import is_over\n"
+    "from assoc._system.compiled import compile_ahead, wait_for_kernels\n    from assoc._system.clock import is_over\n"
     "    from assoc._system.compile_time import compile_seconds\n    assert compile_ahead(is_over, compile_seconds)\n"
-    "    from assoc._system import ahead\n    assert ahead._under_way[0].wait() == 0"
+    "    from assoc._system import compiled\n    assert compiled._under_way[0].wait() == 0"
 )
 WAYS = {
     "solve, kernels compiled beside": ["-m", "assoc.solve", "scene.npz"],

@@ -8,11 +8,11 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import assoc
-from assoc._system import ahead
-from assoc._system.processes import start_python
+from assoc._system.helpers import _Beside
 from assoc.simulation import simulate
 from tests.sizes import sample
 
@@ -125,7 +125,9 @@ def doubtful_calls(function: ast.FunctionDef) -> list[str]:
 @pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no priorities on this system")
 def test_the_process_beside_leaves_the_cores_to_the_program():
     """In a session of its own it would get an equal share, whatever its nice value (sched(7), autogroups)."""
-    process = start_python(ahead.__name__, process_group=0)
+    beside = _Beside()
+    beside.ask("assoc._system.clock", "is_over", (numba.float64,))
+    process = beside._process
     try:
         assert os.getsid(process.pid) == os.getsid(0)
         # Ctrl-C is for the group of the program

@@ -28,7 +28,7 @@ def test_it_ends_as_it_should(way, tmp_path):
 
 COMPILING = """
 import atexit, os, signal, threading
-from assoc._system.in_time import end_if_abandoned, uninterrupted
+from assoc._system.interrupts import end_if_abandoned, uninterrupted
 
 steps = []
 
@@ -59,9 +59,9 @@ def test_a_signal_is_heard_at_once_and_work_ends_between_two_steps():
 SLOW = """
 import sys, time
 from assoc._cli.signals import EarlyEnd, Interruption
-from assoc._system.ahead import compile_ahead, wait_for_kernels
+from assoc._system.compiled import compile_ahead, wait_for_kernels
 from assoc._system.compiled import njit
-from assoc._system.in_time import uninterrupted
+from assoc._system.interrupts import uninterrupted
 
 
 @njit

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from assoc._cli.options import COMMON, Given, Option, Parser, read_config, verbosity
 from assoc._cli.program import command
 from assoc._cli.values import OneOf, csv_table, html_page, scan_range, whole
-from assoc._system.extras import check_extra
+from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from assoc._files import reading
-from assoc._system.extras import check_extra, load_extra
+from assoc._system.imports import check_extra, load_extra
 
 EDITIONS = {21: "Cat_021_2_7", 34: "Cat_034_1_29", 48: "Cat_048_1_32", 62: "Cat_062_1_21"}
 """Editions by category; earlier ones of the same numbering decode alike."""

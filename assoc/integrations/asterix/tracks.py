@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._system.door import door
-from assoc._system.extras import check_extra
+from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
 from assoc.integrations.asterix.reading import Source, SourceRows

@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc._files.output import write_atomically
 from assoc._system.door import door
-from assoc._system.extras import check_extra
+from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import edition
 from assoc.integrations.asterix.reading import ANGLE_STEP, LEVEL_STEP, RANGE_STEP, SECOND, Source

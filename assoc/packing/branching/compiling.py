@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assoc._system.ahead import compile_ahead
-from assoc._system.compiled import compile_for
+from assoc._system.compiled import compile_ahead, compile_for
 from assoc._system.interpreted import interpreted_only
 from assoc.packing.branching.depth_first import search_depth_first
 from assoc.packing.branching.node import new_work

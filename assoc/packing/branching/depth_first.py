@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, search_njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.packing.branching.node import Work, allowed_at, branch, drop, keep_side, open_node, relax
 from assoc.packing.branching.open_nodes import Stack, has_room
 from assoc.packing.branching.pairs import NEITHER, TOGETHER, WHOLE, any_open_pair, decide, doubtful_pairs
@@ -87,7 +87,7 @@ def _by_values(work: Work, allowed: Allowed) -> bool:
     return whole
 
 
-@search_njit
+@njit
 def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float, limits: Limits) -> Any:
     """Search depth first; the number of open nodes, the incumbent's weight and number of columns, the nodes done.
 

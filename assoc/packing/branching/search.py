@@ -20,8 +20,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.ahead import wait_for_kernels
 from assoc._system.clock import is_over
+from assoc._system.compiled import wait_for_kernels
 from assoc._types import Floats
 from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first

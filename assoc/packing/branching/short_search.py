@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.ahead import wait_for_kernels
+from assoc._system.compiled import wait_for_kernels
 from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.node import new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit, search_njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
@@ -210,7 +210,7 @@ def _grow(
     return num
 
 
-@search_njit
+@njit
 def _search_clusters(
     packing: PackingArrays, by_row: Ints, prices: Prices, owner: Ints, rng: Any, effort: _Effort, deadline: float
 ) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from assoc._system.extras import check_extra, load_extra
+from assoc._system.imports import check_extra, load_extra
 
 # licences are not changed; XML namespaces only look like addresses
 _ADDRESS = re.compile(r"(/\*!.{0,3000}?\*/)|\b(?:https?|wss?)://(?!www\.w3\.org/)(?=[\w{])[^\s\"'`<>\\)/]*", re.DOTALL)

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
@@ -198,7 +198,7 @@ def _root(graph: Graph, nodes: Nodes, queues: Queues) -> bool:
     return True
 
 
-@search_njit
+@njit
 def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: int) -> None:
     """Take open children by cost or bound; stop when arrays are full or the evaluations are used up."""
     num_rows = graph.row_alone.size

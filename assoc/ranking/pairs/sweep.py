@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import njit
 from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.ranking.pairs.graph import PairGraph
@@ -140,7 +140,7 @@ def _closed(members: Ints, v: int, steps: Ints, count: int, work: Work) -> int:
     return count + 1
 
 
-@search_njit
+@njit
 def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats) -> None:
     """Do a planned sweep forwards and backwards: fill in the probabilities of its edges.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.reading import check_unpacked, open_input
-from assoc._system.extras import check_extra
+from assoc._system.imports import check_extra
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.reading import MOST_PLOTS

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compile_time import loading
-from assoc._system.in_time import StopSignal
+from assoc._system.interrupts import StopSignal
 from assoc.packing.packing import Packing
 from assoc.solvers.milp.answer import Answer, most_columns, solution_or_none
 from assoc.solvers.milp.parameters import MilpParameters

@@ -21,7 +21,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.in_time import StopSignal, in_time
+from assoc._system.interrupts import StopSignal, in_time
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.kernels.sorting import ascending

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
@@ -24,7 +24,7 @@ VISITS = 20_000
 """Limit on branches visited in a group; less than a millisecond."""
 
 
-@search_njit
+@njit
 def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int) -> Any:
     """Find the branches of the best global hypothesis.
 
@@ -135,7 +135,7 @@ def _left_over(
     return total
 
 
-@search_njit
+@njit
 def _search(
     trees: NDArray[np.int64],
     good: NDArray[np.int64],

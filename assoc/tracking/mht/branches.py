@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import njit
 from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
@@ -111,7 +111,7 @@ class _Limits(NamedTuple):
     visits: int
 
 
-@search_njit
+@njit
 def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
     """Grow all branches and prune them; also return what is needed to prune them again."""
     numbers, counts, history, born = tables

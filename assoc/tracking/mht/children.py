@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import search_njit
+from assoc._system.compiled import njit
 from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
@@ -81,7 +81,7 @@ class _Work(NamedTuple):
     taken: NDArray[np.bool_]
 
 
-@search_njit
+@njit
 def next_hypotheses(
     holds: NDArray[np.bool_], weight: Floats, missed: Floats, meanings: Meanings, most: int, drop: float
 ) -> Any:
@@ -131,7 +131,7 @@ def next_hypotheses(
     return used[:size], found, after - after[0]
 
 
-@search_njit
+@njit
 def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
     """Rank the children of all parents.
 
@@ -200,7 +200,7 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
     return nodes.parent[found], nodes.choice[found], -nodes.cost[found]
 
 
-@search_njit
+@njit
 def _room(tracks: int, count: int, pairs: int) -> Any:
     return _Work(
         np.zeros(count + 1, np.int64), np.empty(pairs + count, np.int64), np.empty(pairs + count),
@@ -209,7 +209,7 @@ def _room(tracks: int, count: int, pairs: int) -> Any:
     )  # fmt: skip
 
 
-@search_njit
+@njit
 def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
     """Lower bound on the cost of a parent's best child: each measurement takes its best choice."""
     cost = -parents.weight[h]
@@ -222,7 +222,7 @@ def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
     return cost
 
 
-@search_njit
+@njit
 def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
     """Find the best child of a node, and lower bounds on the cost of changing it; infinite where there is none."""
     first, track, gain, birth = meanings

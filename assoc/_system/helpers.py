@@ -1,4 +1,4 @@
-"""Background processes that compile kernels while this process goes on.
+"""Processes that compile kernels while this one goes on.
 
 They end at once when a signal ends this process. When it ends normally they first finish the kernel that they are
 compiling, for the next process.
@@ -7,22 +7,23 @@ compiling, for the next process.
 from __future__ import annotations
 
 import atexit
-import base64
 import functools
+import operator
 import os
-import pickle
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
+from assoc._system.first_import import path_without
 from assoc._system.interrupts import end_is_asked
-from assoc._system.processes import start_python
+from assoc._system.processes import leave, send, start_python
 
-LEAVE = b"leave\n"
-# module of these processes, by name: it imports interpreted.py, which imports this module
-_SERVE = "assoc._system.ahead"
+# nice value of the process that compiles what is interpreted meanwhile
+_NICE = 10
 
 
 @functools.cache
@@ -31,10 +32,21 @@ def has_room() -> bool:
     return (os.cpu_count() or 1) > 1
 
 
-def call_beside(module: str, name: str) -> subprocess.Popen[bytes]:
+def call_beside(function: Callable[[], object]) -> subprocess.Popen[bytes]:
     """Start a process that calls a function and ends."""
     # a session of its own: Ctrl-C goes to this program alone, and this program ends the process
-    return start_python(_SERVE, module, name, start_new_session=True)
+    process = _start(start_new_session=True)
+    send(process, function)
+    leave(process)
+    return process
+
+
+def _start(**options: Any) -> subprocess.Popen[bytes]:
+    """Start a process that calls the functions that it is sent and interprets nothing."""
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = start_python(path_without(), env=os.environ | {"ASSOC_INTERPRET": "0"}, **quiet, **options)
+    send(process, operator.call)
+    return process
 
 
 class _Beside:
@@ -59,8 +71,10 @@ class _Beside:
                 if self._process is None:
                     # a process group of its own shields it from Ctrl-C; in a session of its own it would get an
                     # equal share of the cores whatever its nice value (sched(7), autogroups)
-                    self._process = start_python(_SERVE, process_group=0)
-                self._write(base64.b64encode(pickle.dumps((module, name, kinds))) + b"\n")
+                    self._process = _start(process_group=0)
+                    if hasattr(os, "nice"):
+                        send(self._process, functools.partial(os.nice, _NICE))
+                send(self._process, functools.partial(compile_kernel, module, name, kinds))
             except (OSError, ValueError):
                 # the process died or could not start: this process compiles the kernel after `PATIENCE`
                 self._process = None
@@ -70,12 +84,12 @@ class _Beside:
         interrupted = end_is_asked() or getattr(sys, "last_type", None) is KeyboardInterrupt
         if self._process is not None and self._owner == os.getpid() and not interrupted:
             with suppress(OSError, ValueError):
-                self._write(LEAVE)
+                leave(self._process)
 
-    def _write(self, line: bytes) -> None:
-        assert self._process is not None and self._process.stdin is not None
-        self._process.stdin.write(line)
-        self._process.stdin.flush()
+
+def compile_kernel(module: str, name: str, kinds: Any) -> None:
+    """Compile a kernel for argument types."""
+    getattr(import_module(module), name).compile(kinds)
 
 
 beside = _Beside()

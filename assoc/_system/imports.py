@@ -1,11 +1,15 @@
-"""Public names of a package that are loaded on first use (PEP 562), so that importing the package is quick."""
+"""Imports on first use: public names of packages (PEP 562), so that importing them is quick, and optional packages."""
 
 from __future__ import annotations
 
 import importlib
 import sys
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from types import ModuleType
 from typing import Any
+
+from assoc.errors import MissingExtraError
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -39,3 +43,32 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
         return sorted({*homes, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
 
     return load, names
+
+
+def check_extra(package: str, extra: str) -> None:
+    """Raise at once, without importing anything, if an optional package is missing.
+
+    Parameters
+    ----------
+    package : str
+        Name of the top-level package.
+    extra : str
+        The extra of assoc that installs it.
+
+    Raises
+    ------
+    MissingExtraError
+        An ImportError; its message names the command.
+    """
+    try:
+        found = find_spec(package) is not None
+    except (ImportError, ValueError):  # ValueError: sys.modules holds None
+        found = False
+    if not found:
+        raise MissingExtraError(f"{package} is not installed: python -m pip install 'assoc[{extra}]'")
+
+
+def load_extra(module: str, extra: str) -> ModuleType:
+    """Import a module of an optional package, or raise as `check_extra` does."""
+    check_extra(module.partition(".")[0], extra)
+    return importlib.import_module(module)
