@@ -1,0 +1,484 @@
+"""Tracks of several systems as one picture.
+
+Each system sends tracks, no measurements. Which tracks are of one target is an S-D assignment problem: a tuple has at
+most one track of each system, and list 0 holds the fused tracks of the last step. With states x_s of covariances P_s,
+a density b of targets and a probability P that a system has a track of a target, k tracks of one target weigh, against
+k targets that one system each has,
+
+    integral over x of the product of N(x_s; x, P_s)  /  (b (1 - P)^S)^(k - 1).
+
+A track that was in a fused track before stays there with additional log odds, so that ids are kept.
+
+The errors of the tracks of one target depend on each other in an unknown way: all systems follow the same manoeuvres.
+Covariance intersection, P^-1 = sum of w_s P_s^-1 with weights w_s that sum to 1, is never too sure, whatever the
+dependence. The weights minimise the determinant of P.
+
+References
+----------
+S. Julier, J. Uhlmann, A non-divergent estimation algorithm in the presence of unknown correlations, ACC 1997.
+Y. Bar-Shalom, H. Chen, Multisensor track-to-track association for tracks with dependent errors, CDC 2004.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from assoc._parameters import positive
+from assoc._system.door import door, doors
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.filters.motion.models import Motion
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+from assoc.solvers.assign import assign
+from assoc.tracking.births.initiation import velocity_components
+from assoc.tracking.track import Track
+from assoc.tracking.track_table import TrackTable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_OPEN_HEIGHT, _OPEN_VELOCITY = 5e3, 200.0
+"""Standard deviations of a height and of velocities that a system does not tell, metres and m/s."""
+_LEAST_BOX = 1e4
+"""Least side of the box of all tracks from which a density of targets is estimated, metres."""
+_ROUNDS = 20
+"""Steps of the search for the weights of an intersection."""
+_CSV = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz")
+
+
+class SystemTracks(NamedTuple):
+    """The n tracks of one system at one time: positions and velocities."""
+
+    ids: Array
+    """Whole numbers above 0, (n,)."""
+    mean: Array
+    """x, y, z, vx, vy, vz; metres, m/s, (n, 6)."""
+    covariance: Array
+    """(n, 6, 6)."""
+    existence: Array
+    """Probability that there is a target, (n,)."""
+
+    @staticmethod
+    def of(tracks: Iterable[Track], motion: Motion) -> SystemTracks:
+        """Those of a tracker, whose filter has this motion model."""
+        tracks = list(tracks)
+        own = np.concatenate([np.array(motion.position), velocity_components(motion)]).astype(np.int64)
+        axes = len(motion.position)
+        place = np.concatenate([np.arange(axes), 3 + np.arange(len(own) - axes)])
+        mean, covariance = _open(len(tracks))
+        for row, track in enumerate(tracks):
+            mean[row, place] = track.mean[own]
+            covariance[row, place[:, None], place] = track.covariance[own[:, None], own]
+        ids, existence = [track.track_id for track in tracks], [track.existence for track in tracks]
+        return SystemTracks(np.array(ids, dtype=np.int64), mean, covariance, np.array(existence, dtype=np.float64))
+
+    @staticmethod
+    def of_rows(rows: pd.DataFrame, sigma: float, sigma_velocity: float) -> SystemTracks:
+        """Those of rows of a table; values that are missing are open, standard deviations that are missing as given."""
+        mean, covariance = _open(len(rows))
+        values = rows[list(_CSV[2:])].to_numpy(dtype=np.float64)
+        sigmas = np.full(values.shape, sigma_velocity)
+        sigmas[:, :3] = rows.reindex(columns=["sigma_x", "sigma_y", "sigma_z"]).fillna(sigma).to_numpy(dtype=np.float64)
+        known = np.isfinite(values) & (sigmas > 0.0)
+        known[:, 5] &= known[:, 2]
+        mean[known] = values[known]
+        diagonal = np.einsum("nii->ni", covariance)
+        diagonal[known] = sigmas[known] ** 2
+        existence = rows["existence"] if "existence" in rows else np.ones(len(rows))
+        return SystemTracks(rows["track_id"].to_numpy(dtype=np.int64), mean, covariance, np.asarray(existence, float))
+
+    def moved(self, seconds: float | Array, noise: float) -> SystemTracks:
+        """The tracks so many seconds later, with constant velocity and accelerations of this spectral density."""
+        dt = np.broadcast_to(np.asarray(seconds, dtype=np.float64), (len(self.ids),))
+        if not dt.any():
+            return self
+        F, Q = np.zeros((2, len(dt), 6, 6))
+        F[:], i = np.eye(6), np.arange(3)
+        F[:, i, i + 3] = dt[:, None]
+        size = np.abs(dt)[:, None]
+        Q[:, i, i], Q[:, i + 3, i + 3] = size**3 / 3.0, size
+        Q[:, i, i + 3] = Q[:, i + 3, i] = dt[:, None] * size / 2.0
+        mean = np.einsum("nij,nj->ni", F, self.mean)
+        return self._replace(mean=mean, covariance=F @ self.covariance @ F.transpose(0, 2, 1) + noise**2 * Q)
+
+
+def _open(count: int) -> tuple[Array, Array]:
+    """Means and covariances of tracks of which nothing is known but that they are near the plane z = 0."""
+    covariance = np.zeros((count, 6, 6))
+    covariance[:] = np.diag([0.0, 0.0, _OPEN_HEIGHT, *[_OPEN_VELOCITY] * 3]) ** 2
+    return np.zeros((count, 6)), covariance
+
+
+@dataclass(frozen=True)
+class FusionParameters:
+    """How tracks are fused.
+
+    Parameters
+    ----------
+    density : float, optional
+        Targets per m^3. Default: as many as the system with most tracks has, in the box of all tracks.
+    coverage : float
+        Probability that a system has a track of a target, above 0 and below 1.
+    speed : float
+        Standard deviation of targets' velocities along each axis, m/s.
+    stay : float
+        Log odds with which a track stays in its fused track.
+    gate_probability : float
+        Share of tracks of one target whose states lie in the gate, above 0 and below 1.
+    noise : float
+        Of states that are moved to a common time: root of the acceleration's spectral density, m/s^1.5.
+    patience : float
+        Seconds for which a fused track that no system has any more may come back with its id.
+    """
+
+    density: float | None = field(default=None)
+    coverage: float = field(default=0.7)
+    speed: float = field(default=300.0)
+    stay: float = field(default=5.0)
+    gate_probability: float = field(default=0.999)
+    noise: float = field(default=5.0)
+    patience: float = field(default=30.0)
+
+    def __post_init__(self) -> None:
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            if value is None and setting.name == "density":
+                continue
+            positive(value, setting.name, zero=setting.name in ("stay", "noise", "patience"))
+            if setting.name in ("coverage", "gate_probability") and value >= 1:
+                raise InvalidInputError(f"{setting.name} must be below 1, got {value!r}")
+
+
+class FusedPicture(NamedTuple):
+    """All targets at one time."""
+
+    tracks: list[Track]
+    """One for each target, sorted by id; `hits` counts the steps, `mean` is x, y, z, vx, vy, vz."""
+    members: Array
+    """Track of each system in each of them, 0 for none, int64 (T, S)."""
+    solution: Solution
+    """Of the assignment problem, with its bound; list 0 are the fused tracks before."""
+
+
+class _Known(NamedTuple):
+    """Fused tracks so far."""
+
+    ids: Array
+    members: Array
+    """(F, S)"""
+    state: SystemTracks
+    started: Array
+    seen: Array
+    """When any system last had it, seconds, (F,)."""
+    hits: Array
+
+
+@doors
+class TrackFusion:
+    """Fuses the tracks of several systems, step by step.
+
+    Parameters
+    ----------
+    systems : int
+        How many there are.
+    parameters : FusionParameters, optional
+    solver : str
+        One of ``assoc.solvers.names()``.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no system.
+    """
+
+    def __init__(self, systems: int, parameters: FusionParameters | None = None, solver: str = "exact") -> None:
+        if isinstance(systems, bool) or not isinstance(systems, (int, np.integer)) or systems < 1:
+            raise InvalidInputError(f"systems must be a whole number above 0, got {systems!r}")
+        self.systems, self.solver = int(systems), solver
+        self.parameters = FusionParameters() if parameters is None else parameters
+        nothing = np.zeros(0, dtype=np.int64)
+        state = SystemTracks(nothing, *_open(0), np.zeros(0))
+        self._known = _Known(nothing, np.zeros((0, self.systems), np.int64), state, np.zeros(0), np.zeros(0), nothing)
+        self._time, self._next_id = -np.inf, 1
+
+    def step(self, time: float, tracks: Sequence[SystemTracks]) -> FusedPicture:
+        """Fuse the tracks that the systems have at this time.
+
+        Parameters
+        ----------
+        time : float
+            Seconds, not before the last step's.
+        tracks : sequence of SystemTracks
+            One of each system, at this time.
+
+        Raises
+        ------
+        InvalidInputError
+            Time goes back, a system is missing, or a covariance is not positive definite.
+        """
+        if not time >= self._time:
+            raise InvalidInputError(f"time: {time!r} s comes after {self._time:g} s, expected times in order")
+        if len(tracks) != self.systems:
+            raise InvalidInputError(f"tracks: expected those of {self.systems} systems, got {len(tracks)}")
+        for s, one in enumerate(tracks):
+            _check(one, s)
+        chosen = self.parameters
+        known = _part(self._known, time - self._known.seen <= chosen.patience)
+        if len(known.ids):
+            known = known._replace(state=known.state.moved(time - self._time, chosen.noise))
+        # a fused track that some system still has is found by its members, the others by their states
+        left = np.ones(len(known.ids), dtype=np.bool_)
+        for one, ids in zip(tracks, known.members.T, strict=True):
+            left &= ~np.isin(ids, one.ids)
+        rows, costs = self._candidates(tracks, known, np.flatnonzero(left))
+        problem = AssignmentProblem(rows, costs, [len(known.ids), *(len(one.ids) for one in tracks)])
+        solution = assign(problem, self.solver, advise=False)
+        groups = solution.tuples[solution.tuples[:, 1:].any(axis=1)]
+        return self._after(time, tracks, known, groups, solution)
+
+    def _candidates(self, tracks: Sequence[SystemTracks], known: _Known, left: Array) -> tuple[Array, Array]:
+        """Tuples of two or more (M, 1 + S) and their costs."""
+        lists = [SystemTracks(*(part[left] for part in known.state)), *tracks]
+        price = self._price(tracks)
+        grown = _Grown.none(len(lists))
+        for s, one in enumerate(lists):
+            number = left + 1 if s == 0 else np.arange(1, len(one.ids) + 1)
+            grown = grown.with_list(s, number, one, price, self.parameters.gate_probability)
+        rows, costs = grown.rows, grown.costs
+        # with the fused track of each of its members
+        was = np.zeros_like(rows[:, 1:])
+        for s, one in enumerate(tracks):
+            # those that some system had last come first, and count
+            of_id = {i: f for f, i in reversed([*enumerate(known.members[:, s].tolist(), 1)]) if i}
+            owner = np.array([0, *(of_id.get(i, 0) for i in one.ids.tolist())], dtype=np.int64)
+            was[:, s] = owner[rows[:, s + 1]]
+        more = [(rows, costs)]
+        for s in range(self.systems):
+            of = np.flatnonzero((was[:, s] > 0) & (rows[:, 0] == 0) & ~(was[:, :s] == was[:, s : s + 1]).any(axis=1))
+            staying = (was[of] == was[of, s][:, None]).sum(axis=1)
+            more.append((np.column_stack([was[of, s], rows[of, 1:]]), costs[of] - self.parameters.stay * staying))
+        rows, costs = np.concatenate([pair[0] for pair in more]), np.concatenate([pair[1] for pair in more])
+        several = (rows > 0).sum(axis=1) > 1
+        return rows[several], costs[several]
+
+    def _price(self, tracks: Sequence[SystemTracks]) -> float:
+        """What a further track costs that joins others: ln of the density of tracks that no other system has."""
+        chosen, density = self.parameters, self.parameters.density
+        if density is None:
+            places = np.concatenate([one.mean[:, :3] for one in tracks])
+            sides = np.maximum(np.ptp(places, axis=0), _LEAST_BOX) if len(places) else np.full(3, _LEAST_BOX)
+            density = max(1, *(len(one.ids) for one in tracks)) / float(np.prod(sides))
+        velocities = 3.0 * np.log(np.sqrt(2.0 * np.pi) * chosen.speed)
+        return float(np.log(density) - velocities + self.systems * np.log1p(-chosen.coverage))
+
+    def _after(
+        self, time: float, tracks: Sequence[SystemTracks], known: _Known, groups: Array, solution: Solution
+    ) -> FusedPicture:
+        """Fuse each group, give it its id, and remember it."""
+        mean, covariance = np.zeros((len(groups), self.systems, 6)), np.zeros((len(groups), self.systems, 6, 6))
+        members, absent = np.zeros((len(groups), self.systems), np.int64), np.ones((len(groups), self.systems))
+        covariance[:] = np.eye(6)
+        for s, one in enumerate(tracks):
+            there = groups[:, s + 1] > 0
+            row = groups[there, s + 1] - 1
+            mean[there, s], covariance[there, s] = one.mean[row], one.covariance[row]
+            members[there, s], absent[there, s] = one.ids[row], 1.0 - one.existence[row]
+        fused = intersected(mean, covariance, members > 0)
+        before, fresh = groups[:, 0] - 1, groups[:, 0] == 0
+        ids = np.empty(len(groups), dtype=np.int64)
+        ids[~fresh] = known.ids[before[~fresh]]
+        # in the order of places, so that ids do not depend on the solver
+        order = np.flatnonzero(fresh)[np.lexsort(fused[0][fresh].T)]
+        ids[order] = np.arange(self._next_id, self._next_id + len(order))
+        started, hits = np.full(len(groups), float(time)), np.ones(len(groups), dtype=np.int64)
+        started[~fresh], hits[~fresh] = known.started[before[~fresh]], known.hits[before[~fresh]] + 1
+        state = SystemTracks(ids, *fused, 1.0 - absent.prod(axis=1))
+        now = _Known(ids, members, state, started, np.full(len(groups), float(time)), hits)
+        now = _part(now, np.argsort(ids))
+        gone = _part(known, ~np.isin(known.ids, ids))
+        self._known = _Known(*(_joined(a, b) for a, b in zip(now, gone, strict=True)))
+        self._time, self._next_id = float(time), self._next_id + len(order)
+        found = [
+            Track(int(i), float(time), x, P, x[:3], x[3:], True, 0.0, int(hit), float(begun), float(time), float(there))
+            for (i, x, P, there), begun, hit in zip(zip(*now.state, strict=True), now.started, now.hits, strict=True)
+        ]
+        return FusedPicture(found, now.members, solution)
+
+
+class _Grown(NamedTuple):
+    """Tuples of tracks that may be of one target, with the sums that their costs need."""
+
+    rows: Array
+    """1-based, (M, L)."""
+    costs: Array
+    Y: Array
+    """Sum of the inverse covariances, (M, 6, 6)."""
+    y: Array
+    """Sum of inverse covariance times mean, (M, 6)."""
+    log: Array
+    """Sum of mean' inverse covariance mean, and ln det(2 pi covariance), (M,)."""
+
+    @staticmethod
+    def none(lists: int) -> _Grown:
+        """No tuples."""
+        zero = np.zeros(0)
+        return _Grown(np.zeros((0, lists), np.int64), zero, np.zeros((0, 6, 6)), np.zeros((0, 6)), zero)
+
+    def with_list(self, s: int, number: Array, tracks: SystemTracks, price: float, gate: float) -> _Grown:
+        """Add tuples with a track of list `s`, alone and with all tuples so far that lie in its gate."""
+        inverse = np.linalg.inv(tracks.covariance)
+        part = np.einsum("nij,nj->ni", inverse, tracks.mean)
+        log = (part * tracks.mean).sum(axis=1) + np.linalg.slogdet(2.0 * np.pi * tracks.covariance)[1]
+        rows = np.zeros((len(number), self.rows.shape[1]), np.int64)
+        rows[:, s] = number
+        alone = _Grown(rows, np.zeros(len(number)), inverse, part, log)
+        if not len(self.rows) or not len(number):
+            return _Grown(*map(_joined, self, alone))
+        limit = 2.0 * gammaincinv(3.0, gate)
+        spread = np.linalg.inv(self.Y)
+        middle = np.einsum("nij,nj->ni", spread, self.y)
+        near = np.ones((len(middle), len(number)), dtype=np.bool_)
+        for axis in range(6):
+            wide = spread[:, axis, axis][:, None] + tracks.covariance[:, axis, axis]
+            near &= (middle[:, axis][:, None] - tracks.mean[:, axis]) ** 2 <= limit * wide
+        a, b = np.nonzero(near)
+        away = middle[a] - tracks.mean[b]
+        square = (away * np.linalg.solve(spread[a] + tracks.covariance[b], away[:, :, None])[:, :, 0]).sum(axis=1)
+        inside = square <= limit
+        a, b = a[inside], b[inside]
+        Y, y, log = self.Y[a] + inverse[b], self.y[a] + part[b], self.log[a] + alone.log[b]
+        # ln of the integral of the product of the members' densities
+        best = (y * np.linalg.solve(Y, y[:, :, None])[:, :, 0]).sum(axis=1)
+        integral = -0.5 * (log - best) - 0.5 * np.linalg.slogdet(Y / (2.0 * np.pi))[1]
+        rows = self.rows[a] + rows[b]
+        costs = ((rows > 0).sum(axis=1) - 1) * price - integral
+        return _Grown(*map(_joined, map(_joined, self, alone), _Grown(rows, costs, Y, y, log)))
+
+
+def intersected(mean: Array, covariance: Array, used: Array) -> tuple[Array, Array]:
+    """Covariance intersection of states with unknown dependence, by the weights of least determinant.
+
+    Parameters
+    ----------
+    mean, covariance : arrays (G, S, n), (G, S, n, n)
+    used : bool array (G, S)
+        Which states there are; at least one of each group.
+
+    Returns
+    -------
+    mean (G, n), covariance (G, n, n)
+    """
+    inverse = np.linalg.inv(covariance)
+    weights = used / np.maximum(used.sum(axis=1, keepdims=True), 1)
+    several = np.flatnonzero(used.sum(axis=1) > 1)
+    # the multiplicative algorithm of D-optimal designs: the determinant falls with each step
+    for _ in range(_ROUNDS if len(several) else 0):
+        P = np.linalg.inv(np.einsum("gs,gsij->gij", weights[several], inverse[several]))
+        weights[several] *= np.einsum("gij,gsji->gs", P, inverse[several]) / mean.shape[2]
+    P = np.linalg.inv(np.einsum("gs,gsij->gij", weights, inverse))
+    return np.einsum("gij,gs,gsjk,gsk->gi", P, weights, inverse, mean, optimize=True), P
+
+
+@door
+def fuse_tables(
+    tables: Sequence[TrackTable | pd.DataFrame | str | os.PathLike[str]],
+    parameters: FusionParameters | None = None,
+    *,
+    interval: float | None = None,
+    sigma: float = 100.0,
+    sigma_velocity: float = 20.0,
+) -> TrackTable:
+    """Fuse tables of tracks of several systems into one.
+
+    Parameters
+    ----------
+    tables : sequence of TrackTable, DataFrame or path
+        Columns as in tracks.csv: track_id, time, x, y, z, vx, vy, vz, and sigma_x, sigma_y, sigma_z and existence if
+        known. All in one frame and of one clock. `assoc.integrations.asterix.read_tracks` reads category 062.
+    parameters : FusionParameters, optional
+    interval : float, optional
+        Seconds from picture to picture; default: the usual seconds between two times of the slowest system. A track
+        counts until twice as long after its last row.
+    sigma, sigma_velocity : float
+        Standard deviations of positions where a table has none, and of velocities, metres and m/s.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no table, one cannot be read or lacks a column.
+    """
+    frames = [_frame(table, number) for number, table in enumerate(tables, 1)]
+    if not frames:
+        raise InvalidInputError("tables: expected at least one")
+    positive(sigma, "sigma")
+    positive(sigma_velocity, "sigma_velocity")
+    times = [np.unique(frame["time"].to_numpy(dtype=np.float64)) for frame in frames]
+    paces = [float(np.median(np.diff(one))) for one in times if len(one) > 1]
+    pace = max(paces, default=1.0) if interval is None else positive(interval, "interval")
+    every = np.concatenate(times)
+    fusion, table = TrackFusion(len(frames), parameters), TrackTable()
+    first, last = (float(every.min()), float(every.max())) if len(every) else (0.0, -1.0)
+    for time in first + pace * np.arange(int((last - first) / pace + 1e-9) + 1):
+        found = []
+        for frame in frames:
+            rows = frame[(frame["time"] <= time + 1e-9) & (frame["time"] > time - 2.0 * pace)]
+            rows = rows.drop_duplicates("track_id", keep="last")
+            one = SystemTracks.of_rows(rows, sigma, sigma_velocity)
+            found.append(one.moved(time - rows["time"].to_numpy(dtype=np.float64), fusion.parameters.noise))
+        table.add(fusion.step(float(time), found).tracks)
+    return table
+
+
+def _frame(table: Any, number: int) -> pd.DataFrame:
+    """A table as rows sorted by time, without tracks that are not confirmed."""
+    import pandas as pd
+
+    name = f"table {number}"
+    if isinstance(table, TrackTable):
+        table = table.to_frame()
+    elif isinstance(table, (str, os.PathLike)):
+        name = os.fspath(table)
+        try:
+            table = pd.read_csv(table)
+        except (OSError, ValueError) as error:
+            raise InvalidInputError(f"{name}: cannot be read as a table of tracks ({error})") from None
+    if not isinstance(table, pd.DataFrame):
+        raise InvalidInputError(f"{name}: expected a TrackTable, a DataFrame or a path, got {type(table).__name__}")
+    for column in _CSV:
+        if column not in table or table[column].dtype.kind not in "iuf":
+            raise InvalidInputError(f"{name}: expected numbers in the column {column!r}")
+    needed = table[["track_id", "time", "x", "y"]].to_numpy(dtype=np.float64)
+    if not np.isfinite(needed).all() or not (needed[:, 0] > 0).all():
+        raise InvalidInputError(f"{name}: expected a track_id above 0, time, x and y in each row")
+    if "confirmed" in table:
+        table = table[table["confirmed"].astype(bool)]
+    return table.sort_values("time", kind="stable")
+
+
+def _check(tracks: SystemTracks, s: int) -> None:
+    n = len(tracks.ids)
+    shapes = np.shape(tracks.mean), np.shape(tracks.covariance)
+    if shapes != ((n, 6), (n, 6, 6)):
+        raise InvalidInputError(f"tracks of system {s}: expected shapes {((n, 6), (n, 6, 6))}, got {shapes}")
+    if len(np.unique(tracks.ids)) < n or (n and tracks.ids.min() < 1):
+        raise InvalidInputError(f"tracks of system {s}: expected different ids above 0")
+    if not np.isfinite(tracks.mean).all() or (n and not np.linalg.eigvalsh(tracks.covariance).min() > 0.0):
+        raise InvalidInputError(f"tracks of system {s}: expected finite states and positive definite covariances")
+
+
+def _part(known: _Known, rows: Array) -> _Known:
+    state = SystemTracks(*(part[rows] for part in known.state))
+    return _Known(known.ids[rows], known.members[rows], state, known.started[rows], known.seen[rows], known.hits[rows])
+
+
+def _joined(a: Any, b: Any) -> Any:
+    if isinstance(a, SystemTracks):
+        return SystemTracks(*map(_joined, a, b))
+    return np.concatenate([a, b])
