@@ -78,6 +78,8 @@ def _program(arguments: Sequence[str] | None) -> tuple[Program, list[str]]:
 def _track(words: list[str]) -> None:
     given, settings = read_options(words, track_parser())
     given.check_outputs([given["file"]])
+    if given["check"] and given["no_adapt"]:
+        raise InvalidInputError("--check: nothing is estimated with --no-adapt; leave one of them out")
     with messages(given):
         _make_tracks(given, settings)
 
@@ -107,6 +109,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
+        (given["check"], lambda: print_lines(str(found.tracker.health))),
         (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
         (found.plots, lambda: _print_rates(found.plots, given["identity"])),
     )

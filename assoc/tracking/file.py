@@ -18,6 +18,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
+from assoc.tracking.adapting.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import Nursery, TrackerState
@@ -102,6 +103,8 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= state.registration.arrays()
     if state.identities is not None:
         found |= state.identities.arrays()
+    if state.estimates is not None:
+        found |= {f"estimates.{name}": np.array(value) for name, value in state.estimates._asdict().items()}
     if settings.nursery is not None and state.nursery is not None:
         inner, unseen = state.nursery
         found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, inner).items()}
@@ -130,6 +133,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
         registration=None if model.registration is None else model.registration.restored(saved),
         identities=None if model.identities is None else model.identities.restored(saved),
+        estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
     )  # fmt: skip
     state = state._replace(own=settings.method.restored(settings, saved, state))
     if settings.nursery is None or model.nursery is None:
@@ -141,6 +145,23 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
     saved.require(good, "unseen", "how often each sensor has missed each track")
     return state._replace(nursery=Nursery(inner, Unseen(ids, misses)))
+
+
+def _estimates(model: Estimates, saved: Saved) -> Estimates:
+    """The estimates in these arrays, checked."""
+    count = len(saved["ids"])
+    saved.require((np.diff(saved["ids"]) > 0).all(), "ids", "ids that ascend")
+    for name, value in model._asdict().items():
+        shape = np.shape(value)
+        shape = (count, *shape[1:]) if name in PER_TRACK else shape
+        good = saved[name].shape == shape and np.isfinite(saved[name]).all()
+        saved.require(good, name, f"finite numbers of the shape {shape}")
+    for name in ("factors", "used", "manoeuvres"):
+        saved.require((saved[name] > 0).all(), name, "numbers above 0")
+    saved.require((saved["used"][:, DETECTION] < 1).all(), "used", "probabilities below 1 in its second column")
+    saved.require((np.linalg.eigvalsh(saved["weights"]) > 0).all(), "weights", "a positive definite matrix")
+    arrays: dict[str, Any] = {**saved, "manoeuvres": float(saved["manoeuvres"])}
+    return Estimates(**arrays)
 
 
 def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:
@@ -191,6 +212,8 @@ def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
         "gate_probability": repr(settings.gate_probability),
         "registration": "none" if settings.registration is None else repr(settings.registration.parameters),
         "identity": repr(settings.identity),
+        # left out where it is not on: files from before it are still read
+        **({"adapt": "True"} if settings.adapt else {}),
         **{item.name: described(getattr(settings.method, item.name)) for item in fields(settings.method)},
     }
 
@@ -204,8 +227,8 @@ def _changed_setting(saved: str, own: str) -> str:
         before = None
     if not isinstance(before, dict):
         return "they cannot be read"
-    for key in now:
-        old, new = str(before.get(key)), now[key]
+    for key in {**now, **before}:
+        old, new = str(before.get(key)), str(now.get(key))
         if old != new:
             # long texts are shown from their first difference
             same = len(os.path.commonprefix([old, new]))

@@ -29,7 +29,7 @@ def keep_pace(progress: Progress) -> Progress:
 def excuse(progress: Progress) -> Progress:
     """Undo the effect of misses on existence for tracks outside the field of view of a sensor that looked."""
     tracks = progress.state.tracks
-    overlooked: Array = (out_of_view(progress) & _looked(progress)) @ progress.settings.terms.miss
+    overlooked: Array = (out_of_view(progress) & looked(progress)) @ progress.settings.terms.miss
     return progress.with_state(tracks=tracks.not_overlooked(-overlooked))
 
 
@@ -39,7 +39,7 @@ def out_of_view(progress: Progress) -> Array:
     return ~np.stack([sensor.in_view(sensor.measure(where)) for sensor in views], axis=1)
 
 
-def _looked(progress: Progress) -> Array:
+def looked(progress: Progress) -> Array:
     """Which sensors looked towards which tracks, bool (T, S)."""
     sectors, sensors = progress.scan.sectors, progress.settings.sensors
     if sectors is None:

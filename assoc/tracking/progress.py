@@ -74,6 +74,8 @@ class Progress(NamedTuple):
     work: Work
     timed: TimedScan | None = None
     """Set for measurements with times of their own; None if all sensors looked everywhere at one instant."""
+    before: TrackBatch | None = None
+    """The tracks that association began with, of a tracker that adapts."""
     found: Association | None = None
     step: Step | None = None
 

@@ -41,6 +41,8 @@ class TrackerSettings:
         Sensors and region.
     registration : OnlineRegistration or None
         Its state before the first scan.
+    adapt : bool
+        Whether to estimate what is declared of the sensors, and the manoeuvres.
     nursery : TrackerSettings or None
         Of the nursery, if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
     """
@@ -59,6 +61,7 @@ class TrackerSettings:
     max_tuples: int
     registration: OnlineRegistration | None
     identity: IdentityParameters | None
+    adapt: bool = False
     nursery: TrackerSettings | None = None
 
     def __post_init__(self) -> None:

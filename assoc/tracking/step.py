@@ -23,6 +23,7 @@ from assoc.filters.base import predict_each
 from assoc.filters.batches import concatenate
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
+from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimates
 from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
 from assoc.tracking.checking import checked_measurements, checked_time
 from assoc.tracking.identity_evidence import checked_identities
@@ -40,13 +41,16 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
     nursing = settings.nursery is not None
     return [
         *([register] if settings.registration is not None else []),
+        *([use_estimates] if settings.adapt else []),
         keep_pace,
         *([take_over] if nursing else []),
         predict,
+        *([remember_tracks] if settings.adapt else []),
         associate,
         live,
         *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_nursery] if nursing else []),
+        *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
         excuse,
         report,

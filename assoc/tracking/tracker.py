@@ -21,6 +21,7 @@ from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
+from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
@@ -67,6 +68,9 @@ class Tracker:
         then be of one instant. Without it measurements are not corrected.
     identity : IdentityParameters, optional
         How to weigh Mode 3/A codes and addresses that `step` is given. Without it they are ignored.
+    adapt : bool
+        Whether to estimate noise, detection probabilities, false alarms and manoeuvres while tracking, and to use the
+        estimates where they are surely not as declared; see `health`.
     **own
         Settings of this kind of tracker.
 
@@ -103,6 +107,7 @@ class Tracker:
         max_tuples: int = MAX_TUPLES,
         registration: str | OnlineRegistration | None = None,
         identity: IdentityParameters | None = None,
+        adapt: bool = False,
         **own: Any,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
@@ -115,7 +120,7 @@ class Tracker:
             solver_parameters=dict(solver_parameters or {}), seed=whole_seed(seed),
             time_limit=checked_time_limit(time_limit), life_cycle=LifeCycle() if life_cycle is None else life_cycle,
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
-            max_tuples=max_tuples, registration=online, identity=identity,
+            max_tuples=max_tuples, registration=online, identity=identity, adapt=bool(adapt),
         )  # fmt: skip
         self.settings = with_nursery(settings)
         self.state = first_state(self.settings)
@@ -154,6 +159,11 @@ class Tracker:
     def registration(self) -> OnlineRegistration | None:
         """The present estimates of the sensors' biases; None if they are not estimated."""
         return self.state.registration
+
+    @property
+    def health(self) -> Health | None:
+        """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
+        return None if self.state.estimates is None else health(self.sensors, self.state.estimates)
 
     @property
     def solver_calls(self) -> int:

@@ -164,18 +164,71 @@ def _at_times(scene: Scene, s: int, due: Array) -> Scene:
     return Scene(scene.sensors, scene.times, measurements, scene.region, truth)
 
 
+def misdeclared(declared: Setting, true: Setting) -> Row:
+    """Scenes of true sensors, of which trackers are told something else."""
+
+    def row(seed: int) -> Case:
+        known = simulate(true, seed)
+        return Case(replace(known, sensors=radars(declared)), known)
+
+    return row
+
+
+def agile(seed: int) -> Case:
+    """Targets of 250 m/s that now and then turn with 8 g for 2 to 6 s."""
+    rng, fine, turn = np.random.default_rng(seed), 0.1, 8 * 9.81 / 250.0
+    steps = round(SCANS * INTERVAL / fine)
+    rate = np.zeros((steps, TARGETS))
+    for target in range(TARGETS):
+        k = 0
+        while k < steps:
+            k += round(rng.uniform(8.0, 30.0) / fine)
+            length = round(rng.uniform(2.0, 6.0) / fine)
+            rate[k : k + length, target] = turn * rng.choice([-1.0, 1.0])
+            k += length
+    heading = rng.uniform(-np.pi, np.pi, TARGETS) + np.cumsum(rate, axis=0) * fine
+    velocity = 250.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=-1)
+    path = np.cumsum(velocity, axis=0) * fine
+    middle = rng.uniform([-12e3, -12e3, 0.0], [12e3, 12e3, 1.0], (TARGETS, 3))
+    middle[:, 2] = rng.permutation(np.linspace(1e3, 11e3, TARGETS))
+    path = (path - path.mean(axis=0) + middle)[:: round(INTERVAL / fine)]
+    times, ids = INTERVAL * np.arange(SCANS), [np.arange(TARGETS)] * SCANS
+    return Case(observe(radars(SETTINGS["separate"]), times, ids, list(path), rng, region=REGION))
+
+
+def one_planar(seed: int) -> Case:
+    """One radar without heights, 100 false alarms a scan."""
+    scene = simulate(Setting("separate", noise=(80.0,), false_alarms=100.0), seed)
+    assert scene.truth is not None
+    full, rng = scene.sensors[0], np.random.default_rng([seed, 1])
+    radar = Radar2D(
+        position=full.position, noise=full.noise[:2], detection_probability=0.9, false_alarm_rate=100.0,
+        field_of_view=full.field_of_view[:2], name="radar",
+    )  # fmt: skip
+    return Case(observe([radar], scene.times, scene.truth.target_ids, scene.truth.positions, rng, region=scene.region))
+
+
+SEPARATE, NOISY = SETTINGS["separate"], (160.0, 160.0, 160.0)
+
 ROWS: dict[str, Row] = {
     "full views": lambda seed: Case(simulate(SETTINGS["separate"], seed)),
     "six radars of 17 km": short_radars,
     "six radars of 17 km, P_d 0.6": lambda seed: short_radars(seed, 0.6),
     "P_d 0.6": lambda seed: Case(simulate(Setting("separate", detection_probability=0.6), seed)),
+    "P_d 0.6, declared 0.9": misdeclared(SEPARATE, Setting("separate", detection_probability=0.6)),
+    "noise twice the declared": misdeclared(SEPARATE, Setting("separate", NOISY)),
+    "noise three times the declared": misdeclared(SEPARATE, Setting("separate", (240.0, 240.0, 240.0))),
+    "formations, noise twice the declared": misdeclared(SETTINGS["formations"], Setting("formations", NOISY)),
+    "8 g": agile,
+    "one 2-D radar, 100 false alarms": one_planar,
     "dark band of 4 km": dark_band,
     "splitting": splitting,
     "wind farm": wind_farm,
     "ships, radar alone": lambda seed: ships(seed, reports=False),
     "ships, radar and AIS": ships,
 }
-NAMES = ("oracle", *TRACKERS)
+ADAPTING = ", adapting"
+NAMES = ("oracle", *TRACKERS, *(name + ADAPTING for name in TRACKERS))
 
 
 class Judged(NamedTuple):
@@ -191,7 +244,9 @@ class Judged(NamedTuple):
 def judge(name: str, scene: Scene, options: Mapping[str, Any]) -> Judged:
     """Run a tracker, or the oracle, over a scene."""
     tracker: Tracker
-    tracker = OracleTracker(scene, **options) if name == "oracle" else TRACKERS[name].for_scene(scene, **options)
+    options = dict(options) | ({"adapt": True} if name.endswith(ADAPTING) else {})
+    kind = TRACKERS.get(name.removesuffix(ADAPTING))
+    tracker = OracleTracker(scene, **options) if kind is None else kind.for_scene(scene, **options)
     truth, tracks = Trajectories.from_scene(scene), through(tracker, scene).tracks
     values, unit = gospa_over_time(truth, tracks, CUTOFF)[1], CUTOFF**2 / 2
     return Judged(
@@ -225,7 +280,7 @@ def experiment(rows: Sequence[str], names: Sequence[str], seeds: Sequence[int]) 
         for name in names:
             claims += claims_of(row, name, [judge(name, one.declared, one.options) for one in cases])
             known = [(one.known, one.options) for one in cases if one.known is not None]
-            if known and name != "oracle":
+            if known and name != "oracle" and not name.endswith(ADAPTING):
                 claims += claims_of(row, f"{name} if known", [judge(name, *one) for one in known])
     return claims
 

@@ -132,6 +132,14 @@ def test_what_a_scene_does_not_allow_is_refused_before_it_is_tracked(scene_file,
         assert message in told.err and told.err.count("\n") == 1 and not (tmp_path / "tracks.csv").exists()
 
 
+def test_what_is_declared_is_checked(scene_file, tmp_path, capsys):
+    words = [str(scene_file), "-o", str(tmp_path / "tracks.csv"), "--check"]
+    assert track.main(words) == 0
+    assert "noise/declared" in capsys.readouterr().out
+    assert track.main([*words, "--no-adapt"]) == 2
+    assert "--check: nothing is estimated with --no-adapt" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", list(TRACKERS))
 def test_scans_of_one_time(name, tmp_path, capsys):
     """Two radars that report one after the other at one time are legal; targets and tracks then count once."""

@@ -57,6 +57,7 @@ TRACKING = (
     Option("filter", "NAME", f"{', '.join(FILTERS)} (default: imm-cv, for recorded plots ekf)", kinds.OneOf(FILTERS)),
     Option("process_noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)",
            kinds.not_negative),
+    Option("no_adapt", "", "keep to the noise, detection probabilities and false alarms that are declared"),
     *(COMMON[name] for name in _OF_ALL),
     *_OF_TRACKERS,
 )  # fmt: skip
@@ -94,6 +95,7 @@ TRACK = (
            kinds.position_on_earth),
     Option("report", "FILE", "write an HTML page: tracks over time, metric, table (needs assoc[report])",
            kinds.html_page),
+    Option("check", "", "print what is declared of sensors and targets against what was seen"),
     Option("all", "", "also write tracks that are tentative, or whose target may be gone"),
 )  # fmt: skip
 OF_SCENES = (
@@ -279,4 +281,5 @@ def make_tracker(
     parsed.check_use(_OF_TRACKERS, tracker=name)
     made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace, region)
     of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
-    return KINDS[name](sensors, made, region=region, **settings, **of_tracker)
+    adapt = not parsed["no_adapt"]
+    return KINDS[name](sensors, made, region=region, adapt=adapt, **settings, **of_tracker)

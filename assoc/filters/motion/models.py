@@ -6,6 +6,7 @@ metres and seconds; in two dimensions z is left out.
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -52,6 +53,12 @@ class Motion(ABC):
     def linear(self) -> bool:
         """Whether `propagate` is a matrix."""
         return False
+
+    def noisier(self, factor: float) -> Motion:
+        """The same motion with `factor` times the covariance of the process noise."""
+        made = copy.copy(self)
+        made.noise = lambda states, dt: factor * self.noise(states, dt)  # type: ignore[method-assign]
+        return made
 
 
 class LinearMotion(Motion):
@@ -101,6 +108,10 @@ class LinearMotion(Motion):
             both = np.stack((F[None], Q[None]))
             known = self._known[dt] = (both[0], both[1], both)
         return known
+
+    def noisier(self, factor: float) -> LinearMotion:
+        """The same motion with `factor` times the covariance of the process noise."""
+        return LinearMotion(self._transition, lambda dt: factor * self._noise(dt), self.dim, self.position)
 
     def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
         """F and Q of each of k time steps, both (k, n, n)."""
@@ -180,6 +191,10 @@ class ConstantVelocity(LinearMotion):
             (order + 1) * dimensions,
             axes,
         )
+
+    def noisier(self, factor: float) -> ConstantVelocity:
+        """The same motion with `factor` times the covariance of the process noise."""
+        return type(self)(math.sqrt(factor) * self.sigma, len(self.position), self.kind)
 
     def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
         """F and Q of each of k time steps, both (k, n, n); the polynomials are taken of all steps at once."""

@@ -36,7 +36,7 @@ def with_nursery(settings: TrackerSettings) -> TrackerSettings:
     method = settings.method.nursery
     if method is None or not settings.angles_alone:
         return settings
-    return replace(settings, nursery=replace(settings, method=method, registration=None, identity=None))
+    return replace(settings, nursery=replace(settings, method=method, registration=None, identity=None, adapt=False))
 
 
 def current(settings: TrackerSettings, state: TrackerState) -> TrackBatch:

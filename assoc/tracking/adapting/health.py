@@ -1,0 +1,142 @@
+"""What was declared of sensors and targets against what a tracker has seen, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from assoc.sensors import Sensor
+from assoc.tracking.adapting.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
+
+_WIDTH = 1.96
+# differences smaller than this share are not worth a word, nor those within so many standard deviations
+_SMALL, _UNSURE = 0.1, 3.0
+_WORDS = {2.0: "twice", 3.0: "three times", 4.0: "four times", 0.5: "half", 1 / 3: "a third of", 0.25: "a quarter of"}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity as declared and as seen.
+
+    Attributes
+    ----------
+    declared, seen : float
+    low, high : float
+        Interval of 95 %, the prior at what was declared included.
+    """
+
+    declared: float
+    seen: float
+    low: float
+    high: float
+
+    @property
+    def differs(self) -> bool:
+        """Whether what was seen is surely and noticeably not as declared."""
+        # the interval is symmetric on its scale: wider by this factor it must not contain what was declared
+        wide = _UNSURE / _WIDTH
+        low, high = self.seen * (self.low / self.seen) ** wide, self.seen * (self.high / self.seen) ** wide
+        return not low <= self.declared <= high and abs(self.seen / self.declared - 1.0) > _SMALL
+
+    def __format__(self, kind: str) -> str:
+        kind = kind if self.high < 10.0 else ".3g"
+        return f"{self.seen:{kind}} ({self.low:{kind}}-{self.high:{kind}})"
+
+
+@dataclass(frozen=True)
+class SensorHealth:
+    """A sensor as declared and as seen.
+
+    Attributes
+    ----------
+    name : str
+    noise : Quantity
+        Standard deviations relative to those declared.
+    detection_probability, false_alarm_rate : Quantity
+    verdict : str
+    """
+
+    name: str
+    noise: Quantity
+    detection_probability: Quantity
+    false_alarm_rate: Quantity
+
+    @property
+    def verdict(self) -> str:
+        """What is not as declared, in words."""
+        noise, seen, alarms = self.noise, self.detection_probability, self.false_alarm_rate
+        found = [
+            *([f"noise about {_times(noise.seen)} the declared"] if noise.differs else []),
+            *([f"detects {seen.seen:.0%} of targets, declared {seen.declared:.0%}"] if seen.differs else []),
+            *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
+        ]
+        return "; ".join(found) or "as declared"
+
+
+@dataclass(frozen=True)
+class Health:
+    """Sensors and targets as declared and as seen; `str` is a table for people.
+
+    Attributes
+    ----------
+    sensors : tuple of SensorHealth
+    manoeuvres : Quantity
+        Process noise of the filter, of its most agile model, relative to that declared.
+    """
+
+    sensors: tuple[SensorHealth, ...]
+    manoeuvres: Quantity
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """One line for each sensor, and one for the targets."""
+        agile = self.manoeuvres.differs and self.manoeuvres.seen > 1.0
+        targets = (
+            f"manoeuvre about {_times(self.manoeuvres.seen)} as hard as the filter expects"
+            if agile
+            else ("no harder manoeuvres than the filter expects")
+        )
+        return (*(f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors), f"targets: {targets}")
+
+    def __str__(self) -> str:
+        rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d", "decl.", "false alarms", "decl.")]
+        for sensor in self.sensors:
+            both = sensor.detection_probability, sensor.false_alarm_rate
+            cells = (cell for value in both for cell in (f"{value:.2f}", f"{value.declared:.3g}"))
+            rows.append((sensor.name[:12], f"{sensor.noise:.2f}", *cells))
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        lines = ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return "\n".join([*lines, *self.verdicts])
+
+
+def _times(factor: float) -> str:
+    for known, words in _WORDS.items():
+        if abs(factor / known - 1.0) < _SMALL:
+            return words
+    return f"{factor:.2g} times"
+
+
+def health(sensors: Sequence[Sensor], estimates: Estimates) -> Health:
+    """Compare estimates with what was declared of these sensors."""
+    values, spreads = estimates.found(sensors)
+    declared = declared_values(sensors)
+    rows = []
+    for s, sensor in enumerate(sensors):
+        quantities = [_quantity(declared[s, c], values[s, c], spreads[s, c], c) for c in (NOISE, DETECTION, ALARMS)]
+        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", *quantities))
+    manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
+    return Health(tuple(rows), manoeuvres)
+
+
+def _quantity(declared: float, seen: float, spread: float, column: int) -> Quantity:
+    """A quantity whose logarithm (of a probability: of its odds) has this deviation."""
+    factors = np.exp([-_WIDTH * spread, _WIDTH * spread])
+    if column == DETECTION:
+        low, high = (seen * factor / (1.0 - seen + seen * factor) for factor in factors.tolist())
+    else:
+        low, high = (seen * factor for factor in factors.tolist())
+    # variances were estimated
+    root = 0.5 if column == NOISE else 1.0
+    return Quantity(*(float(value) ** root for value in (declared, seen, low, high)))

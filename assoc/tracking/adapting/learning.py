@@ -1,0 +1,139 @@
+"""Stages of a step that use the estimates, and that learn from what association found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.gating import angular_components, near_pairs
+from assoc.costs.tracks.tuples import gate_of
+from assoc.filters.base import Expected, predict_each
+from assoc.filters.imm import Mixture
+from assoc.scene.own_times import FULL_TURN
+from assoc.tracking.adapting.in_use import in_use
+from assoc.tracking.adapting.residuals import Predicted, Seen, variances
+from assoc.tracking.looks import looked, out_of_view
+from assoc.tracking.progress import Progress
+from assoc.tracking.track_batch import TrackBatch
+
+# a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
+_WIDER, _FALSE = 4.0, 0.05
+
+
+def use_estimates(progress: Progress) -> Progress:
+    """Stage: go on with the settings that the estimates suggest."""
+    assert progress.state.estimates is not None
+    return progress._replace(settings=in_use(progress.settings, progress.state.estimates))
+
+
+def remember_tracks(progress: Progress) -> Progress:
+    """Stage: keep the tracks that association begins with."""
+    return progress._replace(before=progress.settings.method.current(progress.state))
+
+
+def learn(progress: Progress) -> Progress:
+    """Stage: count detections, misses and false alarms, and weigh residuals."""
+    state, step, settings = progress.state, progress.step, progress.settings
+    estimates, tracks = state.estimates, progress.before
+    assert estimates is not None and step is not None and tracks is not None
+    tracks = tracks[tracks.confirmed]
+    late = tracks
+    if progress.timed is not None and len(tracks):
+        late = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
+    there = progress.with_state(tracks=late)
+    dwells = ~out_of_view(there) & looked(there)
+    rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
+    if len(tracks):
+        _seek(progress, late, rows, dwells)
+    hits = rows > 0
+    sectors = progress.scan.sectors
+    turns = np.ones(len(settings.sensors)) if sectors is None else (sectors[:, 1] - sectors[:, 0]) / FULL_TURN
+    sure = dict(zip(state.tracks.track_id.tolist(), _certainty(state.tracks).tolist(), strict=True))
+    alarms = np.array([sum(1.0 - sure.get(i, 0.0) for i in ids.tolist()) for ids in step.assigned])
+    # before tracks are confirmed, targets look like false alarms
+    if state.scan >= 3:
+        estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
+    estimates = estimates.counted(tracks.track_id, dwells | hits, hits)
+    fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
+    if len(fresh):
+        estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
+    declared = progress.work.settings.sensors
+    return progress.with_state(estimates=estimates.forgotten(turns).settled(declared))
+
+
+def _certainty(tracks: TrackBatch) -> Array:
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(tracks.score, -30.0, 30.0))))
+
+
+def _rows(progress: Progress, ids: Array) -> Array:
+    """1-based measurements of tracks with these ids, ascending, 0 for none, int (T, S)."""
+    assert progress.step is not None
+    rows = np.zeros((len(ids), len(progress.settings.sensors)), dtype=np.int64)
+    for s, taken in enumerate(progress.step.assigned):
+        place = np.minimum(np.searchsorted(ids, taken), len(ids) - 1)
+        known = np.flatnonzero(ids[place] == taken)
+        rows[place[known], s] = known + 1
+    return rows
+
+
+def _seek(progress: Progress, late: TrackBatch, rows: Array, dwells: Array) -> None:
+    """Add measurements outside of the gates of tracks that were missed: without them, noise would seem smaller."""
+    settings, step = progress.settings, progress.step
+    assert step is not None
+    for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
+        missed = np.flatnonzero((rows[:, s] == 0) & dwells[:, s] & (late.missed == 0))
+        free = np.flatnonzero(~np.isin(step.assigned[s], late.track_id))
+        if not len(missed) or not len(free):
+            continue
+        gate, angles = gate_of(sensor, settings.gate_probability), angular_components(sensor)
+        expected = settings.filter.expected(late.states[missed], sensor)
+        size = np.sqrt(np.linalg.det(expected.covariance)) * (2.0 * np.sqrt(gate)) ** sensor.dim
+        most = _FALSE * sensor.volume / (sensor.false_alarm_rate * size)
+        wider = np.minimum(_WIDER, most ** (1.0 / sensor.dim))
+        wide = Expected(expected.mean, expected.covariance * (wider**2)[:, None, None])
+        track, found = near_pairs(wide, z[free], angles, gate)
+        off = sensor.residual(z[free[found]], expected.mean[track])
+        square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(wide.covariance)[track], off)
+        open_track, open_found = np.ones(len(missed), dtype=np.bool_), np.ones(len(free), dtype=np.bool_)
+        for k in np.argsort(square, kind="stable").tolist():
+            t, m = track[k], found[k]
+            if square[k] <= gate and wider[t] > 1.0 and open_track[t] and open_found[m]:
+                open_track[t] = open_found[m] = False
+                rows[missed[t], s] = free[m] + 1
+
+
+def _residuals(
+    progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: Array, fresh: Array
+) -> tuple[Array, Array]:
+    """What the measurements of these tracks say about variances."""
+    settings, estimates = progress.settings, progress.state.estimates
+    assert estimates is not None
+    axes = list(settings.filter.motion.position)
+    states = late.states[fresh]
+    times = progress.scan.own_times() if progress.timed is not None else None
+    seen = []
+    for s, z in enumerate(progress.scan.measurements):
+        track = np.flatnonzero(rows[fresh, s])
+        number = rows[fresh[track], s] - 1
+        at = states[track]
+        if times is not None and len(track):
+            # not before the tracks' last measurement
+            at = predict_each(settings.filter, tracks.states[fresh[track]], times[s][number] - progress.state.time)
+        place = np.zeros((len(track), 3))
+        if len(track):
+            place[:, : len(axes)] = at.mean[:, axes]
+        seen.append(Seen(track, z[number], place))
+    declared = progress.work.settings.sensors
+    return variances(declared, seen, _predicted(states, axes), estimates.used[:, 0])
+
+
+def _predicted(states: Any, axes: list[int]) -> Predicted:
+    """Positions of predicted states."""
+    mean, covariance = states.mean[:, axes], states.covariance[:, axes][:, :, axes]
+    if not isinstance(states, Mixture):
+        one = np.ones((len(mean), 1))
+        return Predicted(covariance, np.zeros((len(mean), 1, len(axes))), covariance[:, None], one)
+    offsets = states.means[:, :, axes] - mean[:, None]
+    return Predicted(covariance, offsets, states.covariances[:, :, axes][:, :, :, axes], states.weights)
