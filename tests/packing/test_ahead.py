@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from assoc._system import compiled
+from tests.told import told
 
 _SEARCH = """
 import numpy as np
@@ -37,7 +38,7 @@ print(len(seen.buffer))
 @pytest.mark.slow
 def test_it_is_what_a_hard_problem_needs():
     done = subprocess.run([sys.executable, "-c", _SEARCH], capture_output=True, text=True, timeout=900)
-    assert (done.returncode, done.stderr, done.stdout) == (0, "", "0\n")
+    assert (done.returncode, told(done.stderr), done.stdout) == (0, "", "0\n")
 
 
 _AHEAD = """
@@ -72,7 +73,7 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), *sys.path])
     code = "from prepares import prepare_clock\n" + _AHEAD
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
 
 
 def test_what_is_compiled_is_looked_for_once(monkeypatch):
@@ -103,4 +104,4 @@ def test_the_first_process_compiles_those_trials_that_the_search_links(tmp_path)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     words = [sys.executable, "-c", _TRIALS]
     done = subprocess.run(words, capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, done.stderr, done.stdout) == (0, "", "True 1\n")
+    assert (done.returncode, told(done.stderr), done.stdout) == (0, "", "True 1\n")

@@ -15,6 +15,7 @@ import assoc
 from assoc._system.helpers import _Beside
 from assoc.simulation import simulate
 from tests.sizes import sample
+from tests.told import told
 
 _CALLS = """
 import numpy as np
@@ -43,7 +44,7 @@ def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.Complete
     done = subprocess.run(
         [sys.executable, *warnings, "-c", code], capture_output=True, text=True, env=environment, timeout=300
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
     return done
 
 

@@ -16,6 +16,7 @@ import assoc
 from assoc._system.kernel_stamp import KernelStamp
 from tests.reliability.test_processes import copied
 from tests.sizes import few_or_all
+from tests.told import told
 
 KERNEL = '''"""Kernels."""
 from typing import Any
@@ -89,7 +90,7 @@ def run(folder: Path) -> list:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN], env=environment, text=True, cwd=folder, capture_output=True
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
     return json.loads(done.stdout)
 
 

@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from tests.told import told
+
 UNTOUCHED = """
 import sys
 import types
@@ -70,7 +72,7 @@ IN_TREE = "delattr(caching, next(name for name in vars(caching) if name.endswith
 def run(code, **environment):
     environment = {**os.environ, "ASSOC_INTERPRET": "0", **environment}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
     return done.stdout.splitlines()
 
 
