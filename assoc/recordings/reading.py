@@ -14,7 +14,7 @@ import numpy as np
 from assoc._files.reading import read_lines
 from assoc._system.door import door
 from assoc._types import Array
-from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, code, number, seconds, whole
 from assoc.recordings.recording import UNDECODED, Recording
@@ -24,6 +24,8 @@ MAX_DISORDER = 30.0
 
 MOST_PLOTS = 20_000_000
 _FARTHEST = 1e7
+# metres: no radar of plots sees farther; and plots from which on bearings within 2 pi degrees are no chance
+_REACH, _ENOUGH = 1.5e6, 10
 
 
 @door
@@ -183,6 +185,21 @@ class _Table:
         name = self.names[meaning]
         return InvalidInputError(f"{self.file}: line {line}, column {name!r}: expected {expected}, got {text[:60]!r}")
 
+    def _doubt_units(self, units: Mapping[str, str], columns: Mapping[str, Array]) -> None:
+        """Warn of ranges and bearings that are hardly in their units."""
+        farthest, turned, unit = columns["range"].max(), np.abs(columns["bearing"]), units["range"]
+        metres = farthest * UNITS["range"][unit]
+        if unit != "m" and metres > _REACH:
+            warn(
+                f"{self.file}: column {self.names['range']!r}: {farthest:.6g} {unit} are {metres / 1000:,.0f} km: "
+                "metres? (column range_m, or units={'range': 'm'})"
+            )
+        if units["bearing"] == "deg" and len(turned) >= _ENOUGH and np.ptp(turned) > 3.0 and turned.max() <= 6.2832:
+            warn(
+                f"{self.file}: column {self.names['bearing']!r}: all within {turned.max():.3g} deg: radians? "
+                "(column bearing_rad, or units={'bearing': 'rad'})"
+            )
+
     def recording(self, units: Mapping[str, str], max_disorder: float, codes: Array | None) -> Recording:
         """Sort, leave out repeated rows, and convert units."""
         if not self.lines:
@@ -202,6 +219,7 @@ class _Table:
         content = np.stack([np.nan_to_num(columns[meaning], nan=-math.inf) for meaning in self.columns_of], axis=1)
         _, first = np.unique(content[order], axis=0, return_index=True)
         keep = order[np.sort(first)]
+        self._doubt_units(units, columns)
         scale = {meaning: UNITS[meaning][unit] for meaning, unit in units.items()}
         levels = columns["altitude"][keep]
         identities = columns["mode3"][keep].astype(np.int64)

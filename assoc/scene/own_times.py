@@ -43,7 +43,8 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
         what = f"{where} of sensor {s}"
         array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, what, (len(z),))
         if len(array) and array.max() > end:
-            raise InvalidInputError(f"{what} must not be after the scan's, {moment(end)}, got {moment(array.max())}")
+            late = moment(array.max())
+            raise InvalidInputError(f"{what} must not be after the scan's time, {moment(end)}, got {late}")
         result.append(array)
     return tuple(result)
 

@@ -6,14 +6,14 @@ import numpy as np
 
 from assoc.problem import AssignmentProblem
 
-# in a small problem all measurements may be false alarms: two sensors must have at least this many
-_ENOUGH = 3
+# one unlikely target may well be false alarms
+_ENOUGH = 2
 
 
 def cost_warnings(problem: AssignmentProblem) -> tuple[str, ...]:
     """Return a warning if no cost favours a target, as when distances or likelihoods are given instead of costs."""
     several = np.count_nonzero(problem.tuples, axis=1) > 1
-    if not problem.dummy or not several.any() or np.count_nonzero(problem.sizes >= _ENOUGH) < 2:
+    if not problem.dummy or np.count_nonzero(several) < _ENOUGH:
         return ()
     singletons = problem.tuples[~several]
     sensor = singletons.argmax(axis=1)

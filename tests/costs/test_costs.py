@@ -147,6 +147,7 @@ def radar(place, noise=(50, 1e-3, 1e-3)):
         ([BearingSensor(position=[x, 0, 0], noise=[5e-3]) for x in (0, 1e4)], [[[0.0], [np.pi]]] * 2),
     ],
 )
+@pytest.mark.filterwarnings("ignore:.* lie outside of its field of view")
 def test_extremes_stay_finite(sensors, measurements):
     scene = Scene(sensors, [0.0], [measurements])
     tuples = all_tuples(scene, least=1)

@@ -2,13 +2,14 @@
 
 import math
 import os
+import warnings
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocWarning, InvalidInputError
 from assoc.recordings import Recording, garbled_altitudes, radar_of, read_plots, write_plots
 from tests.recordings.common import TABLE_2_1, circling
 
@@ -249,3 +250,30 @@ def test_octal_codes(tmp_path):
 def test_times_with_an_exponent(tmp_path):
     text = "time,range,bearing\n1.5e-05,1,1\n1e-3,1,2\n1.5e+01,1,3\n"
     assert read_plots(written(tmp_path, text)).times.tolist() == [1.5e-5, 1e-3, 15.0]
+
+
+@pytest.mark.parametrize(
+    ("head", "ranges", "bearings", "message"),
+    [
+        (
+            "time,range,bearing",
+            [20_000, 5_000],
+            [10, 200],
+            "'range': 20000 nmi are 37,040 km",
+        ),
+        (
+            "time,range,bearing",
+            range(20, 32),
+            [0.5 * k for k in range(12)],
+            "'bearing': all within 5.5 deg",
+        ),
+        ("time,range_km,bearing", [20_000, 5_000], [10, 200], "'range_km': 20000 km are 20,000 km"),
+        ("time,range_m,bearing", [20_000, 5_000], [1, 2], None),
+        ("time,range,bearing", range(20, 32), [3 + 0.2 * k for k in range(12)], None),  # a sector
+    ],
+)
+def test_units_that_are_hardly_meant_are_told(tmp_path, head, ranges, bearings, message):
+    rows = "".join(f"{t},{r},{b}\n" for t, (r, b) in enumerate(zip(ranges, bearings, strict=True)))
+    file = written(tmp_path, f"{head}\n{rows}")
+    with warnings.catch_warnings() if message is None else pytest.warns(AssocWarning, match=message):
+        read_plots(file)

@@ -9,7 +9,8 @@ from tests.costs.reference import all_tuples, constant, measures_positions, resi
 from tests.reliability.scenes import draw
 from tests.sizes import few_or_all
 
-pytestmark = pytest.mark.filterwarnings("error")
+# angles of several turns, and targets beyond every view, are warned of
+pytestmark = pytest.mark.filterwarnings("error", "ignore::assoc.errors.AssocWarning")
 
 
 def clear_of_sensors(scene, one, target, scale):

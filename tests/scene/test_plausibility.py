@@ -89,7 +89,10 @@ def test_no_warning_at_the_edges_of_what_is_sound():
             scans = [[bearings[[k]], ranges[[k]], flat[[k]]] for k in range(n)]
             Scene([bearing, radar, plane], np.arange(n), scans)
         # a problem without a target in it
-        assoc.assign(assoc.AssignmentProblem([[1, 1], [1, 2], [2, 1]], [3.0, 2.0, 1.0], [2, 2]))
+        assoc.assign(assoc.AssignmentProblem([[1, 1]], [3.0], [2, 2]))
+        # targets near a radar of long reach, and one seen by a little beyond the zenith, north and the field of view
+        few = [[5e3, 0.1, 0.1], [1.2e3, 2 * np.pi + 0.03, np.pi / 2 + 0.03], [1.5e5, 0.2, 0.2]]
+        Scene([radar], [0.0, 1.0], [[np.array(few)], [np.zeros((0, 3))]])
 
 
 def changed(scene, factors):
@@ -118,6 +121,22 @@ def test_measurements_in_other_units(factors, message):
     assert {one.filename for one in caught} == {__file__}
 
 
+@pytest.mark.parametrize(
+    ("few", "message"),
+    [
+        ([[5e4, 0.1, 30.0]], "elevations from 30 to 30 rad, but nothing is seen beyond pi/2"),
+        ([[5e4, 350.0, 0.1], [5e4, 2.0, 0.1]], "azimuths from 2 to 350 rad: degrees"),
+        ([[3.3e5, 0.1, 0.1]], r"100 % of its ranges \(3.3e\+05 to 3.3e\+05 m\) lie outside"),
+        ([[12.0, 0.1, 0.1], [80.0, 0.2, 0.1], [45.0, 0.3, 0.1]], "its ranges end at 80 m, .* kilometres"),
+    ],
+)
+def test_few_measurements_in_other_units(few, message):
+    radar = Radar3D(position=[0, 0, 0], noise=[50, 0.01, 0.01], field_of_view=[[0, 1e5], [-1, 1], [0, np.pi / 2]])
+    with pytest.warns(AssocWarning, match=message) as caught:
+        Scene([radar], [0.0], [[np.array(few)]])
+    assert len(caught) == 1
+
+
 def test_positions_in_degrees_or_kilometres():
     rng = np.random.default_rng(1)
     sensor = PositionSensor(position=[0, 0, 0], noise=[50, 50], field_of_view=[[-1e5, 1e5]] * 2)
@@ -142,6 +161,8 @@ def test_costs_of_which_none_is_negative():
     with pytest.warns(AssocWarning, match="none of the 27 tuples costs less .* negative log likelihood ratios"):
         found = assoc.assign(problem)
     assert found.status == "optimal" and (np.count_nonzero(found.tuples, axis=1) == 1).all()
+    with pytest.warns(AssocWarning, match="none of the 2 tuples"):
+        assoc.assign(assoc.AssignmentProblem([[1, 1], [2, 2]], [3.0, 5.0], [2, 2]))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assoc.assign(assoc.AssignmentProblem(problem.tuples[:27], np.append(costs[:-1], -1.0), [3, 3, 3]))
