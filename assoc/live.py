@@ -5,27 +5,33 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
+import math
+import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from typing import IO, TYPE_CHECKING, Any
 
 from assoc._cli.options import Given, Parser
 from assoc._cli.program import Program
 from assoc._cli.signals import Interruption
 from assoc._cli.track.options import LIVE, live_parser, make_tracker, read_options, with_further
-from assoc._files.output import STDOUT
+from assoc._files.output import STDOUT, is_stream
+from assoc._system.compile_time import announcement
 from assoc._text.plain import printable
+from assoc._text.times import moment
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from assoc._cli.track.plot_lines import Lines
     from assoc.plotting.live import LivePage
-    from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.tracking import LiveTracker, Picture
 
 _INTERRUPTION = Interruption("assoc.live")
+# seconds between two savings of the state, ids that are reserved until the next, and most bytes of a line
+_EVERY, _IDS, _LONGEST = 5.0, 100, 10_000
 
 
 def _live(words: list[str]) -> None:
@@ -34,18 +40,25 @@ def _live(words: list[str]) -> None:
     if given["udp"] is not None and given["replay"] is not None:
         raise InvalidInputError("--udp and --replay: expected one of them")
     given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
-    from assoc._cli.track.plot_lines import Lines
+    from assoc._cli.track.plot_lines import Lines, header_of
     from assoc.scene.scene import Scene
 
     scene = Scene.load(given["file"])
-    tracker = _tracker(scene, given, settings)
+    going_on = given["state"] is not None and os.path.exists(given["state"])
+    _check_output(given["output"], header_of(scene.origin), going_on)
+    with announcement.silenced() if given["quiet"] else nullcontext():
+        tracker = _tracker(scene, given, settings)
+    if going_on:
+        tracker.restore(given["state"])
+        _say(given, f"goes on from {given['state']}, which ends at {moment(tracker.state.newest)}")
+    state = _StateFile(given["state"], tracker)
     page = _page(scene, given, heights=len(tracker.positions) > 2)
     lines = Lines(given["udp"]) if given["replay"] is None else None
     if lines is not None and lines.port is not None:
         _say(given, f"plots: udp 127.0.0.1:{lines.port}")
     if given["verbose"]:
         _say(given, ", ".join(f"{name} {value}" for name, value in settings.items()))
-    outputs = _Outputs(given["output"], page, tracker.positions, scene.origin)
+    outputs = _Outputs(given["output"], page, tracker, going_on)
     losing = False
 
     def show(pictures: Iterable[Picture]) -> None:
@@ -55,9 +68,11 @@ def _live(words: list[str]) -> None:
             if lines is not None and lines.lost and not losing:
                 losing = True
                 _print("datagrams are lost: they come quicker than tracks can be made")
+        state.keep()
 
     def end() -> None:
         show(tracker.finish())
+        state.keep(last=True)
         outputs.close()
         if lines is not None and lines.lost:
             _print(f"{lines.lost} datagrams lost: they came quicker than tracks can be made")
@@ -66,6 +81,40 @@ def _live(words: list[str]) -> None:
     with _INTERRUPTION.reported(end):
         _take_plots(lines, scene, tracker, given, show)
     end()
+
+
+class _StateFile:
+    """The file in which a live tracker's state is kept, if there is one; it is there before the first track is."""
+
+    def __init__(self, path: str | None, tracker: LiveTracker) -> None:
+        self._path, self._tracker = path, tracker
+        self._due, self._ids = -math.inf, 0
+        self.keep()
+
+    def keep(self, *, last: bool = False) -> None:
+        """Save the state if it is time to, or before new tracks get ids that were not reserved."""
+        next_id = self._tracker.state.tracker.next_id
+        if self._path is None or not (last or time.monotonic() >= self._due or next_id >= self._ids):
+            return
+        # after a crash tracks that began since are not known: their ids must not be used again
+        reserve = 0 if last else _IDS
+        self._tracker.save(self._path, reserve=reserve)
+        self._due, self._ids = time.monotonic() + _EVERY, next_id + reserve
+
+
+def _check_output(path: str | None, header: str, going_on: bool) -> None:
+    """Refuse an output other than tracks to go on with; cut off a line that a crash left unfinished."""
+    if path in (None, STDOUT) or is_stream(path) or not os.path.exists(path) or not os.path.getsize(path):
+        return
+    if not going_on:
+        raise InvalidInputError(f"{path}: is there already; expected a new name, or --state to go on with its tracks")
+    with open(path, "rb+") as file:
+        if file.readline().decode("utf-8", "replace").strip() != header:
+            raise InvalidInputError(f"{path}: holds other columns than those of these tracks; expected a new name")
+        end = file.seek(0, os.SEEK_END)
+        file.seek(max(0, end - _LONGEST))
+        tail = file.read()
+        file.truncate(end - len(tail) + tail.rfind(b"\n") + 1)
 
 
 def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracker:
@@ -121,18 +170,18 @@ def _take_plots(
 class _Outputs:
     """Outputs of pictures: lines to a file or stdout, and the page if there is one."""
 
-    def __init__(
-        self, path: str | None, page: LivePage | None, positions: Sequence[int], origin: Origin | None
-    ) -> None:
+    def __init__(self, path: str | None, page: LivePage | None, tracker: LiveTracker, going_on: bool) -> None:
         from assoc._cli.track.plot_lines import TrackWriter
 
         self._page = page
         self._name = "stdout" if path in (None, STDOUT) else path
         self._stream: IO[str] = sys.stdout
         if path not in (None, STDOUT):
-            self._stream = open(path, "w", encoding="utf-8", newline="\n")
+            self._stream = open(path, "a", encoding="utf-8", newline="\n")
+        known = [track for track in tracker.state.tracker.tracks if track.track_id in tracker.confirmed]
+        origin, begun = tracker.settings.scene.origin, self._stream is not sys.stdout and self._stream.tell() > 0
         with self._writing():
-            self._writer = TrackWriter(self._stream, positions, origin)
+            self._writer = TrackWriter(self._stream, tracker.positions, origin, known, begun=begun)
 
     def show(self, picture: Picture) -> None:
         """Write the changes."""

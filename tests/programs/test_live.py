@@ -99,11 +99,12 @@ def test_the_default_filter_suits_the_turns(tmp_path, monkeypatch, capsys):
     expected = described(MultiSensorTracker.for_scene(scene).filter)
     for more in (["--turns", "4,5,5.5"], []):
         made.clear()
-        words = [str(tmp_path / "radars.npz"), "--replay", "0", "-o", str(tmp_path / "t.csv"), *more]
+        words = [str(tmp_path / "radars.npz"), "--replay", "0", "-o", str(tmp_path / f"{len(more)}.csv"), *more]
         assert live.main(words) == 0
         assert {described(one.filter) for one in made} == {expected}
     made.clear()
     assert " steps; a step takes " in capsys.readouterr().err
+    (tmp_path / "0.csv").unlink()
     assert live.main([*words, "--turns", "9,10,12", "-q"]) == 0
     assert {described(one.filter) for one in made} == {described(two_speeds(manoeuvre_noise(9.0)))}
     assert capsys.readouterr().err == ""
@@ -291,7 +292,7 @@ def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
     told, tracks = {}, {}
     for how in (None, "score-only", "ignore", "use"):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines.encode())))
-        out = tmp_path / "tracks.csv"
+        out = tmp_path / f"{how}.csv"
         more = [] if how is None else ["--identity", how]
         given = [str(tmp_path / "radar.npz"), "--interval", "4", "--tracker", "nearest-neighbour"]
         assert live.main([*given, "-o", str(out), *more]) == 0
@@ -303,3 +304,66 @@ def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
     assert tracks[None] == tracks["score-only"] == tracks["ignore"] != tracks["use"]
     assert live.main([*given, "--replay", "0", "--identity", "use", "-o", str(out)]) == 2
     assert "--identity: is only for plots, not for the measurements of a scene" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on(scene_file, tmp_path):
+    """SIGKILL; the source repeats its last seconds, and the tracks are those of a run that was never killed."""
+    scene = Scene.load(scene_file)
+    lines = [*as_lines(scene, "csv")]
+    whole = subprocess.run(words(scene_file), input="\n".join(lines), capture_output=True, text=True, timeout=300)
+    more = ["-o", tmp_path / "tracks.csv", "--state", tmp_path / "live.npz"]
+    # saved after each plot, so that the test need not wait
+    own = [*words(scene_file, *more)]
+    own[3:5] = ["-c", "from assoc import live; live._EVERY = 0.0; raise SystemExit(live.start())"]
+    half = len(lines) * 2 // 3
+    program = subprocess.Popen(own, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    program.stdin.write("\n".join(lines[:half]) + "\n")
+    program.stdin.flush()
+    ended = float(lines[half - 1].split(",")[1]) - 1.0
+    deadline = time.monotonic() + 300
+    while time.monotonic() < deadline:
+        text = (tmp_path / "tracks.csv").read_text() if (tmp_path / "tracks.csv").exists() else ""
+        if text.count("\n") > 1 and pd.read_csv(io.StringIO(text[: text.rfind("\n")])).time.max() >= np.floor(ended):
+            break
+        time.sleep(0.1)
+    program.kill()
+    program.communicate()
+    with open(tmp_path / "tracks.csv", "a") as file:
+        file.write("7,12.5,40")  # the line that it was writing
+    rest = lines[half - 10 :]
+    again = subprocess.run(own, input="\n".join(rest), capture_output=True, text=True, timeout=300)
+    assert again.returncode == 0, again.stderr
+    assert "goes on from" in again.stderr and " repeated" in again.stderr
+    check(whole.stdout)
+    expected, found = (pd.read_csv(io.StringIO(text)) for text in (whole.stdout, (tmp_path / "tracks.csv").read_text()))
+    # what came after the last state was saved may be there twice; ids of tracks that begin later differ
+    found = found.drop_duplicates()
+    early = expected[expected.track_id.isin(expected[expected.time < ended].track_id)]
+    pd.testing.assert_frame_equal(
+        found[found.track_id.isin(early.track_id)].sort_values(["time", "track_id"]).reset_index(drop=True),
+        early.sort_values(["time", "track_id"]).reset_index(drop=True),
+    )
+    assert len(found) == len(expected)
+
+
+def test_no_output_is_overwritten(scene_file, tmp_path, capsys):
+    tracks, state = tmp_path / "tracks.csv", tmp_path / "live.npz"
+    words = [str(scene_file), "--turns", "4,5,5.5", "--replay", "0", "-q", "-o", str(tracks)]
+    tracks.write_text("precious\n")
+    assert live.main(words) == live.main([*words, "--state", str(state)]) == 2
+    assert f"{tracks}: is there already; expected a new name, or --state" in capsys.readouterr().err
+    tracks.unlink()
+    assert live.main([*words, "--state", str(state)]) == 0
+    before = tracks.read_text()
+    assert before.count("\n") > 20 and Scene.load(scene_file) and state.exists()
+    # all plots are known, or too old
+    tracks.write_text("precious\n")
+    assert live.main([*words, "--state", str(state)]) == 2
+    assert "holds other columns" in capsys.readouterr().err and tracks.read_text() == "precious\n"
+    for bad in ("--state", str(tmp_path / "no" / "live.npz")), ("--state", "live.csv"):
+        tracks.unlink(missing_ok=True)
+        assert live.main([*words, *bad]) == 2
+    (tmp_path / "junk.npz").write_bytes(b"junk")
+    assert live.main([*words, "--state", str(tmp_path / "junk.npz")]) == 2
+    assert "junk.npz: is not a readable npz file" in capsys.readouterr().err

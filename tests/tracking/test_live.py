@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -275,3 +276,70 @@ def test_a_plot_without_values_is_left_out(scene):
     assert tracker.counts["unusable"] == 1 and told[0].endswith(
         "left out: measurements of sensor 0 must have 3 values; further ones are only counted"
     )
+
+
+def pictured(pictures):
+    """Pictures as plain values."""
+    return [
+        (
+            one.time,
+            one.ended,
+            [(t.track_id, t.time, t.hits, t.mean.tolist(), t.covariance.tolist()) for t in one.tracks],
+        )
+        for one in pictures
+    ]
+
+
+@pytest.mark.parametrize("name", ["nearest-neighbour", "multi-sensor", "mht"])
+@pytest.mark.parametrize("again", [0, 15])
+def test_a_saved_tracker_goes_on_as_if_nothing_had_happened(scene, tmp_path, name, again):
+    """Whether the source goes on where it was, or repeats its last plots, which are known; plots come late, too."""
+    identity = IdentityParameters() if name == "mht" else None
+    options = {
+        "make": lambda: TRACKERS[name].for_scene(scene, identity=identity),
+        "tell": [].append, "turns": TURNS, "horizon": 8.0,
+    }  # fmt: skip
+    plots = [(sensor, time, values, (k % 7, 0)) for k, (sensor, time, values, _) in enumerate(replayed(scene, 0.0))]
+    plots = [plots[k] for k in np.argsort([time + 3.0 * (k % 5 == 0) for k, (_, time, *_) in enumerate(plots)])]
+    half = len(plots) // 2
+    whole, first = LiveTracker(scene, **options), LiveTracker(scene, **options)
+    early = [picture for plot in plots[:half] for picture in whole.take(*plot)]
+    for plot in plots[:half]:
+        first.take(*plot)
+    first.save(tmp_path / "live.npz")
+    second = LiveTracker(scene, **options)
+    second.restore(tmp_path / "live.npz")
+    assert early[-1].tracks and whole.counts["late"] > 0
+    rest = [picture for plot in plots[half:] for picture in whole.take(*plot)] + whole.finish()
+    assert pictured(fed(second, plots[half - again :])) == pictured(rest)
+    assert second.counts - Counter(repeated=again) == whole.counts
+
+
+def test_a_saved_state_is_checked(scene, tmp_path):
+    tracker, _ = live(scene)
+    for plot in [*replayed(scene, 0.0)][:80]:
+        tracker.take(*plot)
+    tracker.save(tmp_path / "live.npz", reserve=100)
+    other, _ = live(scene)
+    other.restore(tmp_path / "live.npz")
+    assert other.state.tracker.next_id == tracker.state.tracker.next_id + 100
+    for options, message in [
+        ({"interval": 0.5}, "live.npz: was saved with interval 1.0, .* not interval 0.5"),
+        ({"make": lambda: TRACKERS["mht"].for_scene(scene)}, "other settings: tracker was 'nearest-neighbour'"),
+    ]:
+        with pytest.raises(InvalidInputError, match=message):
+            LiveTracker(scene, **({"make": tracker.settings.make, "turns": TURNS} | options)).restore(
+                tmp_path / "live.npz"
+            )
+    arrays = dict(np.load(tmp_path / "live.npz"))
+    for field, value in [
+        ("live.plots", arrays["live.plots"][:, :3]),
+        ("live.plots", np.where(arrays["live.plots"] > 0, np.nan, 9.0)),
+        ("live.scans", arrays["live.scans"][::-1]),
+        ("live.counts", np.array("[1")),
+        ("live.antennas", arrays["live.antennas"][:1]),
+        ("live.names", np.zeros((2, 3), int)),
+    ]:
+        np.savez(tmp_path / "bad.npz", **{**arrays, field: value})
+        with pytest.raises(InvalidInputError, match="bad.npz: "):
+            live(scene)[0].restore(tmp_path / "bad.npz")

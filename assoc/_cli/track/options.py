@@ -133,6 +133,8 @@ LIVE = (
     Option("file", "SCENE.npz", "scene with the sensors and the region", positional=True),
     Option("output", "FILE", "file for the tracks (.csv; default: stdout)", kinds.Output(".csv", strict=True),
            short="-o"),
+    Option("state", "FILE", "keep the state in this file (.npz) every few seconds; go on from it if it is there",
+           kinds.Output(".npz", strict=True, streams=False)),
     Option("udp", "PORT", "read plots from this UDP port on 127.0.0.1 (default: stdin)", kinds.whole(0)),
     Option("replay", "X", "take the scene's own plots, X times as quickly as they were made (0: at once)",
            kinds.not_negative),

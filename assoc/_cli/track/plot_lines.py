@@ -9,7 +9,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from assoc._text.times import decimals
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
-    from assoc.tracking import Picture
+    from assoc.tracking import Picture, Track
 
 ADDRESSES = 2**24
 """Number of ICAO addresses."""
@@ -241,14 +241,41 @@ def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
         yield plot
 
 
-class TrackWriter:
-    """Writes a line of CSV for each track that is new, was detected, or has ended."""
+def header_of(origin: Origin | None) -> str:
+    """First line of the tracks."""
+    return ",".join(COLUMNS if origin is None else (*COLUMNS, *COORDINATES))
 
-    def __init__(self, stream: IO[str], positions: Sequence[int], origin: Origin | None = None) -> None:
+
+class TrackWriter:
+    """Writes a line of CSV for each track that is new, was detected, or has ended.
+
+    Parameters
+    ----------
+    stream : file
+    positions : sequence of int
+        Indices of x, y (and z) in the state.
+    origin : tuple, optional
+        Of the scene.
+    known : iterable of Track
+        Tracks that have their line already.
+    begun : bool
+        Whether the stream has its header.
+    """
+
+    def __init__(
+        self,
+        stream: IO[str],
+        positions: Sequence[int],
+        origin: Origin | None = None,
+        known: Iterable[Track] = (),
+        *,
+        begun: bool = False,
+    ) -> None:
         self._stream, self._positions, self._origin = stream, list(positions), origin
-        self._known: dict[int, Any] = {}
-        stream.write(",".join(COLUMNS if origin is None else (*COLUMNS, *COORDINATES)) + "\n")
-        stream.flush()
+        self._known = {track.track_id: track for track in known}
+        if not begun:
+            stream.write(header_of(origin) + "\n")
+            stream.flush()
 
     def write(self, picture: Picture) -> None:
         """Write the changes since the last picture."""
@@ -258,9 +285,8 @@ class TrackWriter:
                 self._row("new" if before is None else "update", track, track.time)
                 self._known[track.track_id] = track
         for number in picture.ended:
-            track = self._known.pop(number, None)
-            if track is not None:
-                self._row("end", track, picture.time)
+            if number in self._known:
+                self._row("end", self._known.pop(number), picture.time)
         self._stream.flush()
 
     def _row(self, event: str, track: Any, when: float) -> None:

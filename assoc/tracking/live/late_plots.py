@@ -8,7 +8,7 @@ any method of association. Tracks keep their ids through this.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,6 +43,11 @@ class _Past(NamedTuple):
     sectors: Array | None
     identities: Sequence[Array] | None
     assigned: tuple[Array, ...]
+
+    def by_sensor(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Times, values and identities of each sensor's measurements."""
+        stamps = self.times or [np.full(len(z), self.time) for z in self.measurements]
+        return zip(stamps, self.measurements, self.identities or no_identities(self.measurements), strict=True)
 
     def with_late(self, s: int, z: Array, times: Array, codes: Array | None) -> _Past:
         """The scan with late measurements of sensor s appended."""
@@ -95,10 +100,11 @@ class LatePlots:
             raise InvalidInputError(f"tracker must be a tracker of assoc.tracking, got {type(tracker).__name__}")
         self.tracker, self.horizon = tracker, positive(horizon, "horizon")
         self.late = self.refused = 0
-        self._past: list[_Past] = []
-        self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
+        self.past: list[_Past] = []
+        """The scans that may still be revised, the oldest first."""
+        self.names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
         """From the tracker's internal ids to the ids that are handed out."""
-        self.next_id = max(first_id, max(self._names, default=0) + 1)
+        self.next_id = max(first_id, max(self.names, default=0) + 1)
         self._decided: dict[int, tuple[int, Decision]] = {}
         """By scan: the scan whose step decided it, and the decision."""
         self._many = self._most = many
@@ -123,7 +129,7 @@ class LatePlots:
     @property
     def scans(self) -> list[float]:
         """Times of the scans that may still be revised, the oldest first, seconds."""
-        return [past.time for past in self._past]
+        return [past.time for past in self.past]
 
     def past_tracks(self, scan: int) -> list[Track]:
         """The tracks at the end of one of `scans`, by all measurements that have arrived since.
@@ -133,10 +139,10 @@ class LatePlots:
         scan : int
             Index in `scans`; negative from the end.
         """
-        count = len(self._past)
+        count = len(self.past)
         if not -count <= scan < count:
             raise InvalidInputError(f"scan must be a number in the {count} scans that are kept, got {scan}")
-        states = [*(past.before for past in self._past[1:]), self.tracker.state]
+        states = [*(past.before for past in self.past[1:]), self.tracker.state]
         return self._tracks(states[scan])
 
     def step(
@@ -179,8 +185,8 @@ class LatePlots:
         on_time = [array >= now for array in stamps]
         if all(mask.all() for mask in on_time):
             return self._finish(self._advance(time, checked, stamps, sectors, codes), 0, 0)
-        before = tracker.state, self._past, self._names, self._decided, self.next_id
-        self._past, self._names, self._decided = list(self._past), dict(self._names), dict(self._decided)
+        before = tracker.state, self.past, self.names, self._decided, self.next_id
+        self.past, self.names, self._decided = list(self.past), dict(self.names), dict(self._decided)
         confirmed = {track.track_id for track in self.tracks if track.confirmed}
         try:
             moves, refused = self._insert(checked, stamps, codes, on_time)
@@ -193,13 +199,13 @@ class LatePlots:
             assert new is not None
             step = self._advance(time, new, new_stamps, sectors, new_codes)
         except BaseException:
-            tracker.state, self._past, self._names, self._decided, self.next_id = before
+            tracker.state, self.past, self.names, self._decided, self.next_id = before
             raise
         assigned = [np.zeros(len(z), dtype=np.int64) for z in checked]
         for s, mask in enumerate(on_time):
             assigned[s][mask] = step.assigned[s]
         for k, s, rows, begin in moves:
-            assigned[s][rows] = self._past[k].assigned[s][begin:][: len(rows)]
+            assigned[s][rows] = self.past[k].assigned[s][begin:][: len(rows)]
         sure = [track.track_id for track in self.tracks if track.confirmed]
         known = tuple(np.isin(ids, sure) & (ids > 0) for ids in assigned)
         ended = np.array(sorted(confirmed - {track.track_id for track in self.tracks}), dtype=np.int64)
@@ -210,8 +216,8 @@ class LatePlots:
         self, measurements: list[Array], stamps: Sequence[Array], codes: list[Array] | None, on_time: list[Array]
     ) -> tuple[list[_Move], int]:
         """Insert late measurements into their scans; also return how many are too old."""
-        ends = np.array([past.time for past in self._past])
-        first = self._past[0].before.time if self._past else None
+        ends = np.array([past.time for past in self.past])
+        first = self.past[0].before.time if self.past else None
         moves, refused = [], 0
         for s, (z, times) in enumerate(zip(measurements, stamps, strict=True)):
             rows = np.flatnonzero(~on_time[s])
@@ -223,21 +229,21 @@ class LatePlots:
             refused += int((~good).sum())
             for k in np.unique(scan[good]).tolist():
                 late = rows[good & (scan == k)]
-                moves.append(_Move(k, s, late, len(self._past[k].measurements[s])))
+                moves.append(_Move(k, s, late, len(self.past[k].measurements[s])))
                 late_codes = None if codes is None else codes[s][late]
-                self._past[k] = self._past[k].with_late(s, z[late], times[late], late_codes)
+                self.past[k] = self.past[k].with_late(s, z[late], times[late], late_codes)
         return moves, refused
 
     def _again(self, first: int) -> None:
         """Process the scans from index `first` on again, and match the tracks to their ids."""
         tracker = self.tracker
-        tracker.state = self._past[first].before
+        tracker.state = self.past[first].before
         # tracks that began since then have new internal ids
-        names = {inner: outer for inner, outer in self._names.items() if inner < tracker.state.next_id}
+        names = {inner: outer for inner, outer in self.names.items() if inner < tracker.state.next_id}
         votes: Counter[tuple[int, int]] = Counter()
         steps = []
-        for k, past in enumerate(self._past[first:], start=first):
-            self._past[k] = past._replace(before=tracker.state)
+        for k, past in enumerate(self.past[first:], start=first):
+            self.past[k] = past._replace(before=tracker.state)
             step = tracker.step(past.time, past.measurements, past.times, past.sectors, past.identities)
             steps.append(step)
             for new, old in zip(step.assigned, past.assigned, strict=True):
@@ -247,9 +253,9 @@ class LatePlots:
             if inner and outer and inner not in names and outer not in taken:
                 names[inner] = outer
                 taken.add(outer)
-        self._names = names
+        self.names = names
         for k, step in enumerate(steps, start=first):
-            self._past[k] = self._past[k]._replace(assigned=self._named(step.assigned))
+            self.past[k] = self.past[k]._replace(assigned=self._named(step.assigned))
             self._decide(step)
 
     def _advance(
@@ -260,7 +266,7 @@ class LatePlots:
         before = self.tracker.state
         step = self.tracker.step(time, measurements, times, sectors, codes)
         assigned = self._named(step.assigned)
-        self._past.append(_Past(before, step.time, measurements, times, sectors, codes, assigned))
+        self.past.append(_Past(before, step.time, measurements, times, sectors, codes, assigned))
         self._decide(step)
         ended = np.array(sorted(self._name(i) for i in step.ended.tolist()), dtype=np.int64)
         return replace(step, assigned=assigned, ended=ended)
@@ -272,17 +278,15 @@ class LatePlots:
     def _finish(self, step: Step, late: int, refused: int) -> Step:
         """Forget scans beyond the horizon, and the names of dead tracks."""
         self.late, self.refused = self.late + late, self.refused + refused
-        self._past = [past for past in self._past if past.time >= step.time - self.horizon]
-        open_scans = step.scan - len(self._past)
+        self.past = [past for past in self.past if past.time >= step.time - self.horizon]
+        open_scans = step.scan - len(self.past)
         # decisions made by a scan that is still kept may change when it is processed again
         done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
         final = tuple(self._decided.pop(scan)[1] for scan in done)
-        if len(self._names) > self._most:
-            living = set().union(
-                *(_ids(state) for state in (self.tracker.state, *(past.before for past in self._past)))
-            )
-            self._names = {inner: outer for inner, outer in self._names.items() if inner in living}
-            self._most = self._many + 2 * len(self._names)
+        if len(self.names) > self._most:
+            living = set().union(*(_ids(state) for state in (self.tracker.state, *(past.before for past in self.past))))
+            self.names = {inner: outer for inner, outer in self.names.items() if inner in living}
+            self._most = self._many + 2 * len(self.names)
         return replace(step, final=final, late=late, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:
@@ -292,10 +296,10 @@ class LatePlots:
 
     def _name(self, inner: int) -> int:
         """The id that is handed out for a track, by its internal id."""
-        if inner not in self._names:
-            self._names[inner] = self.next_id
+        if inner not in self.names:
+            self.names[inner] = self.next_id
             self.next_id += 1
-        return self._names[inner]
+        return self.names[inner]
 
     def _outside(self, decision: Decision) -> Decision:
         """The decision with the ids that are handed out."""

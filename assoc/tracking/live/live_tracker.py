@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time as clock
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
@@ -19,6 +20,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors.base import LARGEST
 from assoc.tracking.checking import checked
 from assoc.tracking.identity_evidence import checked_identities
+from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
 from assoc.tracking.live.pictures import Antenna, Picture, PlotKey, SoundPlot
@@ -127,7 +129,8 @@ class LiveTracker:
         late = positive(horizon, "horizon"), positive(wait, "wait", zero=True)
         self.settings = LiveSettings(scene, make, *spans, *late, tell)
         self.state = LiveState(LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors])
-        self._confirmed: set[int] = set()
+        self.confirmed: set[int] = set()
+        """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
         self.counts: Counter[str] = Counter()
         """Plots used, late plots, and those that could not be used, by reason."""
@@ -147,6 +150,28 @@ class LiveTracker:
         text = str(name).strip()
         number = int(text) - 1 if text.isascii() and text.isdigit() and len(text) < 10 else -1
         return number if 0 <= number < len(self.settings.scene.sensors) else names.get(text)
+
+    def save(self, path: str | os.PathLike[str], *, reserve: int = 0) -> None:
+        """Write the whole state: a tracker that restores it and takes the same plots gives the same tracks.
+
+        Parameters
+        ----------
+        path : path-like
+            Written whole or not at all.
+        reserve : int
+            Number of ids that new tracks will not get, since they may be used before the next `save`.
+        """
+        state_file.save(path, self, self.state.tracker.next_id + reserve)
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Read the state of a tracker with the same scene and settings; plots that it has are taken for repeated.
+
+        Raises
+        ------
+        InvalidInputError
+            The file is not such a state.
+        """
+        state_file.restore(path, self)
 
     def leave_out(self, kind: str, line: str) -> None:
         """Count a plot that cannot be used; report the first of its kind."""
@@ -322,7 +347,7 @@ class LiveTracker:
         self._kept.settle({track.track_id for track in living}, too_old)
         tracks = [track for track in living if track.confirmed]
         ids = {track.track_id for track in tracks}
-        ended, self._confirmed = sorted(self._confirmed - ids), ids
+        ended, self.confirmed = sorted(self.confirmed - ids), ids
         found = [single_positions(settings.scene, s, measured)[0] for s, measured in enumerate(z)]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
         return Picture(end, tracks, ended, np.concatenate(found), owner)
