@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
-from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
+from assoc.packing.branching.counts import USUAL, Leaf, Splitting, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.node import (
     Work,
     allowed_at,
@@ -60,10 +60,6 @@ from assoc.ranking.enumeration import (
 
 FIRST_BUDGET = 3000
 NODE_BUDGET = 500
-# nodes after which a search may restart with cuts and split on counts, and again whenever they have doubled
-_HARD = 40
-# share of the gap to the limit by which a split must raise the bound
-_RAISED = 0.02
 # an unlimited budget
 _ALL = 1 << 60
 
@@ -89,6 +85,8 @@ class ComponentRanking:
         Time limit by the kernels' clock (`Run.deadline`); the current node then stays open.
     memory_allows : callable, optional
         Whether the search may allocate this many bytes more (`Run.memory_allows`).
+    splitting : Splitting
+        When it restarts with cuts, split on counts.
     """
 
     def __init__(
@@ -102,6 +100,7 @@ class ComponentRanking:
         budget: int = NODE_BUDGET,
         deadline: Callable[[], float] = never,
         memory_allows: Callable[[float], bool] = memory_allows,
+        splitting: Splitting = USUAL,
     ) -> None:
         self._packing = packing
         self._deadline = deadline
@@ -113,8 +112,9 @@ class ComponentRanking:
         self._work: Work | None = None
         # the parts of the root not searched yet, the least bound last
         self._waiting: list[Leaf] = []
-        self._split_at = _HARD
+        self._splitting, self._split_at = splitting, splitting.after
         self.nodes = 0
+        self.parts_begun = 0
 
     @property
     def done(self) -> bool:
@@ -146,6 +146,7 @@ class ComponentRanking:
                 return
             if self._open.count == 0:
                 given_up = self._open.given_up
+                self.parts_begun += 1
                 self._open, self._work = begin_leaf(self._packing, self._waiting.pop(), given_up, self._work)
             elif self.nodes >= self._split_at and self._split():
                 continue
@@ -173,9 +174,9 @@ class ComponentRanking:
         if not (cut < np.inf and self._open.given_up == np.inf and self._memory_allows(needed)):
             return False
         root = root_with_cuts(packing, self._root.duals, cut, self._deadline())
-        leaves = split_on_counts(packing, root, cut, cut, self._deadline())
+        leaves = split_on_counts(packing, root, cut, cut, self._deadline(), self._splitting.pays)
         proven = self.proven
-        if min((leaf.bound for leaf in leaves), default=cut) <= proven + _RAISED * (cut - proven):
+        if min((leaf.bound for leaf in leaves), default=cut) <= proven + self._splitting.raised * (cut - proven):
             return False
         self._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
         self._open.count = 0

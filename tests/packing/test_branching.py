@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.depth_first import Limits, search_depth_first
-from assoc.packing.branching.feasibility import first_solution
+from assoc.packing.branching.feasibility import first_solution, infeasible
 from assoc.packing.branching.node import branch, drop, new_work, open_node
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import (
@@ -276,15 +275,15 @@ def test_first_solution_is_one_or_there_is_none():
     assert found > 20
 
 
-def test_search_for_a_first_solution_ends(monkeypatch):
+def test_search_for_a_first_solution_ends():
     """Without dummies even a first solution is hard to find: heuristics give up, and say so."""
     rng = np.random.default_rng(1)
     planted = np.stack([rng.permutation(14) + 1 for _ in range(4)], axis=1)
     # enough tuples that dives in the linear program end without a solution, too
     tuples = np.unique(np.vstack([planted, rng.integers(1, 15, (160, 4))]), axis=0)
     problem = AssignmentProblem(tuples, rng.random(len(tuples)), [14] * 4, dummy=False)
-    assert assign(problem, "genetic", iterations=5).cost > 0.0
-    monkeypatch.setattr("assoc.packing.branching.feasibility._NODES", 0)
-    with pytest.raises(InfeasibleError, match="no complete solution was found in 0 nodes; solver exact"):
-        assign(problem, "genetic", iterations=5)
-    assert assign(problem, "exact").status == "optimal"
+    packing, run = prepare(problem).packing, Run(0)
+    assert first_solution(packing, run, nodes=0) is None
+    assert "no complete solution was found in 20,000 nodes; solver exact" in str(infeasible(packing, run))
+    assert first_solution(packing, Run(0)) is not None
+    assert assign(problem, "genetic", iterations=5).cost > 0.0 and assign(problem, "exact").status == "optimal"

@@ -5,8 +5,8 @@ import pytest
 
 from assoc import AssignmentProblem, assign
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching import counts, search
-from assoc.packing.branching.counts import split_on_counts
+from assoc.packing.branching import counts
+from assoc.packing.branching.counts import USUAL, Splitting, split_on_counts
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
@@ -16,6 +16,9 @@ from experiments.common.instances.synthetic import axial_random
 from tests.oracles import small_problems
 from tests.packing.test_branching import covers
 from tests.packing.test_passes import ghosts, optimum
+
+# split whenever it can be, and at once
+ALWAYS = Splitting(after=1, raised=-np.inf, pays=np.inf)
 
 
 def random_packing(seed, rigid=0.0):
@@ -65,16 +68,8 @@ def inside(leaf, size, used):
     return ((value <= most) & (value >= most - program.sides[size + half :])).all(axis=1)
 
 
-@pytest.fixture
-def always(monkeypatch):
-    """Every split is made, and at once."""
-    monkeypatch.setattr(counts, "_PAYS", np.inf)
-    monkeypatch.setattr(search, "_HARD", 1)
-    monkeypatch.setattr(search, "_RAISED", -np.inf)
-
-
 @pytest.mark.parametrize("rigid", [0.0, 0.3])
-def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(always, rigid):
+def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(rigid):
     split = dropped = 0
     for seed in range(24):
         packing = random_packing(seed, rigid)
@@ -87,7 +82,7 @@ def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(always,
             row[one] = 1
         weights = used @ packing.weights
         for cutoff in (np.inf, weights.min() + 0.8, weights.min()):
-            leaves = split_on_counts(packing, root, cutoff, cutoff, np.inf)
+            leaves = split_on_counts(packing, root, cutoff, cutoff, np.inf, np.inf)
             split += len(leaves) > 1
             times = np.zeros(len(every), dtype=np.int64)
             for leaf in leaves:
@@ -100,13 +95,13 @@ def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(always,
 
 
 @pytest.mark.parametrize("rigid", [0.0, 0.3])
-def test_a_search_of_parts_ends_at_the_optimum(always, rigid):
+def test_a_search_of_parts_ends_at_the_optimum(rigid):
     for seed in range(20):
         packing = random_packing(seed, rigid)
         every = solutions(packing)
         best = min((packing.weights[one].sum() for one in every), default=np.inf)
         for incumbent in (np.inf, -1.0, best - 0.5, best + 0.3):
-            one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True)
+            one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True, splitting=ALWAYS)
             while not one.done:
                 one.run(1)
                 assert one.lower_bound <= max(best, min(best, incumbent)) + 1e-8
@@ -116,14 +111,14 @@ def test_a_search_of_parts_ends_at_the_optimum(always, rigid):
                 assert packing.weights[one.columns].sum() == pytest.approx(best, abs=1e-9)
 
 
-def test_bounds_of_parts_hold_and_rise(always):
+def test_bounds_of_parts_hold_and_rise():
     """Checked after every node, from incumbents near and far, with cuts."""
     made = 0
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
         best = optimum(packing, duals, 1e-9 * abs(bound))
         for incumbent in (0.95 * bound, best + 1e-3 * abs(best)):
-            one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
+            one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
             bounds = []
             while not one.done:
                 one.run(1)
@@ -134,18 +129,18 @@ def test_bounds_of_parts_hold_and_rise(always):
     assert made > 2
 
 
-def test_axial_packings_and_problems_without_dummies(always):
+def test_axial_packings_and_problems_without_dummies():
     """All columns of one size leave nothing to split; of several sizes, with rows that must be covered, they do."""
     for seed in range(4):
         packing = prepare(axial_random(10, seed)).packing
         root = root_with_cuts(packing, dual_bound(packing), np.inf, np.inf)
-        leaves = split_on_counts(packing, root, np.inf, np.inf, np.inf)
+        leaves = split_on_counts(packing, root, np.inf, np.inf, np.inf, np.inf)
         assert len(leaves) == 1 and leaves[0].root.program.sides.size == root.program.sides.size
     for problem in small_problems(40, 91):
         packing = prepare(problem).packing
         found = []
         for to_the_end in (False, True):
-            one = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, to_the_end=to_the_end)
+            one = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, to_the_end=to_the_end, splitting=ALWAYS)
             while not one.done:
                 one.run(5)
             found.append(one.weight)
@@ -174,15 +169,13 @@ def test_further_columns_have_no_rows_and_weigh_nothing():
     assert (arrays.weights[packing.num_columns :] == 0.0).all()
 
 
-def test_fewer_nodes_are_needed_where_the_gap_is_wide(monkeypatch):
+def test_fewer_nodes_are_needed_where_the_gap_is_wide():
     packing, duals, bound = ghosts(20, 2018)
     weight, nodes = np.inf, []
-    usual = search._HARD
-    for hard in (10**9, 10**9, usual):
-        monkeypatch.setattr(search, "_HARD", hard)
+    for after in (10**9, 10**9, USUAL.after):
         # the second and the third from the same incumbent, a little above the optimum
         incumbent = min(0.95 * bound, weight + 1e-3 * abs(weight)) if nodes else 0.95 * bound
-        one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
+        one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=Splitting(after))
         while not one.done:
             one.run(1000)
         assert not nodes or one.weight == pytest.approx(weight, abs=1e-8)
@@ -191,25 +184,26 @@ def test_fewer_nodes_are_needed_where_the_gap_is_wide(monkeypatch):
     assert nodes[2] < 0.7 * nodes[1]
 
 
-def test_what_a_pass_has_not_searched_yet_bounds_the_whole(always):
+def test_what_a_pass_has_not_searched_yet_bounds_the_whole():
     """Between two parts, whatever the aim."""
     packing, duals, bound = ghosts(10, 16)
-    one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True)
+    one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
     one._begin()
-    leaves = split_on_counts(packing, one._root, np.inf, np.inf, np.inf)
+    leaves = split_on_counts(packing, one._root, np.inf, np.inf, np.inf, np.inf)
     one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
     one._open.count, one._aim = 0, np.inf
     assert len(leaves) > 1 and not one.done
     assert one.lower_bound == min(leaf.bound for leaf in leaves)
 
 
-def test_a_long_first_pass_is_split_before_it_ends(monkeypatch):
+def test_a_long_first_pass_is_split_before_it_ends():
     """From a poor incumbent the first aim is so high that its pass alone would take hundreds of nodes."""
     packing, duals, bound = ghosts(20, 4048)
     nodes = []
-    for hard in (10**9, search._HARD):
-        monkeypatch.setattr(search, "_HARD", hard)
-        one = BranchAndBound(packing, duals, 0.5 * bound, 1e-9 * abs(bound), to_the_end=True)
+    for after in (10**9, USUAL.after):
+        one = BranchAndBound(
+            packing, duals, 0.5 * bound, 1e-9 * abs(bound), to_the_end=True, splitting=Splitting(after)
+        )
         bounds = []
         while not one.done:
             one.run(10)

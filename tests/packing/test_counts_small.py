@@ -4,25 +4,21 @@ import numpy as np
 import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching import counts, search
+from assoc.packing.branching import counts
 from assoc.packing.branching.counts import split_on_counts
 from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
-from tests.packing.test_counts import inside, random_packing, solutions
+from tests.packing.test_counts import ALWAYS, inside, random_packing, solutions
 
 
 @pytest.fixture(params=[3, 26])
-def packing(request, monkeypatch):
-    """Split whenever it can be."""
-    monkeypatch.setattr(counts, "_PAYS", np.inf)
-    monkeypatch.setattr(search, "_HARD", 1)
-    monkeypatch.setattr(search, "_RAISED", -np.inf)
+def packing(request):
     return random_packing(request.param)
 
 
 def split(packing, cutoff=np.inf):
-    leaves = split_on_counts(packing, plain_root(packing, dual_bound(packing)), cutoff, cutoff, np.inf)
+    leaves = split_on_counts(packing, plain_root(packing, dual_bound(packing)), cutoff, cutoff, np.inf, np.inf)
     assert len(leaves) > 1
     return leaves
 
@@ -44,7 +40,7 @@ def test_every_solution_is_of_one_part(packing):
 def test_a_search_in_parts_ends_at_the_optimum(packing):
     best = min(packing.weights[one].sum() for one in solutions(packing))
     for incumbent in (-1.0, best + 0.3):
-        one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True)
+        one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True, splitting=ALWAYS)
         while not one.done:
             one.run(1)
             assert one.lower_bound <= best + 1e-8
@@ -53,7 +49,7 @@ def test_a_search_in_parts_ends_at_the_optimum(packing):
 
 def test_the_least_bound_of_the_parts_bounds_the_whole(packing):
     leaves = split(packing)
-    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True)
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True, splitting=ALWAYS)
     one._begin()
     one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
     one._open.count, one._aim = 0, np.inf
@@ -63,7 +59,7 @@ def test_the_least_bound_of_the_parts_bounds_the_whole(packing):
 @pytest.mark.parametrize("packing", [26], indirect=True)
 def test_a_pass_is_split_in_its_middle(packing):
     """Split after one node, with others open: the bound proved so far stays."""
-    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True)
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True, splitting=ALWAYS)
     one.run(1)
     assert one._open.count and not one._leaves
     shown = one.lower_bound
@@ -86,7 +82,7 @@ def test_columns_of_many_rows_are_counted():
 
 def test_a_split_without_time_is_one_part_and_its_bound_holds(packing):
     best = min(packing.weights[one].sum() for one in solutions(packing))
-    (leaf,) = split_on_counts(packing, plain_root(packing, dual_bound(packing)), np.inf, np.inf, -1.0)
+    (leaf,) = split_on_counts(packing, plain_root(packing, dual_bound(packing)), np.inf, np.inf, -1.0, np.inf)
     assert leaf.bound <= best + 1e-9
 
 

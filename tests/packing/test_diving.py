@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import Bounds, LinearConstraint, milp
@@ -31,11 +33,14 @@ from tests.solvers.pieces import columns_of, component, cover_of, open_problem
 NONE = np.zeros(0, dtype=np.int64)
 
 
+def ghosts():
+    return assoc.build_problem(simulate("bearing-only", seed=2, targets=16, scans=1), 0)
+
+
 @pytest.fixture(scope="module")
 def priced():
     """One component of a ghost scene with the multipliers of its linear program."""
-    problem = assoc.build_problem(simulate("bearing-only", seed=2, targets=16, scans=1), 0)
-    one = component(problem, "full")
+    one = component(ghosts(), "full")
     one.sharpen(Run(0))
     return one
 
@@ -151,30 +156,27 @@ def test_dives_begin_in_a_program_with_cuts(priced, plain):
     assert len(diver._root.sets) > 0
 
 
-def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced, monkeypatch):
+def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced):
     """If it had none, dives would find none."""
-    monkeypatch.setattr(diving, "_CORE", 2)
     owner = priced.random_cover(1.0, np.random.default_rng(0))
     assert priced.is_complete(owner)
     known = np.array(columns_of(owner))
-    without = Diver(priced, NONE, np.inf)._core
+    without = Diver(priced, NONE, np.inf, core=2)._core
     assert not np.isin(known, without.origin).all()
-    core = Diver(priced, known, np.inf)._core
+    core = Diver(priced, known, np.inf, core=2)._core
     assert np.isin(known, core.origin).all() and core.num_columns < priced.packing.num_columns
 
 
-def test_the_core_is_what_the_program_with_cuts_would_take(monkeypatch):
+def test_the_core_is_what_the_program_with_cuts_would_take():
     """Chosen by the multipliers without cuts it lacks the optimum; in the end no column is missing."""
     problem, optimum = axial_known_optimum(14, 1)
     one = component(problem, "full")
     one.sharpen(Run(0))
     one.offer_greedy()
     assert optimum < one.weight
-    monkeypatch.setattr(diving, "_CORE", 4)
     bounds, least = [], []
     for rounds in (1, 3):
-        monkeypatch.setattr(diving, "_ROUNDS", rounds)
-        diver = Diver(one, one.best_columns(), np.inf)
+        diver = Diver(one, one.best_columns(), np.inf, core=4, rounds=rounds)
         bounds.append(diver._relaxed.bound)
         least.append(diver._reduced_costs(one.duals).min())
     assert bounds == pytest.approx([one.weight, optimum], abs=1e-2)
@@ -195,21 +197,17 @@ def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
 def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
     one = component(open_problem(), "full")
     assert one.packing.num_rows < 30 and not one.dives
-    monkeypatch.setattr(diving, "_LEAST", 5)
-    assert component(open_problem(), "full").dives
-    assert not component(open_problem(), "local").dives
-    with monkeypatch.context() as short:
-        short.setattr(component_file, "memory_allows", lambda size: size < 1e3)
-        assert not component(open_problem(), "full").dives
-    monkeypatch.setattr(diving, "_MOST", 5)
-    assert not component(open_problem(), "full").dives
+    assert component(ghosts(), "full").dives
+    assert not component(ghosts(), "local").dives
+    assert [Diver.pays(SimpleNamespace(num_rows=rows)) for rows in (30, 900, 901)] == [True, True, False]
+    monkeypatch.setattr(component_file, "memory_allows", lambda size: size < 1e3)
+    assert not component(ghosts(), "full").dives
 
 
 def test_the_colony_dives(monkeypatch):
     """The number of divers in a cycle, of several strictnesses; also zero."""
     called = []
     original = Diver.dive
-    monkeypatch.setattr(diving, "_LEAST", 5)
 
     def spy(self, trail, strictness, *rest):
         called.append(strictness)
@@ -218,7 +216,7 @@ def test_the_colony_dives(monkeypatch):
     monkeypatch.setattr(Diver, "dive", spy)
     for divers in (2, 0):
         called.clear()
-        one = component(open_problem(), "full")
+        one = component(ghosts(), "full")
         colony = Colony(one, AcoParameters(divers=divers, beta=0.5, ants=3, clusters=1), lambda *_: None)
         for _ in range(2):
             colony.iterate(one, np.random.default_rng(0))
@@ -229,14 +227,13 @@ def test_the_colony_dives(monkeypatch):
 def test_others_dive_once_an_iteration(searcher, monkeypatch):
     """In addition to the covers with which a search begins."""
     called = []
-    monkeypatch.setattr(diving, "_LEAST", 5)
     original = Component.dive
 
     def spy(self, number, *rest):
         called.append(number)
         return original(self, number, *rest)
 
-    one = component(open_problem(), "full")
+    one = component(ghosts(), "full")
     small = {"clusters": 1, "moves": 3} if searcher is TabuSearch else {"clusters": 1, "population": 6, "offspring": 1}
     parameters = (TabuParameters if searcher is TabuSearch else GeneticParameters)(**small)
     search, rng = searcher(one, parameters), np.random.default_rng(0)

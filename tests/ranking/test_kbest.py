@@ -2,7 +2,6 @@
 
 import itertools
 import time
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,10 +10,11 @@ import assoc
 from assoc.costs import build_problem
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.counts import begin_leaf
+from assoc.packing.branching.counts import Splitting
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking import component_ranking, iterative_deepening
+from assoc.ranking import iterative_deepening
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.component_ranking import ComponentRanking
 from assoc.ranking.kbest import kbest, rank
@@ -202,20 +202,20 @@ def _solutions_of(piece):
 
 
 @pytest.mark.parametrize("seed", [2001, 2033, 2037])
-def test_scenes_full_of_ghosts_in_parts_and_without(monkeypatch, seed):
-    problem = build_problem(scenes.ghost(20, seed), 0)
+def test_scenes_full_of_ghosts_in_parts_and_without(seed):
+    packing = prepare(build_problem(scenes.ghost(20, seed), 0)).packing.component(0)
     lists = []
-    for hard in (1, 10**9):
-        monkeypatch.setattr(component_ranking, "_HARD", hard)
-        begun = Mock(side_effect=begin_leaf)
-        monkeypatch.setattr(component_ranking, "begin_leaf", begun)
-        lists.append(kbest(problem, 20))
-        assert begun.called == (hard == 1)
-    one, two = lists
-    assert [solution.cost for solution in one] == pytest.approx([solution.cost for solution in two], abs=1e-11)
+    for after in (1, 10**9):
+        ranking = ComponentRanking(packing, dual_bound(packing), 20, np.inf, 1e-12, splitting=Splitting(after))
+        while not ranking.done:
+            ranking.run(1000)
+        lists.append(ranking.solutions())
+        assert (ranking.parts_begun > 0) == (after == 1)
+    (one, first), (two, second) = lists
+    assert one == pytest.approx(two, abs=1e-11)
     # solutions that tie with the last one may differ
-    sure = [[s.indices.tolist() for s in found if s.cost < found[-1].cost - 1e-9] for found in lists]
-    assert sure[0] == sure[1] and len(sure[0]) >= 8
+    sure = np.count_nonzero(one < one[-1] - 1e-9)
+    assert sure >= 8 and {frozenset(s) for s in first[:sure]} == {frozenset(s) for s in second[:sure]}
 
 
 def test_components_that_need_branching_within_a_problem(monkeypatch):

@@ -1,13 +1,10 @@
 """The k best in parts split on counts, on packings so small that the tests run uncompiled, too (`make mutants`)."""
 
-from unittest.mock import Mock
-
 import numpy as np
 import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching import counts
-from assoc.packing.branching.counts import begin_leaf
+from assoc.packing.branching.counts import Splitting
 from assoc.packing.branching.root import plain_root
 from assoc.packing.packing import assemble
 from assoc.packing.run import never
@@ -15,15 +12,8 @@ from assoc.ranking import component_ranking
 from assoc.ranking.component_ranking import ComponentRanking
 from tests.packing.test_counts import random_packing, solutions
 
-
-@pytest.fixture
-def parts(monkeypatch):
-    """Make every split, at once; count the parts begun."""
-    monkeypatch.setattr(counts, "_PAYS", np.inf)
-    monkeypatch.setattr(component_ranking, "_HARD", 1)
-    begun = Mock(side_effect=begin_leaf)
-    monkeypatch.setattr(component_ranking, "begin_leaf", begun)
-    return begun
+# every split that raises the bound, at once
+ALWAYS = Splitting(after=1, pays=np.inf)
 
 
 @pytest.fixture
@@ -34,19 +24,19 @@ def without_cuts(monkeypatch):
 
 @pytest.mark.parametrize(("seed", "rigid"), [(3, 0.0), (26, 0.0), (26, 0.3)])
 @pytest.mark.parametrize(("k", "budget"), [(4, 0), (12, 6)])
-def test_none_is_left_out_and_none_listed_twice(parts, without_cuts, seed, rigid, k, budget):
-    check_list(parts, random_packing(seed, rigid), k, budget)
+def test_none_is_left_out_and_none_listed_twice(without_cuts, seed, rigid, k, budget):
+    check_list(random_packing(seed, rigid), k, budget)
 
 
-def test_the_same_with_cuts(parts):
-    check_list(parts, random_packing(26), 12, 0)
+def test_the_same_with_cuts():
+    check_list(random_packing(26), 12, 0)
 
 
-def check_list(parts, packing, k, budget):
+def check_list(packing, k, budget):
     """The lightest k by recursion, and the bound at any moment."""
     weight_of = {frozenset(one): float(packing.weights[one].sum()) for one in solutions(packing)}
     every = sorted(weight_of.values())
-    ranking = ComponentRanking(packing, dual_bound(packing), k, every[-1] + 1.0, 1e-12, budget=budget)
+    ranking = ComponentRanking(packing, dual_bound(packing), k, every[-1] + 1.0, 1e-12, budget=budget, splitting=ALWAYS)
     while not ranking.done:
         before = ranking.proven
         ranking.run(1)
@@ -56,7 +46,7 @@ def check_list(parts, packing, k, budget):
         # a full list may raise the bound further; a split never lowers it
         assert ranking.proven >= before - 1e-9 or len(known) == k
     weights, chosen = ranking.solutions()
-    assert parts.call_count > 1
+    assert ranking.parts_begun > 1
     assert ranking.proven == pytest.approx(every[k - 1] if k <= len(every) else every[-1] + 1.0, abs=1e-9)
     assert weights.tolist() == pytest.approx(every[:k], abs=1e-9)
     found = [frozenset(columns.tolist()) for columns in chosen]
@@ -64,25 +54,32 @@ def check_list(parts, packing, k, budget):
     assert [weight_of[one] for one in found] == pytest.approx(weights.tolist(), abs=1e-9)
 
 
-def test_without_memory_for_parts_the_search_goes_on_as_it_was(parts):
+def test_without_memory_for_parts_the_search_goes_on_as_it_was():
     packing = random_packing(3)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
     room = component_ranking.work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
     ranking = ComponentRanking(
-        packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, memory_allows=lambda needed: needed <= room
+        packing,
+        dual_bound(packing),
+        4,
+        every[-1] + 1.0,
+        1e-12,
+        budget=0,
+        memory_allows=lambda needed: needed <= room,
+        splitting=ALWAYS,
     )
     while not ranking.done:
         ranking.run(1)
-    assert not parts.called
+    assert not ranking.parts_begun
     assert not ranking.out_of_memory
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
 
 
-def test_what_was_given_up_in_one_part_is_remembered_in_the_next(parts, without_cuts):
+def test_what_was_given_up_in_one_part_is_remembered_in_the_next(without_cuts):
     packing = random_packing(3)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
-    while not parts.called:
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
+    while not ranking.parts_begun:
         ranking.run(1)
     assert ranking._open.count
     while ranking._open.count:
@@ -93,10 +90,10 @@ def test_what_was_given_up_in_one_part_is_remembered_in_the_next(parts, without_
     assert ranking.proven < every[3]
 
 
-def test_a_split_that_time_ends_leaves_a_bound_that_holds(parts, monkeypatch):
+def test_a_split_that_time_ends_leaves_a_bound_that_holds():
     packing = random_packing(26)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
     ranking.run(1)
     before = ranking.proven
     # time is over as soon as the search for cuts begins
@@ -109,10 +106,10 @@ def test_a_split_that_time_ends_leaves_a_bound_that_holds(parts, monkeypatch):
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
 
 
-def test_parts_that_show_nothing_new_are_not_begun(parts, without_cuts):
+def test_parts_that_show_nothing_new_are_not_begun(without_cuts):
     packing = random_packing(3)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
     while not ranking._split():
         assert not ranking.done
         ranking.run(1)
@@ -126,7 +123,7 @@ def test_where_there_is_nothing_to_ask_all_is_listed():
     cols = np.array([[0, -1, -1], [-1, 1, -1], [-1, -1, 2], [0, 1, 2]], dtype=np.int32)
     weights = np.array([-1.0, -1.1, -1.2, 5.0])
     packing = assemble(cols, weights, np.ones(3, dtype=np.bool_), np.arange(4, dtype=np.int32)).component(0)
-    ranking = ComponentRanking(packing, dual_bound(packing), 9, 0.5, 1e-12, budget=0)
+    ranking = ComponentRanking(packing, dual_bound(packing), 9, 0.5, 1e-12, budget=0, splitting=ALWAYS)
     for _ in range(5):
         ranking.run(1)
     assert ranking.done

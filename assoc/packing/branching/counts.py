@@ -30,12 +30,32 @@ from assoc.packing.simplex.basis import basis_of, primal_values
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, weight_limit
 
-# most leaves; the power of the gap by which trees grow; the share of its tree at which a leaf is split
+# most leaves; the power of the gap by which trees grow
 _LEAVES = 16
 _POWER = 6.0
-_PAYS = 0.9
 # an LP value this near to a whole number is one
 _WHOLE = 1e-6
+
+
+class Splitting(NamedTuple):
+    """When a search splits its root.
+
+    Attributes
+    ----------
+    after : int
+        Nodes after which a split is tried, and again whenever they have doubled; most searches end before that.
+    raised : float
+        The share of the distance to the goal by which a split must raise the bound.
+    pays : float
+        The share of its tree at which a leaf is split.
+    """
+
+    after: int = 40
+    raised: float = 0.02
+    pays: float = 0.9
+
+
+USUAL = Splitting()
 
 
 class Leaf(NamedTuple):
@@ -91,7 +111,9 @@ class _Part(NamedTuple):
     values: Floats | None
 
 
-def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, deadline: float) -> list[Leaf]:
+def split_on_counts(
+    packing: Packing, root: Root, cutoff: float, goal: float, deadline: float, pays: float = USUAL.pays
+) -> list[Leaf]:
     """Split the solutions below the cutoff into parts, each with its own program.
 
     Parameters
@@ -106,6 +128,8 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
         The bound to prove first; a split pays if it makes that easier.
     deadline : float
         Time limit (clock.py).
+    pays : float
+        See `Splitting`.
 
     Returns
     -------
@@ -115,7 +139,7 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
     """
     everything = _counts_of(packing)
     counted = _Counted(root, everything, cutoff, deadline)
-    parts = _split(counted, everything, min(goal, counted.effort.cutoff))
+    parts = _split(counted, everything, min(goal, counted.effort.cutoff), pays)
     used = np.zeros(len(everything.times), dtype=np.bool_)
     for part in parts:
         used |= (part.counts.least > everything.least) | (part.counts.most < everything.most)
@@ -223,13 +247,13 @@ class _Counted:
         return _Part(leaf, counts, values)
 
 
-def _split(counted: _Counted, counts: _Counts, goal: float) -> list[_Part]:
+def _split(counted: _Counted, counts: _Counts, goal: float, pays: float) -> list[_Part]:
     """Split the part of least bound repeatedly, as long as that pays."""
     waiting = [counted.part(counts)]
     settled: list[_Part] = []
     while waiting and len(waiting) + len(settled) < _LEAVES and not is_over(counted.effort.deadline):
         part = waiting.pop(min(range(len(waiting)), key=lambda i: waiting[i].leaf.bound))
-        sides = _best_split(counted, part, goal)
+        sides = _best_split(counted, part, goal, pays)
         if sides is None:
             settled.append(part)
         else:
@@ -237,12 +261,12 @@ def _split(counted: _Counted, counts: _Counts, goal: float) -> list[_Part]:
     return waiting + settled
 
 
-def _best_split(counted: _Counted, part: _Part, goal: float) -> list[_Part] | None:
+def _best_split(counted: _Counted, part: _Part, goal: float, pays: float) -> list[_Part] | None:
     """Both sides of the split that leaves the smallest trees; None if no split pays."""
     bound = part.leaf.bound
     if part.values is None or bound >= goal:
         return None
-    best, chosen = _PAYS, None
+    best, chosen = pays, None
     for k, value in enumerate(part.values):
         below = int(np.floor(value))
         least, most = int(part.counts.least[k]), int(part.counts.most[k])

@@ -15,7 +15,7 @@ from assoc.packing.run import Run
 _NODES = 20_000
 
 
-def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
+def first_solution(packing: Packing, run: Run, nodes: int = _NODES) -> NDArray[np.int32] | None:
     """Return the columns of a complete solution; None if there is none, or time or nodes are used up."""
     if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
         return None
@@ -23,7 +23,7 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
     for c in range(packing.num_components):
         part = packing.component(c)
         search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline, run.memory_allows)
-        while search.columns is None and not search.done and search.nodes < _NODES and not run.should_stop():
+        while search.columns is None and not search.done and search.nodes < nodes and not run.should_stop():
             search.run(20)
         if search.columns is None and not search.done and not run.should_stop():
             run.stopped_by = "iterations"

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import wait_for_kernels
 from assoc._types import Floats
-from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
+from assoc.packing.branching.counts import USUAL, Leaf, Splitting, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.node import Work, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
@@ -33,12 +33,8 @@ from assoc.packing.run import memory_allows, never
 
 # the first and the last aim, as shares of the gap between the root's bound and the incumbent, and their growth
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
-# nodes after which a split of the root on counts is tried, and again whenever they have doubled; most searches end
-# before that
-_HARD = 40
-# a split is judged by the savings of passes with aims so many times as far; it is made if it raises the bound by this
-# share of the distance
-_FARTHER, _RAISED = 3.0, 0.02
+# a split is judged by the savings of passes with aims so many times as far
+_FARTHER = 3.0
 
 
 class BranchAndBound:
@@ -62,6 +58,8 @@ class BranchAndBound:
         Whether to search to the end: with cuts at the root, and in passes.
     floor : float
         A known lower bound; a search to the end starts with an aim above it.
+    splitting : Splitting
+        When a search to the end splits its root on counts.
     """
 
     def __init__(
@@ -75,6 +73,7 @@ class BranchAndBound:
         *,
         to_the_end: bool = False,
         floor: float = -np.inf,
+        splitting: Splitting = USUAL,
     ) -> None:
         self._packing = packing
         self.tolerance = tolerance
@@ -90,7 +89,7 @@ class BranchAndBound:
         # the parts of the root: all of them, and those that this pass has yet to search, the least bound last
         self._leaves: list[Leaf] = []
         self._waiting: list[Leaf] = []
-        self._split_at = _HARD
+        self._splitting, self._split_at = splitting, splitting.after
         # this pass searches for solutions below the aim; earlier ones proved that none is below the floor
         self._aim, self._floor = np.inf, floor
 
@@ -206,9 +205,9 @@ class BranchAndBound:
             return False
         cutoff, bound = self.weight - self.tolerance, self._root_bound
         goal = min(bound + _FARTHER * (self._aim - bound), cutoff)
-        leaves = split_on_counts(self._packing, self._root, cutoff, goal, self._deadline())
+        leaves = split_on_counts(self._packing, self._root, cutoff, goal, self._deadline(), self._splitting.pays)
         least = min((leaf.bound for leaf in leaves), default=cutoff)
-        if least < bound + _RAISED * (goal - bound):
+        if least < bound + self._splitting.raised * (goal - bound):
             return False
         self._floor = max(self._floor, least)
         self._leaves = sorted(leaves, key=lambda leaf: -leaf.bound)

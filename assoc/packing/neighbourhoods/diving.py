@@ -41,10 +41,6 @@ from assoc.packing.simplex.program import all_allowed, all_reduced_costs
 
 # rows for which a dive pays: fewer are solved exactly, and for more the inverse takes too long
 _LEAST, _MOST = 30, 900
-# columns of the program for each row, those of least reduced cost; how often they are chosen again where cuts change
-# the reduced costs
-_CORE = 40
-_ROUNDS = 3
 # share of the rows still to be covered by choices that is covered before the program is solved again
 _BATCH = 0.1
 # share of the rows left to branch and bound: at first (but this many rows), least and largest (all rows would make an
@@ -69,18 +65,24 @@ class Diver:
         Columns of the best known cover; empty if none is known.
     deadline : float
         Time limit (clock.py).
+    core : int
+        Columns of the program for each row: those of least reduced cost.
+    rounds : int
+        How often they are chosen again where cuts change the reduced costs.
     """
 
-    def __init__(self, priced: Priced, known: NDArray[np.int64], deadline: float) -> None:
+    def __init__(
+        self, priced: Priced, known: NDArray[np.int64], deadline: float, *, core: int = 40, rounds: int = 3
+    ) -> None:
         packing = priced.packing
         self._packing, self._tolerance = packing, priced.tolerance
         cutoff = float(packing.weights[known].sum()) if known.size else np.inf
         reduced = priced.reduced
-        count = min(_CORE * packing.num_rows, packing.num_columns - 1)
+        count = min(core * packing.num_rows, packing.num_columns - 1)
         near = np.zeros(packing.num_columns, dtype=np.bool_)
         # the columns near the bound may have no cover at all
         near[known] = True
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             near |= reduced <= np.partition(reduced, count)[count]
             # rows that must be covered keep at least one column: insertion may bring back the others
             self._core: Packing = packing.restrict(near)
