@@ -15,7 +15,7 @@ from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
-from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.limits import fitting
 from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
@@ -37,7 +37,7 @@ def build_problem(
     scan: int | Scan,
     *,
     gate_probability: float = GATE_PROBABILITY,
-    max_tuples: int = MAX_TUPLES,
+    max_tuples: int | None = None,
     speed: float | Sequence[float] = SPEED,
     target_density: float | str | None = None,
     all_tuples: bool = False,
@@ -65,8 +65,8 @@ def build_problem(
     gate_probability : float
         Probability with which measurements of one target pass a gate, in (0, 1]; 1 leaves only the sign
         of the cost.
-    max_tuples : int
-        The most candidate tuples that may be made.
+    max_tuples : int, optional
+        The most candidate tuples that may be made; None: as many as the available memory has room for.
     speed : float or sequence of float
         Prior standard deviation of a target's velocity along each axis, m/s, for range rates and for measurements of
         different times; without these it has no effect.
@@ -95,8 +95,6 @@ def build_problem(
     ----------
     The ant colony paper, equations 1-5; with clutter density r / V in place of 1 / V.
     """
-    if isinstance(max_tuples, bool) or not isinstance(max_tuples, (int, np.integer)) or max_tuples < 1:
-        raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
     try:
         probability = float(gate_probability)
     except (TypeError, ValueError):
@@ -104,11 +102,14 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     chosen = scan_of(scene, scan)
+    most = fitting(chosen.sizes.tolist()) if max_tuples is None else max_tuples
+    if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
+        raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
     if all_tuples:
-        return _whole_grid(scene, chosen, int(max_tuples), speed, target_density)
+        return _whole_grid(scene, chosen, int(most), speed, target_density)
     if not chosen.at_once:
         _refuse_prior(target_density)
-        return timed_problem(scene, chosen, probability, int(max_tuples), speed)
+        return timed_problem(scene, chosen, probability, int(most), speed)
     bare = sensor_arrays(scene)
     prior = position_prior(scene, bare, target_density)
     sensors = with_prior(bare, prior)
@@ -116,7 +117,7 @@ def build_problem(
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
     measured, index = scan_arrays(sensors, chosen, reach, least)
-    limits = {"number": chosen.index, "max_tuples": int(max_tuples)}
+    limits = {"number": chosen.index, "max_tuples": int(most)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, chosen, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0

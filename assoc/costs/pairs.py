@@ -21,6 +21,8 @@ from assoc.sensors.codes import BEARING, POSITION
 _BRUTE = 100_000
 # coarse pairs are fitted in blocks of about this size, so that memory grows with the pairs kept
 _BLOCK = 500_000
+# strips into which an area is cut at most
+_STRIPS = 10_000
 
 
 class Pairs(NamedTuple):
@@ -211,32 +213,42 @@ def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[
         done += size
 
 
+class _Windows(NamedTuple):
+    """For measurements of one sensor the intervals of those of another that may be near them."""
+
+    rows: Array
+    """(K,); a measurement may have several intervals."""
+    others: Array
+    """The other sensor's measurements, in an order in which those near each other are beside each other."""
+    first: Array
+    last: Array
+    """others[first : last] of each row, (K,)."""
+
+
 def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> Iterator[tuple[Array, float]]:
     """Blocks of the near pairs of sensors s and t, each with the share of them that is done after it."""
     if sensors.code[s] == BEARING:
         # windows are those of located measurements, where there are any
         s, t = t, s
-    rows = np.arange(scan.start[s], scan.start[s + 1])
-    others, first, last = _windows(sensors, scan, s, t, limit)
+    rows, others, first, last = _windows(sensors, scan, s, t, limit)
     counts = np.cumsum(last - first)
     k = 0
     while k < len(rows):
         so_far = counts[k - 1] if k else 0
         stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
-        yield _near_within(sensors, scan, t, rows[k:stop], others, first[k:stop], last[k:stop], limit), stop / len(rows)
+        low, high = first[k:stop].min(), last[k:stop].max()
+        block = rows[k:stop], others[low:high], first[k:stop] - low, last[k:stop] - low
+        yield _near_within(sensors, scan, t, *block, limit), stop / len(rows)
         k = stop
 
 
-def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> tuple[Array, Array, Array]:
-    """Measurements of sensor t, and for each of sensor s the interval of those near it.
-
-    If one of the two sensors measures bearings alone, it is t.
-    """
+def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> _Windows:
+    """Measurements of sensor t near those of sensor s; if one of the two measures bearings alone, it is t."""
     rows, others = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
-    if sensors.code[s] == BEARING or not len(others):
-        return others, np.zeros(len(rows), np.int64), np.full(len(rows), len(others))
+    if sensors.code[s] == BEARING or not len(others) or not len(rows):
+        return _Windows(rows, others, np.zeros(len(rows), np.int64), np.full(len(rows), len(others)))
     if sensors.code[t] != BEARING:
-        return _windows_along_an_axis(sensors, scan, s, t, limit)
+        return _strips(sensors, scan, rows, others, limit)
     azimuths = scan.z[others, 0]
     d = scan.centre[rows, :2] - sensors.position[t, :2]
     ball = 2.0 * limit * (scan.spread[rows, 0] + scan.spread[rows, 3])
@@ -248,24 +260,36 @@ def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
     unrolled = np.concatenate([azimuths - 2 * math.pi, azimuths, azimuths + 2 * math.pi])
     first = np.searchsorted(unrolled, middle - half, side="left")
     last = np.minimum(np.searchsorted(unrolled, middle + half, side="right"), first + len(others))
-    return np.tile(others, 3), first, last
+    return _Windows(rows, np.tile(others, 3), first, last)
 
 
-def _windows_along_an_axis(
-    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
-) -> tuple[Array, Array, Array]:
-    """`_windows` of sensors that measure positions, along the axis, x or y, that spreads those of t the more."""
-    rows, other = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
-    along = int(np.ptp(scan.centre[other, 1]) > np.ptp(scan.centre[other, 0]))
-    middle, line = scan.centre[rows, along], scan.centre[other, along]
+def _strips(sensors: SensorArrays, scan: ScanArrays, rows: Array, others: Array, limit: float) -> _Windows:
+    """Windows of measured positions: along y within strips of x, so that their number does not grow with the area."""
+    wide = _wide(sensors.code[scan.owner[rows[0]]], sensors.code[scan.owner[others[0]]], limit)
+    # variances of x and of y
+    variance = scan.spread[:, [0, 3]]
+    far = np.sqrt(wide * (variance[rows] + variance[others].max(axis=0))) * (1.0 + 1e-9)
+    low = np.minimum(scan.centre[rows, :2] - far, scan.centre[others, :2].min(axis=0)).min(axis=0)
+    middle, there = scan.centre[rows, :2] - low, scan.centre[others, :2] - low
+    width = max(2.0 * float(np.median(far[:, 0])), float(there[:, 0].max()) / _STRIPS)
+    # strips end to end, farther apart than any window reaches, make one line to search
+    length = 2.0 * float(max(there[:, 1].max(), (middle + far)[:, 1].max()))
+    line = np.floor(there[:, 0] / width) * length + there[:, 1]
     order = np.argsort(line, kind="stable")
+    left, right = np.floor((middle - far)[:, 0] / width), np.floor((middle + far)[:, 0] / width)
+    right = np.minimum(right, np.floor(there[:, 0].max() / width))
+    count = np.maximum(right - left + 1, 0).astype(np.int64)
+    which = np.repeat(np.arange(len(rows)), count)
+    strip = left[which] + np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    at = strip * length + middle[which, 1]
+    # in their order along the line: those of a block of rows are near each other, and the search is faster
+    along = np.argsort(at)
+    at, which = at[along], which[along]
+    reach = far[which, 1] + 4.0 * np.spacing(2.0 * line.max())
     line = line[order]
-    # variances of x or of y
-    variance = scan.spread[:, 3 * along]
-    wide = _wide(sensors.code[s], sensors.code[t], limit)
-    far = np.sqrt(wide * (variance[rows] + variance[other].max())) * (1.0 + 1e-9)
-    first, last = np.searchsorted(line, middle - far), np.searchsorted(line, middle + far, side="right")
-    return order + scan.start[t], first, last
+    first, last = np.searchsorted(line, at - reach), np.searchsorted(line, at + reach, side="right")
+    some = last > first
+    return _Windows(rows[which[some]], others[order], first[some], last[some])
 
 
 def compatible_pairs(sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int) -> Pairs:

@@ -1,0 +1,35 @@
+"""Pairs of measurements in a gate: none missed, and a search whose effort grows with the measurements."""
+
+import numpy as np
+import pytest
+
+from assoc.costs import pairs
+from assoc.costs.arrays import scan_arrays, sensor_arrays
+from assoc.costs.gating import make_gates
+from assoc.simulation import simulate
+
+
+def _arrays(targets, **options):
+    scene = simulate("crowd", 5, targets=targets, scans=1, constant_density=True, **options)
+    sensors = sensor_arrays(scene)
+    gates = make_gates(sensors, 0.999)
+    return sensors, scan_arrays(sensors, scene.scan(0), float(gates.pair.max()), 1.0)[0], gates
+
+
+@pytest.mark.parametrize("options", [{}, {"sensor": "radar"}, {"noise": 700.0}, {"width": 300.0}])
+def test_strips_miss_no_pair(options):
+    sensors, scan, gates = _arrays(300, **options)
+    found = np.concatenate([block for block, _ in pairs._coarse(sensors, scan, gates.pair)])
+    every = pairs._near_all(sensors, scan, gates.pair, 0, len(scan.z))
+    assert len(scan.z) ** 2 > pairs._BRUTE and len(every) > 100
+    assert {tuple(pair) for pair in found.tolist()} >= {tuple(pair) for pair in every.tolist()}
+
+
+def test_candidates_grow_with_the_measurements():
+    counts = []
+    for targets in (500, 2000, 8000):
+        sensors, scan, gates = _arrays(targets)
+        windows = pairs._windows(sensors, scan, 0, 1, float(gates.pair[0, 1]))
+        counts.append((windows.last - windows.first).sum() / targets)
+    # windows along one axis: 2 and 4 times as many for each target
+    assert counts[2] < 1.3 * counts[1] < 1.6 * counts[0]
