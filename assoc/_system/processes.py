@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import pickle
 import queue
@@ -15,7 +14,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from itertools import islice
-from typing import Any
+from typing import Any, NoReturn
 
 from assoc._system import memory, temporary
 from assoc._system.compile_time import announcement
@@ -67,7 +66,7 @@ def parallel_map(
     workers: list[subprocess.Popen[bytes]] = []
     idle: queue.SimpleQueue[subprocess.Popen[bytes]] = queue.SimpleQueue()
 
-    def introduce(worker: subprocess.Popen[bytes]) -> None:
+    def introduce(worker: subprocess.Popen[bytes], content: bytes) -> None:
         with suppress(OSError):  # it died, which its first item will find
             _write(worker.stdin, content)
         idle.put(worker)
@@ -94,7 +93,8 @@ def parallel_map(
     try:
         _start(workers, jobs)
         for worker in workers:
-            threads.submit(introduce, worker)
+            threads.submit(introduce, worker, content)
+        del content  # it may be large
         while True:
             room = None if ordered else 2 * jobs - len(running)
             running += [threads.submit(ask, item) for item in islice(left, room)]
@@ -176,25 +176,32 @@ def serve() -> None:
         received.put(b"")
 
     threading.Thread(target=listen, name="parent", daemon=True).start()
-    task = received.get()
+    task = _loaded(received.get())
     with announcement.silenced(), suppress(OSError):
         while item := received.get():
             _write(answers, _answer(task, item))
     temporary.end_process(0)
 
 
-@functools.cache
-def _loaded(task: bytes) -> Any:
+def _loaded(content: bytes) -> Callable[[Any], Any]:
+    """Return the task, or one that raises for every item what keeps it from being loaded."""
     try:
-        return pickle.loads(task)
-    except (ImportError, AttributeError) as error:
-        raise InvalidInputError(f"jobs: a function or class cannot be imported by other processes ({error})") from None
+        return pickle.loads(content)
+    except Exception as error:
+        wrong: Exception = error
+        if isinstance(error, (ImportError, AttributeError)):
+            wrong = InvalidInputError(f"jobs: a function or class cannot be imported by other processes ({error})")
+
+    def fail(item: object) -> NoReturn:
+        raise wrong
+
+    return fail
 
 
-def _answer(task: bytes, item: bytes) -> bytes:
+def _answer(task: Callable[[Any], Any], item: bytes) -> bytes:
     """Return the packed result of an item and False, or an error and True."""
     try:
-        return _packed((_loaded(task)(pickle.loads(item)), False))
+        return _packed((task(pickle.loads(item)), False))
     except BaseException as error:
         error.add_note(traceback.format_exc())
         try:

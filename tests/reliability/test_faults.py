@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 from functools import partial
 from pathlib import Path
 
@@ -197,6 +198,13 @@ def test_functions_of_a_script_and_what_they_print(tmp_path):
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "[0, 2, 4, 6, 8]\n", "said\n" * 5)
+
+
+def test_what_other_processes_cannot_import_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "only_here", types.ModuleType("only_here"))
+    exec("def task(item): pass", vars(sys.modules["only_here"]))
+    with pytest.raises(InvalidInputError, match="jobs: .* cannot be imported by other processes .*only_here"):
+        list(parallel_map(sys.modules["only_here"].task, [1, 2], 2))
 
 
 def test_an_error_comes_back_with_where_it_came_from():
