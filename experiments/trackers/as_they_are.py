@@ -22,13 +22,15 @@ from assoc.scene import Scene, Truth
 from assoc.sensors import PositionSensor, Radar2D, Sensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.tracking import TRACKERS, Initiation, Tracker
+from assoc.tracking import TRACKERS, Initiation
+from assoc.tracking.filter_choice import make_filter
 from experiments.common.claims import Claim
 from experiments.common.command import make_parser, run, whole
 from experiments.trackers.close_scenes import REGION, SETTINGS, Setting, radars, simulate
 from experiments.trackers.judging import CUTOFF, mean_claim
 from experiments.trackers.oracle import OracleTracker
 from experiments.trackers.running import through
+from experiments.trackers.sites import Sites
 
 TARGETS, SCANS, INTERVAL = 12, 40, 4.0
 
@@ -39,11 +41,13 @@ class Case(NamedTuple):
     declared: Its measurements and the sensors that trackers are told of.
     known: The same with sensors as they are; left out where there is nothing to be known.
     options: Of every tracker and the oracle.
+    level: Whether tracks are judged by their horizontal places alone.
     """
 
     declared: Scene
     known: Scene | None = None
     options: Mapping[str, Any] = {}
+    level: bool = False
 
 
 Row = Callable[[int], Case]
@@ -205,7 +209,37 @@ def one_planar(seed: int) -> Case:
         position=full.position, noise=full.noise[:2], detection_probability=0.9, false_alarm_rate=100.0,
         field_of_view=full.field_of_view[:2], name="radar",
     )  # fmt: skip
-    return Case(observe([radar], scene.times, scene.truth.target_ids, scene.truth.positions, rng, region=scene.region))
+    truth = scene.truth
+    return Case(observe([radar], scene.times, truth.target_ids, truth.positions, rng, region=scene.region), level=True)
+
+
+def flat_radars(seed: int, height: float | None = None) -> Case:
+    """Three radars without elevations, and the filter of the programs; with a height, all targets fly there."""
+    sensors: list[Sensor] = [
+        Radar2D(
+            position=one.position, noise=one.covariance[:2, :2], detection_probability=one.detection_probability,
+            false_alarm_rate=one.false_alarm_rate, field_of_view=one.field_of_view[:2], name=one.name,
+        )
+        for one in radars(SETTINGS["separate"])
+    ]  # fmt: skip
+    scene = simulate(SETTINGS["separate"], seed, sensors=sensors)
+    assert scene.truth is not None
+    if height is not None:
+        paths = [np.column_stack([at[:, :2], np.full(len(at), height)]) for at in scene.truth.positions]
+        rng = np.random.default_rng(seed)
+        scene = observe(sensors, scene.times, scene.truth.target_ids, paths, rng, region=REGION)
+    filter = make_filter("imm-cv", sensors, pace=INTERVAL, region=REGION)
+    return Case(scene, options={"filter": filter}, level=True)
+
+
+def abreast(seed: int, gap: float) -> Case:
+    """Two targets side by side for the whole time."""
+    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    heading = rng.uniform(-np.pi, np.pi)
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
+    side = np.array([[-0.5], [0.5]]) * gap * np.array([-ahead[1], ahead[0], 0.0])
+    paths = [0.0, 0.0, 6e3] + side + (200.0 * (times - times.mean()))[:, None, None] * ahead
+    return Case(observe(radars(SETTINGS["separate"]), times, [np.arange(2)] * SCANS, list(paths), rng, region=REGION))
 
 
 SEPARATE, NOISY = SETTINGS["separate"], (160.0, 160.0, 160.0)
@@ -221,6 +255,11 @@ ROWS: dict[str, Row] = {
     "formations, noise twice the declared": misdeclared(SETTINGS["formations"], Setting("formations", NOISY)),
     "8 g": agile,
     "one 2-D radar, 100 false alarms": one_planar,
+    "three 2-D radars": flat_radars,
+    "three 2-D radars, all at 9 km": lambda seed: flat_radars(seed, 9e3),
+    "formations": lambda seed: Case(simulate(SETTINGS["formations"], seed)),
+    "100 m abreast": lambda seed: abreast(seed, 100.0),
+    "200 m abreast": lambda seed: abreast(seed, 200.0),
     "dark band of 4 km": dark_band,
     "splitting": splitting,
     "wind farm": wind_farm,
@@ -228,7 +267,9 @@ ROWS: dict[str, Row] = {
     "ships, radar and AIS": ships,
 }
 ADAPTING = ", adapting"
-NAMES = ("oracle", *TRACKERS, *(name + ADAPTING for name in TRACKERS))
+SITES = "sites"
+"""A tracker at each sensor, which sends tracks alone; see `experiments.trackers.sites`."""
+NAMES = ("oracle", *TRACKERS, *(name + ADAPTING for name in TRACKERS), "GNN", SITES)
 
 
 class Judged(NamedTuple):
@@ -239,15 +280,40 @@ class Judged(NamedTuple):
     missed: float
     switches: int
     ids: int
+    gap: float
+    """Of two targets: distance of the tracks over that of the targets, a mean; NaN for more targets."""
 
 
-def judge(name: str, scene: Scene, options: Mapping[str, Any]) -> Judged:
-    """Run a tracker, or the oracle, over a scene."""
-    tracker: Tracker
+def make(name: str, scene: Scene, options: Mapping[str, Any]) -> Any:
+    """Make a tracker of this name."""
+    if name == "oracle":
+        return OracleTracker(scene, **options)
+    if name == "GNN":
+        return TRACKERS["nearest-neighbour"].for_scene(scene, rule="assignment", **options)
+    if name == SITES:
+        return Sites(scene, **options)
     options = dict(options) | ({"adapt": True} if name.endswith(ADAPTING) else {})
-    kind = TRACKERS.get(name.removesuffix(ADAPTING))
-    tracker = OracleTracker(scene, **options) if kind is None else kind.for_scene(scene, **options)
-    truth, tracks = Trajectories.from_scene(scene), through(tracker, scene).tracks
+    return TRACKERS[name.removesuffix(ADAPTING)].for_scene(scene, **options)
+
+
+def _gap(truth: Trajectories, tracks: Trajectories) -> float:
+    """See `Judged.gap`; of the second half, along the line through the targets."""
+    if len(np.unique(truth.ids)) != 2:
+        return float("nan")
+    found = []
+    for time in np.unique(truth.times)[SCANS // 2 :]:
+        (a, b), places = truth.positions[truth.times == time], tracks.positions[tracks.times == time]
+        near = places[np.linalg.norm(places - (a + b) / 2, axis=1) < CUTOFF]
+        if len(near) == 2:
+            found.append(abs((near[0] - near[1]) @ (a - b)) / ((a - b) @ (a - b)))
+    return float(np.mean(found)) if found else float("nan")
+
+
+def judge(name: str, scene: Scene, options: Mapping[str, Any], level: bool = False) -> Judged:
+    """Run a tracker, or the oracle, over a scene."""
+    truth, tracks = Trajectories.from_scene(scene), through(make(name, scene, options), scene).tracks
+    if level:
+        truth, tracks = (Trajectories(one.times, one.ids, one.positions * [1, 1, 0]) for one in (truth, tracks))
     values, unit = gospa_over_time(truth, tracks, CUTOFF)[1], CUTOFF**2 / 2
     return Judged(
         float(np.mean([one.distance for one in values])),
@@ -255,20 +321,22 @@ def judge(name: str, scene: Scene, options: Mapping[str, Any]) -> Judged:
         float(np.mean([one.missed for one in values])) / unit,
         identity(truth, tracks, CUTOFF).switches,
         len(np.unique(tracks.ids)),
+        _gap(truth, tracks),
     )
 
 
 def claims_of(row: str, name: str, runs: Sequence[Judged]) -> list[Claim]:
     """What a tracker did on the scenes of a row."""
     gospa = mean_claim(f"{row}, {name}: GOSPA", "m", np.array([one.gospa for one in runs]))
-    false, missed, switches, ids = np.mean([one[1:] for one in runs], axis=0)
+    false, missed, switches, ids, gap = np.mean([one[1:] for one in runs], axis=0)
     low, high = gospa.interval or (gospa.ours, gospa.ours)
     half, label = (high - low) / 2, f"{row}, {name}"
     print(
         f"{label:48} {gospa.ours:7.1f} +- {half:5.1f} m  false {false:6.2f}  missed {missed:6.2f}  "
-        f"switches {switches:5.1f}  ids {ids:5.1f}", flush=True,
+        f"switches {switches:5.1f}  ids {ids:5.1f}" + (f"  gap {gap:.2f}" if np.isfinite(gap) else ""), flush=True,
     )  # fmt: skip
     rest = {"false tracks": false, "missed targets": missed, "switches": switches, "ids": ids}
+    rest |= {"gap of the tracks / true gap": gap} if np.isfinite(gap) else {}
     return [gospa, *(Claim(f"{label}: {what}", ours=float(value)) for what, value in rest.items())]
 
 
@@ -278,8 +346,8 @@ def experiment(rows: Sequence[str], names: Sequence[str], seeds: Sequence[int]) 
     for row in rows:
         cases = [ROWS[row](seed) for seed in seeds]
         for name in names:
-            claims += claims_of(row, name, [judge(name, one.declared, one.options) for one in cases])
-            known = [(one.known, one.options) for one in cases if one.known is not None]
+            claims += claims_of(row, name, [judge(name, one.declared, one.options, one.level) for one in cases])
+            known = [(one.known, one.options, one.level) for one in cases if one.known is not None]
             if known and name != "oracle" and not name.endswith(ADAPTING):
                 claims += claims_of(row, f"{name} if known", [judge(name, *one) for one in known])
     return claims

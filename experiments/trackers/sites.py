@@ -1,0 +1,28 @@
+"""Sites that send tracks and no measurements: a tracker for each sensor, and one picture of their tracks."""
+
+from typing import Any
+
+from assoc._types import Array
+from assoc.scene import Scene
+from assoc.tracking import MultiSensorTracker, Track
+from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
+from assoc.tracking.fusion import SystemTracks, TrackFusion
+
+
+class Sites:
+    """Takes measurements as a tracker does, and hands out fused tracks."""
+
+    def __init__(self, scene: Scene, **options: Any) -> None:
+        options = {"filter": two_speeds(manoeuvre_noise(pace_of(scene.times)))} | options
+        self.sites = [MultiSensorTracker([one], region=scene.region, **options) for one in scene.sensors]
+        self.fusion, self.filter = TrackFusion(len(self.sites)), options["filter"]
+        self.tracks: list[Track] = []
+
+    def step(self, time: float, measurements: Any, times: Any = None, sectors: Array | None = None) -> None:
+        """Step each site, and fuse the tracks that they report."""
+        found = []
+        for s, site in enumerate(self.sites):
+            own = None if times is None else [times[s]]
+            site.step(time, [measurements[s]], own, None if sectors is None else sectors[s : s + 1])
+            found.append(SystemTracks.of([one for one in site.tracks if one.reported], site.filter.motion))
+        self.tracks = self.fusion.step(time, found).tracks
