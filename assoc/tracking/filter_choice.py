@@ -29,7 +29,7 @@ _TURN_NOISE = 0.03
 """Standard deviation of a turn rate's increment in a step, rad/s."""
 
 
-def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[Any]:
+def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3, *, unscented: bool = False) -> Filter[Any]:
     """Interacting multiple models: nearly constant velocity, and manoeuvres.
 
     The quiet model has a tenth of the process noise. Each model changes to the other within four seconds with
@@ -41,9 +41,13 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[An
         Process noise of the manoeuvring model, m/s^1.5.
     dimensions : int
         2 or 3.
+    unscented : bool
+        Unscented filters instead of extended ones, for `open_heights`: linearised at a height that is kilometres off,
+        slant ranges seem to tell more of it than they do.
     """
+    kind: Any = filters.UnscentedKalmanFilter if unscented else filters.ExtendedKalmanFilter
     modes: list[Any] = [
-        filters.ExtendedKalmanFilter(filters.ConstantVelocity(share * noise, dimensions=dimensions, kind="continuous"))
+        kind(filters.ConstantVelocity(share * noise, dimensions=dimensions, kind="continuous"))
         for share in (_QUIET, 1.0)
     ]
     transition = np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]])
@@ -122,7 +126,6 @@ def _imm(noise: float, flat: bool, seed: int) -> Filter[Any]:
 
 
 _MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
-    "imm-cv": lambda noise, flat, seed: two_speeds(noise, 2 if flat else 3),
     "ekf": lambda noise, flat, seed: filters.ExtendedKalmanFilter(_velocity(noise, flat)),
     "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, flat)),
     "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, flat)),
@@ -134,7 +137,7 @@ _MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
     ),
 }
 
-FILTERS = tuple(_MAKERS)
+FILTERS = ("imm-cv", *_MAKERS)
 """Names of the filters."""
 
 
@@ -169,11 +172,15 @@ def make_filter(
     InvalidInputError
         There is no such filter, or it does not suit the sensors.
     """
-    if name not in _MAKERS:
+    if name not in FILTERS:
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
     if process_noise is None:
         process_noise = manoeuvre_noise(pace) if name == "imm-cv" else PROCESS_NOISE
-    made = _MAKERS[name](process_noise, planar(sensors, region), seed)
+    flat = planar(sensors, region)
+    if name == "imm-cv":
+        made = two_speeds(process_noise, 2 if flat else 3, unscented=not flat and open_heights(sensors))
+    else:
+        made = _MAKERS[name](process_noise, flat, seed)
     for sensor in sensors:
         made.observe(sensor)
     return made

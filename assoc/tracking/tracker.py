@@ -26,7 +26,7 @@ from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
 from assoc.tracking.checking import checked_time
-from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
+from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.identity_evidence import IdentityParameters
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.settings import TrackerSettings
@@ -132,7 +132,8 @@ class Tracker:
         Without a `filter`, the default one's process noise suits the pace of the scans.
         """
         if not arguments and options.get("filter") is None:
-            options["filter"] = two_speeds(manoeuvre_noise(pace_of(scene.times)))
+            noise = manoeuvre_noise(pace_of(scene.times))
+            options["filter"] = two_speeds(noise, unscented=open_heights(scene.sensors))
         return cls(scene.sensors, *arguments, region=scene.region, **options)
 
     @property

@@ -13,7 +13,7 @@ from assoc.tracking import Tracker
 from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
-from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
+from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.track_batch import TrackBatch
@@ -81,7 +81,8 @@ class OracleTracker(Tracker):
     def __init__(self, scene: Scene, **options: Any) -> None:
         assert scene.truth is not None and scene.truth.sources is not None
         noise = manoeuvre_noise(pace_of(scene.times))
-        options = {"filter": two_speeds(noise), "region": scene.region} | options
+        filter = two_speeds(noise, unscented=open_heights(scene.sensors))
+        options = {"filter": filter, "region": scene.region} | options
         super().__init__(scene.sensors, sources=scene.truth.sources, **options)
 
 

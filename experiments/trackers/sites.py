@@ -5,7 +5,7 @@ from typing import Any
 from assoc._types import Array
 from assoc.scene import Scene
 from assoc.tracking import MultiSensorTracker, Track
-from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
+from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.fusion import SystemTracks, TrackFusion
 
 
@@ -13,7 +13,8 @@ class Sites:
     """Takes measurements as a tracker does, and hands out fused tracks."""
 
     def __init__(self, scene: Scene, **options: Any) -> None:
-        options = {"filter": two_speeds(manoeuvre_noise(pace_of(scene.times)))} | options
+        noise = manoeuvre_noise(pace_of(scene.times))
+        options = {"filter": two_speeds(noise, unscented=open_heights(scene.sensors))} | options
         self.sites = [MultiSensorTracker([one], region=scene.region, **options) for one in scene.sensors]
         self.fusion, self.filter = TrackFusion(len(self.sites)), options["filter"]
         self.tracks: list[Track] = []

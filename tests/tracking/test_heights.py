@@ -85,6 +85,20 @@ def test_several_radars_find_targets_at_any_height(height, noise):
             assert abs(nearest[2]) < 100.0
 
 
+def test_one_radar_does_not_seem_to_know_heights():
+    """Its tracks' errors are as large as they say, 3 degrees of freedom; extended filters had hundreds."""
+    square = []
+    for seed in range(3):
+        scene = flight([radar()], 9e3, seed)
+        truth = scene.truth.positions[-1]
+        for track in tracked(scene):
+            off = truth - track.position
+            off = off[np.argmin(np.hypot(off[:, 0], off[:, 1]))]
+            square.append(off @ np.linalg.solve(track.covariance[:3, :3], off))
+    assert len(square) > 6
+    assert np.mean(square) < 5.0
+
+
 def test_unknown_heights_stay_within_those_of_the_region():
     """Without detections a velocity of 30 m/s would leave 9 km open after five minutes."""
     tracker = TRACKERS["multi-sensor"]([radar()], region=REGION, life_cycle=LifeCycle(deletion_time=1e4))
