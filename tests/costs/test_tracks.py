@@ -56,6 +56,11 @@ def test_birth_integrated_over_a_linear_position():
     found = log_birth(P[None], flat, 0.2)[0]
     assert found == pytest.approx(0.5 * np.linalg.slogdet(2 * math.pi * P[:2, :2])[1] + math.log(0.2 / 2e6))
     assert log_birth(P[None], np.zeros((3, 2)), 0.2)[0] == pytest.approx(math.log(0.2))
+    # a height that nothing measures, in a region lower than its prior: births are no denser in the plane
+    low = np.array([[-1.0, 1.0], [-1.0, 1.0], [-0.5, 0.5]]) * 1000.0 ** np.array([[1], [1], [0]])
+    tall = np.diag([9.0, 4.0, 1e4])
+    expected = math.log(0.2 * 2.0 * math.pi * 6.0 / 4e6)
+    assert log_birth(tall[None], low, 0.2)[0] == pytest.approx(expected)
 
 
 def test_walds_threshold():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError, filters, simulation
-from assoc.sensors import PositionSensor
+from assoc.sensors import PositionSensor, Radar2D
 from assoc.tracking import (
     TRACKERS,
     LifeCycle,
@@ -16,6 +16,7 @@ from assoc.tracking import (
     TrackOrientedMHT,
 )
 from assoc.tracking.file import file_arrays
+from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.life_cycle import count_bits
 from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
@@ -218,6 +219,25 @@ def test_planar_states():
         (track,) = [t for t in tracker.tracks if t.confirmed]
         assert track.mean.shape == (4,) and track.position[2] == 0
         np.testing.assert_allclose(track.velocity, [100, 0, 0], atol=2)
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        PositionSensor(position=np.zeros(3), noise=[8.0, 8.0], field_of_view=[[-1e3, 1e3], [-1e3, 1e3]]),
+        Radar2D(position=np.zeros(3), noise=[5.0, 0.01], field_of_view=[[0.0, 1e3], [-np.pi, np.pi]]),
+    ],
+    ids=lambda sensor: sensor.kind,
+)
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_sensor_starts_tracks_in_a_low_region(kind, sensor):
+    """The unmeasured height makes births no more likely than joining a track of one scan."""
+    times = 1.7 * np.arange(10)
+    boat = np.stack([200 + 3 * times, 100 - 2 * times, 0 * times], axis=1)
+    tracker = kind([sensor], two_speeds(5.0, 2), region=[[-1e3, 1e3], [-1e3, 1e3], [-0.5, 0.5]])
+    for time, place in zip(times, boat, strict=True):
+        tracker.step(time, [sensor.measure(place[None])])
+    assert [track.confirmed for track in tracker.tracks] == [True]
 
 
 class TestBadInput:

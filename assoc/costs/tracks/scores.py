@@ -57,7 +57,9 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
 
     The cost of a tuple is taken at the most likely position. A target is born anywhere in the region with density
     birth rate / volume; integrated over the position (Laplace's approximation, exact for linear sensors) the
-    likelihood is the one at the best position times this. Directions in which the region has no width are left out.
+    likelihood is the one at the best position times this. Along each axis, given the axes before it, the integral is
+    at most the region's width: heights that nothing measures may vary more than the region is high. Directions in
+    which the region has no width are left out.
 
     Parameters
     ----------
@@ -75,10 +77,13 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     """
     widths = region[:, 1] - region[:, 0]
     wide = np.flatnonzero(widths > 0.0)
-    log_volume = float(np.log(widths[wide]).sum())
-    log_det = np.linalg.slogdet(2.0 * math.pi * covariances[:, wide[:, None], wide])[1]
-    limited: Array = np.minimum(0.5 * log_det, log_volume) + math.log(birth_rate) - log_volume
-    return limited
+    log_widths = np.log(widths[wide])
+    half = np.zeros((len(covariances), len(wide) + 1))
+    for k in range(1, len(wide) + 1):
+        axes = wide[:k]
+        half[:, k] = 0.5 * np.linalg.slogdet(2.0 * math.pi * covariances[:, axes[:, None], axes])[1]
+    limited: Array = np.minimum(np.diff(half, axis=1), log_widths).sum(axis=1)
+    return limited + math.log(birth_rate) - float(log_widths.sum())
 
 
 def doubted_gain(score: Array, gain: Array) -> Array:
