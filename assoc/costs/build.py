@@ -101,7 +101,7 @@ def build_problem(
         probability = math.nan
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
-    chosen = scan_of(scene, scan)
+    scene, chosen = _standing(scene, scan)
     most = fitting(chosen.sizes.tolist()) if max_tuples is None else max_tuples
     if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
         raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
@@ -168,7 +168,7 @@ def tuple_costs(
     InvalidInputError
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
-    chosen = scan_of(scene, scan)
+    scene, chosen = _standing(scene, scan)
     if chosen.at_once:
         return positions.tuple_costs(scene, chosen, tuples, speed=speed, target_density=target_density)
     _refuse_prior(target_density)
@@ -200,10 +200,16 @@ def positions_and_covariances(
     InvalidInputError
         As `tuple_costs`.
     """
-    chosen = scan_of(scene, scan)
+    scene, chosen = _standing(scene, scan)
     if chosen.at_once:
         return positions.positions_and_covariances(scene, chosen, tuples)
     return timed_positions(scene, chosen, tuples, speed)
+
+
+def _standing(scene: Scene, scan: int | Scan) -> tuple[Scene, Scan]:
+    """Sensors as they stand at the scan's time, and the scan as they measure it."""
+    chosen = scan_of(scene, scan)
+    return scene.at(chosen.time), chosen.aligned(scene.sensors)
 
 
 def _refuse_prior(target_density: float | str | None) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.positions import checked_tuples, single_positions
+from assoc.costs.positions import checked_tuples, positions_of_scan
 from assoc.costs.range_rates import checked_speed
 from assoc.costs.tracks.own_times import Places, TimedScan, grow_timed_tuples, score_costs
 from assoc.costs.tracks.scores import ScoreTerms
@@ -75,7 +75,7 @@ def _timed_scan(scene: Scene, scan: Scan, gate_probability: float, speed: float 
     none = start(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
     return TimedScan(
         filter, none, scan.time, scan.measurements, scan.own_times(), scene.sensors, _places(scene, scan), start,
-        scan.sectors, gate_probability, scan.time,
+        scan.sectors, gate_probability, scan.time, None, scan.paths,
     )  # fmt: skip
 
 
@@ -100,7 +100,7 @@ def _places(scene: Scene, scan: Scan) -> Places:
     """
     positions, covariances, able, births = [], [], [], []
     for s, (sensor, z) in enumerate(zip(scene.sensors, scan.measurements, strict=True)):
-        where, spread = single_positions(scene, s, z)
+        where, spread = positions_of_scan(scene, scan, s)
         located = sensor.position_part
         density = located.false_alarm_rate / located.volume
         peak = -0.5 * float(np.linalg.slogdet(2.0 * math.pi * located.covariance)[1])

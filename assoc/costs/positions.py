@@ -75,6 +75,15 @@ def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array,
     return _positions(scene, sensors, sensor, measured)
 
 
+def positions_of_scan(scene: Scene, scan: Scan, sensor: int) -> tuple[Array, Array]:
+    """`single_positions` of a sensor's measurements in a scan, from where it stood when it made each."""
+    positions, covariances = single_positions(scene, sensor, scan.measurements[sensor])
+    path = scan.paths[sensor] if scan.paths else None
+    if path is not None and len(positions):
+        positions = positions + path.poses(scan.own_times()[sensor])[0] - scene.sensors[sensor].position
+    return positions, covariances
+
+
 _known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.WeakKeyDictionary()
 
 

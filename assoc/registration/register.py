@@ -62,6 +62,8 @@ def register(scene: Scene, parameters: RegistrationParameters | None = None, **v
 
 def make_problem(scene: Scene, parameters: RegistrationParameters) -> Problem:
     """The biases of a scene's sensors, and their prior."""
+    if any(sensor.platform is not None for sensor in scene.sensors):
+        raise InvalidInputError("registration: sensors on platforms cannot be registered")
     terms = make_terms(scene.sensors, parameters)
     spreads = np.array([parameters.spread(term.component) for term in terms])
     return Problem(tuple(scene.sensors), terms, spreads, scene.region, parameters)

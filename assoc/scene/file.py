@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,14 @@ from assoc._files.reading import check_unpacked
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_parts
-from assoc.sensors import KINDS
+from assoc.sensors import KINDS, Platform, Sensor
 
 FORMAT = "assoc.scene"
-VERSION = 2
+VERSION = 3
 # bytes, a quarter of its memory: its content counts as well
 _OF_A_SCAN = 120
-# fields of version 2 alone; a scene without them is written as version 1
-_OWN_TIMES = ("measurement_times", "sectors")
+# fields of later versions, latest first; a scene without them is written as version 1
+_LATER = {"sensor_platform": 3, "measurement_times": 2, "sectors": 2}
 
 _FIELDS = {
     "name": Field("str", 0, required=False),
@@ -39,6 +39,12 @@ _FIELDS = {
     "measurement_sources": Field("int", 1, required=False),
     "measurement_times": Field("float", 1, required=False),
     "sectors": Field("float", 3, required=False),
+    "sensor_platform": Field("int", 1, required=False),
+    "platform_turns": Field("bool", 1, required=False),
+    "platform_offsets": Field("int", 1, required=False),
+    "platform_times": Field("float", 1, required=False),
+    "platform_positions": Field("float", 2, required=False),
+    "platform_headings": Field("float", 1, required=False),
     "truth_offsets": Field("int", 1, required=False),
     "truth_ids": Field("int", 1, required=False),
     "truth_positions": Field("float", 2, required=False),
@@ -49,7 +55,7 @@ _FIELDS = {
 def save_parts(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
     """Write the attributes of an `assoc.scene.Scene`; "truth" holds those of its `assoc.scene.Truth`, or None."""
     arrays = _to_arrays(parts)
-    save_npz(path, FORMAT, VERSION if any(name in arrays for name in _OWN_TIMES) else 1, arrays)
+    save_npz(path, FORMAT, next((version for name, version in _LATER.items() if name in arrays), 1), arrays)
 
 
 def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -82,6 +88,7 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         "measurement_values": np.concatenate([z.ravel() for block in blocks for z in block]),
         "measurement_offsets": np.concatenate([np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1),
     }
+    arrays |= _platform_arrays(sensors)
     if parts["sectors"] is not None:
         arrays["sectors"] = parts["sectors"]
     if parts["measurement_times"] is not None:
@@ -95,6 +102,50 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         if truth["sources"] is not None:
             arrays["measurement_sources"] = _flat(truth["sources"], len(sensors))
     return arrays
+
+
+def _platform_arrays(sensors: Sequence[Sensor]) -> dict[str, Array | str | int]:
+    """The sensors' platforms, each once, one after the other; nothing if there is none."""
+    found: list[Platform] = []
+    for sensor in sensors:
+        if sensor.platform is not None and sensor.platform not in found:
+            found.append(sensor.platform)
+    if not found:
+        return {}
+    number = [-1 if sensor.platform is None else found.index(sensor.platform) for sensor in sensors]
+    headings = [np.zeros(len(one.times)) if one.headings is None else one.headings for one in found]
+    return {
+        "sensor_platform": np.array(number, dtype=np.int64),
+        "platform_turns": np.array([one.headings is not None for one in found]),
+        "platform_offsets": np.cumsum([0, *(len(one.times) for one in found)], dtype=np.int64),
+        "platform_times": np.concatenate([one.times for one in found]),
+        "platform_positions": np.concatenate([one.positions for one in found]),
+        "platform_headings": np.concatenate(headings),
+    }
+
+
+def _platforms(arrays: dict[str, Array], count: int) -> list[Platform | None]:
+    """The platform of each sensor, None where nothing carries it."""
+    if "sensor_platform" not in arrays:
+        return [None] * count
+    names = [name for name in _FIELDS if name.startswith("platform_")]
+    for name in names:
+        if name not in arrays:
+            raise InvalidInputError(f"the field {name!r} is missing, it belongs to 'sensor_platform'")
+    turns, offsets, times, positions, headings = (arrays[name] for name in names)
+    _check_shape(arrays, "platform_offsets", (len(turns) + 1,))
+    _check_offsets(offsets, "platform_offsets")
+    for name, shape in (("times", ()), ("positions", (3,)), ("headings", ())):
+        _check_shape(arrays, f"platform_{name}", (int(offsets[-1]), *shape))
+    _check_shape(arrays, "sensor_platform", (count,))
+    number = arrays["sensor_platform"]
+    if number.min() < -1 or number.max() >= len(turns):
+        raise InvalidInputError(f"the field 'sensor_platform' must hold -1 to {len(turns) - 1}")
+    found = [
+        Platform(times[a:b], positions[a:b], headings[a:b] if turning else None)
+        for a, b, turning in zip(offsets[:-1].tolist(), offsets[1:].tolist(), turns.tolist(), strict=True)
+    ]
+    return [None if i < 0 else found[i] for i in number.tolist()]
 
 
 def _flat(scans: Any, sensors: int) -> Array:
@@ -131,6 +182,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
     _check_shape(arrays, "sensor_covariance", (int((dims**2).sum()),))
     _check_shape(arrays, "sensor_field_of_view", (int(dims.sum()), 2))
     sensors = []
+    platforms = _platforms(arrays, count)
     square, row = 0, 0
     for s, dim in enumerate(int(d) for d in dims):
         kind = str(arrays["sensor_kind"][s])
@@ -148,6 +200,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
                     detection_probability=float(arrays["sensor_detection_probability"][s]),
                     false_alarm_rate=float(arrays["sensor_false_alarm_rate"][s]),
                     field_of_view=arrays["sensor_field_of_view"][row : row + dim],
+                    platform=platforms[s],
                 )
             )
         except InvalidInputError as error:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._text.times import moment
 from assoc._types import Array
+from assoc.sensors import Platform, Sensor
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,6 +31,8 @@ class Scan:
         First and last azimuth that each sensor covered, see `assoc.Scene`; None: all directions.
     identities : tuple over sensors of int arrays (n_s, 2), or None
         Mode 3/A code and ICAO address of each measurement, 0 where it has none.
+    paths : tuple over sensors of Platform or None
+        Where sensors were that moved while they measured; see `aligned`.
     """
 
     index: int
@@ -40,6 +44,7 @@ class Scan:
     times: tuple[Array, ...] | None = None
     sectors: Array | None = None
     identities: tuple[Array, ...] | None = None
+    paths: tuple[Platform | None, ...] = ()
 
     @property
     def sizes(self) -> Array:
@@ -56,6 +61,23 @@ class Scan:
     def at_once(self) -> bool:
         """Whether all sensors covered all directions at the scan's time."""
         return self.times is None and self.sectors is None
+
+    def aligned(self, sensors: Sequence[Sensor]) -> Scan:
+        """The scan as sensors would measure it that stand as these do (`Sensor.at`) at the scan's time.
+
+        Angles and positions are then in the axes of the scene's frame. Where measurements have times of their own,
+        `paths` tells from where they were made.
+        """
+        if all(sensor.platform is None for sensor in sensors):
+            return self
+        stamps = self.own_times()
+        found = tuple(s.aligned(z, t) for s, z, t in zip(sensors, self.measurements, stamps, strict=True))
+        moved = [t.size > 0 and bool((t != self.time).any()) for t in stamps]
+        paths = tuple(
+            sensor.platform.of(sensor.position) if sensor.platform is not None and late else None
+            for sensor, late in zip(sensors, moved, strict=True)
+        )
+        return replace(self, measurements=found, paths=paths)
 
     def true_tuples(self) -> NDArray[np.int32] | None:
         """The tuples of the targets that at least two sensors detected.

@@ -26,6 +26,8 @@ from assoc.sensors.base import ANGLES, finite_array
 
 # a planar scene still needs some height for the prior; radars see aircraft up to about here (metres)
 _DEFAULT_HEIGHT = 20_000.0
+# positions of a platform that the default region is made of
+_STANDS = 50
 
 
 @doors
@@ -196,6 +198,14 @@ class Scene:
             sectors=None if self.sectors is None else self.sectors[k],
         )
 
+    def at(self, time: float) -> Scene:
+        """A scene without scans of the sensors as they stand at a time (s); this one if no platform carries any."""
+        if all(sensor.platform is None for sensor in self.sensors):
+            return self
+        sensors = [sensor.at(time) for sensor in self.sensors]
+        nothing = [np.zeros((0, sensor.dim)) for sensor in sensors]
+        return Scene(sensors, np.array([time]), [nothing], self.region, origin=self.origin)
+
     def part(self, start: int, stop: int) -> Scene:
         """Return scans ``start`` to ``stop`` - 1, with their truth, as a scene.
 
@@ -284,22 +294,31 @@ def checked_measurements(scan: Sequence[Array], sensors: Sequence[Sensor], where
 def default_region(sensors: Sequence[Sensor]) -> Array:
     """Box of x, y, z around the fields of view, shape (3, 2), metres; see `Scene`."""
     boxes = []
-    for sensor in sensors:
+    stands = [stand for sensor in sensors for stand in _stands(sensor)]
+    for sensor in stands:
         if isinstance(sensor, (Radar3D, Radar2D)):
             reach = max(float(sensor.field_of_view[0, 1]), 1.0)
             boxes.append(np.stack([sensor.position[:2] - reach, sensor.position[:2] + reach], axis=1))
         elif isinstance(sensor, PositionSensor):
             boxes.append(sensor.field_of_view[:2])
-    positions = np.array([sensor.position for sensor in sensors])
+    positions = np.array([sensor.position for sensor in stands])
     if not boxes:
         # bearings contain no distance: take the surroundings of the sensors, at least 100 km
         reach = max(100_000.0, float(np.ptp(positions[:, :2], axis=0).max()))
         boxes.append(np.stack([positions[:, :2].min(axis=0) - reach, positions[:, :2].max(axis=0) + reach], axis=1))
     floor = float(positions[:, 2].min())
     heights = [(floor, floor + _DEFAULT_HEIGHT)]
-    heights += [tuple(s.field_of_view[2]) for s in sensors if isinstance(s, PositionSensor) and s.dim == 3]
+    heights += [tuple(s.field_of_view[2]) for s in stands if isinstance(s, PositionSensor) and s.dim == 3]
     plane = np.stack([np.min(boxes, axis=0)[:, 0], np.max(boxes, axis=0)[:, 1]], axis=1)
     return np.vstack([plane, [[min(h[0] for h in heights), max(h[1] for h in heights)]]])
+
+
+def _stands(sensor: Sensor) -> list[Sensor]:
+    """The sensor at some of its platform's times; itself if no platform carries it."""
+    if sensor.platform is None:
+        return [sensor]
+    times = sensor.platform.times
+    return [sensor.at(time) for time in times[:: -(-len(times) // _STANDS)].tolist()] + [sensor.at(float(times[-1]))]
 
 
 __all__ = ["Scan", "Scene", "Truth", "default_region"]

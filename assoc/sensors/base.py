@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
+
+if TYPE_CHECKING:
+    from assoc.sensors.platform import Platform
 
 ANGLES = ("azimuth", "elevation")
 """Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
@@ -77,6 +80,9 @@ class Sensor(ABC):
         Lower and upper bound of each component of a measurement.
     name : str
         For people.
+    platform : Platform, optional
+        What carries the sensor. Its position is then that on the carrier, forward, left and up, and measurements and
+        the field of view are relative to the carrier's position and heading; see `at`.
 
     Raises
     ------
@@ -95,6 +101,7 @@ class Sensor(ABC):
     false_alarm_rate: float = 1.0
     field_of_view: Array = None  # type: ignore[assignment]  # only sensors with a natural default leave it out
     name: str = ""
+    platform: Platform | None = None
 
     kind: ClassVar[str]
     components: ClassVar[tuple[str, ...]]
@@ -131,6 +138,11 @@ class Sensor(ABC):
                 raise InvalidInputError(
                     f"{label}: field_of_view of {component} spans {high - low:g} rad, more than a full circle"
                 )
+        if self.platform is not None:
+            from assoc.sensors.platform import Platform
+
+            if not isinstance(self.platform, Platform):
+                raise InvalidInputError(f"{label}: platform must be a Platform, got {type(self.platform).__name__}")
         for line in self.warnings:
             warn(line)
 
@@ -216,6 +228,35 @@ class Sensor(ABC):
         """The same sensor without the components that depend on a velocity."""
         return self
 
+    def at(self, time: float) -> Sensor:
+        """The sensor as it stands at a time (seconds) in the scene's frame: itself if no platform carries it.
+
+        Raises
+        ------
+        InvalidInputError
+            The time is outside of the platform's times.
+        """
+        if self.platform is None:
+            return self
+        (place,) = self.platform.places(np.array([time]), self.position)
+        return self._standing(place, float(self.platform.poses(np.array([time]))[1][0]))
+
+    def _standing(self, position: Array, heading: float) -> Sensor:
+        """The sensor at a position (3,) of the frame, turned by a heading, radians."""
+        view = np.array(self.field_of_view)
+        view[[axis for axis in range(self.dim) if self.components[axis] == "azimuth"]] += heading
+        return replace(self, platform=None, position=position, field_of_view=view)
+
+    def aligned(self, measurements: Array, times: Array) -> Array:
+        """Measurements (n, d) made at times (n,) as the sensors `at` these times would make them."""
+        if self.platform is None or not len(measurements):
+            return measurements
+        result, headings = np.array(measurements), self.platform.poses(times)[1]
+        for axis in range(self.dim):
+            if self.components[axis] == "azimuth" and self.platform.headings is not None:
+                result[:, axis] = wrap_angle(result[:, axis] + headings)
+        return result
+
     @abstractmethod
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free measurements of targets.
@@ -282,6 +323,7 @@ class Sensor(ABC):
             and np.array_equal(self.position, other.position)
             and np.array_equal(self.covariance, other.covariance)
             and np.array_equal(self.field_of_view, other.field_of_view)
+            and self.platform == other.platform
         )
 
     def __hash__(self) -> int:

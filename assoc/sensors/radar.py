@@ -76,6 +76,16 @@ class Radar3D(Sensor):
             result[:, 3, 3:] = u
         return result
 
+    def aligned(self, measurements: Array, times: Array) -> Array:
+        """As `Sensor.aligned`, with range rates relative to the scene's frame."""
+        result = super().aligned(measurements, times)
+        if self.platform is None or not self.measures_velocity or not len(result):
+            return result
+        away = np.stack([np.cos(result[:, 1]), np.sin(result[:, 1]), np.tan(result[:, 2])], axis=1)
+        away *= np.cos(result[:, 2])[:, None]
+        result[:, 3] += (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
+        return result
+
     def _velocities(self, velocities: Array | None) -> Array:
         if velocities is None:
             raise InvalidInputError(f"{self._label}: a range rate needs the targets' velocities")

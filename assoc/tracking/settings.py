@@ -89,10 +89,19 @@ class TrackerSettings:
         online = self.registration
         if not (online is None or isinstance(online, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {online!r}")
+        if online is not None and any(sensor.platform is not None for sensor in self.sensors):
+            raise InvalidInputError("registration: sensors on platforms cannot be registered; leave it out")
         if online is not None and online.sensors != self.sensors:
             raise InvalidInputError("registration: its sensors are not those of the tracker")
         if not (self.identity is None or isinstance(self.identity, IdentityParameters)):
             raise InvalidInputError(f"identity must be IdentityParameters, got {type(self.identity).__name__}")
+
+    def at(self, time: float) -> TrackerSettings:
+        """The settings with the sensors as they stand at a time, seconds; themselves if no platform carries any."""
+        place = self.place.at(time)
+        if place is self.place:
+            return self
+        return replace(self, place=place, nursery=None if self.nursery is None else self.nursery.at(time))
 
     @cached_property
     def angles_alone(self) -> bool:

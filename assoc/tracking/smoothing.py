@@ -76,14 +76,15 @@ def _track(tracker: Tracker, scene: Scene, track_id: int, found: dict[int, Array
     smoother = FixedLagSmoother(filter, max(last - first, 1))
     window, times, hits = None, [], []
     for k in range(first, last + 1):
-        scan = scene.scan(k)
+        scan = scene.scan(k).aligned(scene.sensors)
+        standing = scene.at(scan.time)
         if window is None:
-            window = _begun(tracker, smoother, scene, scan, found[k])
+            window = _begun(tracker, smoother, standing, scan, found[k])
         else:
             window = smoother.predict(window, scan.time - times[-1])
             for s, m in enumerate(found.get(k, np.zeros(len(scene.sensors), dtype=np.int32)).tolist()):
                 if m:
-                    window, _ = smoother.update(window, scan.measurements[s][m - 1 : m], scene.sensors[s])
+                    window, _ = smoother.update(window, scan.measurements[s][m - 1 : m], standing.sensors[s])
         times.append(scan.time)
         hits.append(k in found)
     assert window is not None

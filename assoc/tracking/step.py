@@ -70,6 +70,7 @@ def advance(settings: TrackerSettings, state: TrackerState, scan: Scan) -> tuple
     InvalidInputError
         Times and measurements lead to numbers out of range.
     """
+    settings = settings.at(scan.time)
     progress = Progress(settings, _warned(settings, state, scan), scan, Work(settings, state))
     if state.rng is not None:
         settings.filter.rng.bit_generator.state = state.rng  # type: ignore[attr-defined]
@@ -109,7 +110,8 @@ def check(
         if stamps is None:
             # only the functions for measurements with times of their own weigh identities
             stamps = tuple(np.full(len(z), when) for z in checked)
-    return Scan(state.scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
+    scan = Scan(state.scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
+    return scan.aligned(sensors)
 
 
 def _checked_stamps(
@@ -133,7 +135,7 @@ def _warned(settings: TrackerSettings, state: TrackerState, scan: Scan) -> Track
         return state
     if scan.at_once and len(sensors) > 1 or len(current(settings, state)):
         return state
-    if any(fit.any() for fit in settings.births.places(scan.measurements).fit):
+    if any(fit.any() for fit in settings.births.places(scan).fit):
         return state
     if len(sensors) == 1:
         warn("the only sensor measures angles alone: no track starts, for bearings do not cross")
@@ -174,8 +176,8 @@ def _timed(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TimedS
     before = scan.time if state.time is None else state.time
     return TimedScan(
         settings.filter, state.tracks.states, before, scan.measurements, scan.own_times(), settings.sensors,
-        settings.births.places(scan.measurements), start, scan.sectors, settings.gate_probability, scan.time,
-        _evidence(state, scan),
+        settings.births.places(scan), start, scan.sectors, settings.gate_probability, scan.time,
+        _evidence(state, scan), scan.paths,
     )  # fmt: skip
 
 

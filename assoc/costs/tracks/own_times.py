@@ -10,7 +10,8 @@ Coarse pairs are found by the boxes that a track's gate sweeps between the first
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.scene.own_times import looked_at
-from assoc.sensors import Sensor
+from assoc.sensors import Platform, Sensor
 
 # a gate moves on a curve, the box on a straight line: it is longer by this factor
 _CURVED = 1.3
@@ -109,6 +110,8 @@ class TimedScan:
     evidence : callable (track, sensor, measurement) -> (log ratio, possible), optional
         Further evidence on pairs of a track and a measurement (K,): a log likelihood ratio, and whether they may belong
         together.
+    paths : sequence over sensors of Platform or None, optional
+        Of sensors that moved since the last scan; they are given as they stand at its end.
     """
 
     def __init__(
@@ -125,7 +128,9 @@ class TimedScan:
         gate_probability: float,
         end: float,
         evidence: PairEvidence | None = None,
+        paths: Sequence[Platform | None] = (),
     ) -> None:
+        self.paths = paths or (None,) * len(sensors)
         self.evidence = evidence
         self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
         self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
@@ -171,10 +176,7 @@ class TimedScan:
         log_likelihood, inside = np.zeros(len(track)), np.ones(len(track), dtype=np.bool_)
         for k in range(rows.shape[1]):
             due = (count > k) & (turn[:, k] != leads)
-            for s, sensor in enumerate(self.sensors):
-                here = np.flatnonzero(due & (turn[:, k] == s))
-                if not len(here):
-                    continue
+            for s, sensor, here in self._turns(due, turn[:, k], stamps):
                 now = stamps[here, s]
                 moved = self._moved(states[here], now - when[here])
                 z = np.ascontiguousarray(self.measurements[s][rows[here, s] - 1])
@@ -188,6 +190,22 @@ class TimedScan:
                     log_likelihood[known] += says
                     inside[known] &= possible
         return Followed(states, when, first, leads, log_likelihood, inside)
+
+    def _turns(self, due: Array, turn: Array, stamps: Array) -> Iterator[tuple[int, Sensor, Array]]:
+        """Sensors, as they stood, and the due tuples whose turn they have."""
+        for s in range(len(self.sensors)):
+            here = np.flatnonzero(due & (turn == s))
+            for sensor, rows in self.standing(s, stamps[here, s]):
+                yield s, sensor, here[rows]
+
+    def standing(self, s: int, times: Array) -> list[tuple[Sensor, Array]]:
+        """Sensor s as it stood at times (n,), and the rows of each stand: one of all unless it moved."""
+        path = self.paths[s]
+        if path is None:
+            return [(self.sensors[s], np.arange(len(times)))] if len(times) else []
+        when, which = np.unique(times, return_inverse=True)
+        places = path.poses(when)[0]
+        return [(replace(self.sensors[s], position=places[i]), np.flatnonzero(which == i)) for i in range(len(when))]
 
     def _moved(self, states: Any, dt: Array) -> Any:
         """Each state its own dt seconds later, without caching models by time step."""
@@ -267,6 +285,8 @@ class TimedScan:
         times = self.times[s]
         if not len(self.states) or not len(times):
             return nothing, nothing
+        if self.paths[s] is not None:
+            return self._near_moving(s)
         sensor, gate = self.sensors[s], self.gates[s]
         angles, axes = angular_components(sensor), len(self.filter.motion.position)
         # the gate is widest at the end of the scan; before, it moves with the velocity
@@ -288,19 +308,36 @@ class TimedScan:
         box = Expected(late.mean + 0.5 * (ways[0] + ways[1]), _diagonal(reach**2 / gate))
         return near_pairs(box, self.measurements[s], angles, gate)
 
+    def _near_moving(self, s: int) -> tuple[Array, Array]:
+        """`near` for a sensor that moved: by the predictions to each time at which it measured."""
+        found = []
+        for sensor, rows in self.standing(s, self.times[s]):
+            then = self._moved(self.states, np.maximum(float(self.times[s][rows[0]]) - self.before, 0.0))
+            expected, angles = self.filter.expected(then, sensor), angular_components(sensor)
+            track, near = near_pairs(expected, self.measurements[s][rows], angles, self.gates[s])
+            found.append((track, rows[near]))
+        tracks, measurements = (np.concatenate(part) for part in zip(*found, strict=True))
+        order = np.lexsort((measurements, tracks))
+        return tracks[order], measurements[order]
+
     def near_beginnings(self, r: int, s: int) -> tuple[Array, Array]:
         """Measurements of sensor r that may begin a track, and of sensor s that may be of it, ordered by the first."""
         nothing = np.zeros(0, dtype=np.int64)
         able = np.flatnonzero(self.places.fit[r])
         if not len(able) or not len(self.times[s]):
             return nothing, nothing
-        stamps, ends = self.times[r][able], (float(self.times[s].min()), float(self.times[s].max()))
-        lag = np.maximum(np.abs(stamps - ends[0]), np.abs(stamps - ends[1]))
-        wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)
-        sensor = self.sensors[s]
-        expected = self.filter.expected(wide, sensor)
-        first, second = near_pairs(expected, self.measurements[s], angular_components(sensor), self.gates[s])
-        return able[first], second
+        firsts, seconds = [], []
+        for sensor, rows in self.standing(s, self.times[s]):
+            stamps, ends = self.times[r][able], (float(self.times[s][rows].min()), float(self.times[s][rows].max()))
+            lag = np.maximum(np.abs(stamps - ends[0]), np.abs(stamps - ends[1]))
+            wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)
+            expected, angles = self.filter.expected(wide, sensor), angular_components(sensor)
+            first, second = near_pairs(expected, self.measurements[s][rows], angles, self.gates[s])
+            firsts.append(able[first])
+            seconds.append(rows[second])
+        first, second = np.concatenate(firsts), np.concatenate(seconds)
+        order = np.argsort(first, kind="stable")
+        return first[order], second[order]
 
 
 def _measured(sensor: Sensor, positions: Array, velocities: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.build import build_problem
-from assoc.costs.positions import positions_and_covariances, single_positions
+from assoc.costs.positions import positions_and_covariances, positions_of_scan, single_positions
 from assoc.costs.tracks.own_times import Places
 from assoc.costs.tracks.scores import ScoreTerms, log_birth
 from assoc.filters.base import Filter
@@ -99,11 +99,11 @@ class NewTracks:
         scores = self._appears[s] + self._log_birth(covariances)
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
-    def places(self, measurements: Sequence[Array]) -> Places:
+    def places(self, scan: Scan) -> Places:
         """Position of the target of each measurement of a scan, by that measurement alone."""
         positions, covariances, fit, births = [], [], [], []
-        for s, z in enumerate(measurements):
-            where, spread = single_positions(self._place, s, z)
+        for s in range(len(scan.measurements)):
+            where, spread = positions_of_scan(self._place, scan, s)
             positions.append(where)
             covariances.append(np.asarray(spread))
             fit.append(self._narrow(covariances[s]))

@@ -109,7 +109,7 @@ def step_nursery(progress: Progress, stages: Iterable[Callable[[Progress], Progr
     free = [ids == 0 for ids in step.assigned]
     z = tuple(array[mask] for array, mask in zip(scan.measurements, free, strict=True))
     times = None if scan.times is None else tuple(array[mask] for array, mask in zip(scan.times, free, strict=True))
-    left = Scan(scan.index, scan.time, z, times=times, sectors=scan.sectors)
+    left = Scan(scan.index, scan.time, z, times=times, sectors=scan.sectors, paths=scan.paths)
     inner = Progress(settings.nursery, state.nursery.state, left, progress.work)
     for stage in stages:
         inner = stage(inner)
