@@ -52,16 +52,20 @@ def plot_scene(
     ax = axes_or_new(ax)
     chosen = [scene.scan(scan)] if scan is not None else [scene.scan(k) for k in range(scene.num_scans)]
     middle = float(scene.region[2].mean())
+    chosen = [scan.aligned(scene.sensors) for scan in chosen]
+    stands = [scene.at(scan.time).sensors for scan in chosen]
     found = [
-        [_ends(scene, sensor, scan.measurements[s], middle) for scan in chosen]
-        for s, sensor in enumerate(scene.sensors)
+        [_ends(scene, then[s], scan.measurements[s], middle) for then, scan in zip(stands, chosen, strict=True)]
+        for s in range(len(scene.sensors))
     ]
-    sites = stacked(sensor.position for sensor in scene.sensors)
+    # carried sensors are drawn where they stand in the last of the scans
+    sensors = stands[-1]
+    sites = stacked(sensor.position for sensor in sensors)
     truth = [] if scene.truth is None else [scan.truth_positions for scan in chosen]
     named = [part for row, sensor in zip(found, scene.sensors, strict=True) for part in row if not _bears(sensor)]
     near, far = stacked([sites, *truth]), stacked(named)
     unit = unit_of(np.concatenate([near, far]))
-    for s, (sensor, row) in enumerate(zip(scene.sensors, found, strict=True)):
+    for s, (sensor, row) in enumerate(zip(sensors, found, strict=True)):
         ends = unit.factor * stacked(row)
         label = sensor.name or f"sensor {s + 1}"
         if _bears(sensor):
@@ -71,9 +75,9 @@ def plot_scene(
         style: dict[str, Any] = {"markerfacecolor": "none"} if scan is not None else {"alpha": 0.5}
         ax.plot(*ends[:, :2].T, marker(s), color=colour(s), markersize=size, label=label, **style)
     if gates:
-        _draw_gates(ax, scene, chosen, middle, gate_probability, unit.factor)
+        _draw_gates(ax, scene, sensors, chosen, middle, gate_probability, unit.factor)
     draw_truth(ax, scene, chosen, unit.factor, paths=len(chosen) > 1)
-    draw_sensors(ax, scene.sensors, unit.factor)
+    draw_sensors(ax, sensors, unit.factor)
     set_plan_view(ax, box_around(near, far), unit)
     legend(ax)
     return ax
@@ -95,8 +99,16 @@ def _rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
     ax.plot(*lines.reshape(-1, 2).T, **style)
 
 
-def _draw_gates(ax: Any, scene: Scene, scans: Sequence[Scan], height: float, probability: float, factor: float) -> None:
-    for s, sensor in enumerate(scene.sensors):
+def _draw_gates(
+    ax: Any,
+    scene: Scene,
+    sensors: Sequence[Sensor],
+    scans: Sequence[Scan],
+    height: float,
+    probability: float,
+    factor: float,
+) -> None:
+    for s, sensor in enumerate(sensors):
         z = np.concatenate([scan.measurements[s] for scan in scans])
         style = {"color": colour(s), "linewidth": 0.8, "linestyle": "--"}
         if _bears(sensor):

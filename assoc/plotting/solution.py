@@ -56,7 +56,8 @@ def plot_solution(
     ax = axes_or_new(ax)
     found = association.positions
     drawn = measured_places(scene, association)
-    sites = stacked(sensor.position for sensor in scene.sensors)
+    standing = scene.at(scan.time).sensors
+    sites = stacked(sensor.position for sensor in standing)
     truth = stacked([] if scan.truth_positions is None else [scan.truth_positions])
     rays = [isinstance(sensor, BearingSensor) for sensor in scene.sensors]
     far = stacked([found, *(at for (at, _), ray in zip(drawn, rays, strict=True) if not ray)])
@@ -74,7 +75,7 @@ def plot_solution(
     if target is not None and np.ptp(box, axis=1).max() < 3_000.0:
         unit = unit_of(np.zeros((0, 3)))
     f = unit.factor
-    for ray, sensor, (at, label) in zip(rays, scene.sensors, drawn, strict=True):
+    for ray, sensor, (at, label) in zip(rays, standing, drawn, strict=True):
         if ray:
             _bearings(ax, f * sensor.position, f * at, label)
     links, lost = [], []
@@ -92,7 +93,7 @@ def plot_solution(
         ax.plot(*away.T, "x", color=GREY, markersize=5, label="false alarms")
     ax.plot(*(f * found[:, :2]).T, ".", color=BLACK, markersize=6, label="targets found", zorder=5)
     draw_truth(ax, scene, [scan], f, paths=False)
-    draw_sensors(ax, scene.sensors, f)
+    draw_sensors(ax, standing, f)
     set_plan_view(ax, box, unit)
     legend(ax)
     return ax
@@ -116,7 +117,8 @@ def measured_places(scene: Scene, association: ScanAssociation) -> list[tuple[Ar
     list over sensors of (places (n, 3), labels (n,))
         Metres; row in ``association.targets`` of each measurement, -1 for false alarms.
     """
-    scan = scene.scan(association.scan)
+    scan = scene.scan(association.scan).aligned(scene.sensors)
+    scene = scene.at(scan.time)
     found = np.zeros((0, 3)) if association.positions is None else association.positions
     result = []
     for sensor, z, label in zip(scene.sensors, scan.measurements, association.labels(), strict=True):

@@ -8,6 +8,7 @@ import pytest
 
 from assoc import AssocWarning, InvalidInputError, Scene, associate, build_problem, sensors
 from assoc.costs import positions_and_covariances
+from assoc.plotting import plot_scene
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
 from assoc.tracking import TRACKERS, smoothed
 from assoc.tracking.filter_choice import two_speeds
@@ -146,6 +147,19 @@ def test_smoothed_tracks_of_a_ship():
     times, _, places = table.arrays()
     last = places[times == scene.times[-1]]
     assert np.linalg.norm(last[:, None, :2] - boats(scene.times[-1])[:, :2], axis=2).min(axis=0).max() < 10.0
+
+
+def test_pictures_are_drawn_where_sensors_stand():
+    axes = pytest.importorskip("matplotlib.pyplot").figure().gca()
+    scene = scene_of(["radar2d", "position"])
+    plot_scene(scene, scan=4, ax=axes)
+    drawn = {line.get_label(): line.get_xydata() for line in axes.lines}
+    (radar,) = [points for label, points in drawn.items() if label.startswith("sensor 1")]
+    factor = 1.0 if np.abs(radar).max() > 50 else 1e-3
+    apart = np.linalg.norm(radar[:, None] - factor * boats(scene.times[4])[:, :2], axis=2)
+    assert apart.min(axis=0).max() < 30.0 * factor
+    standing = factor * np.array([sensor.at(scene.times[4]).position[:2] for sensor in scene.sensors])
+    np.testing.assert_allclose(drawn["sensors"], standing)
 
 
 def test_scene_files(tmp_path):

@@ -185,7 +185,7 @@ def _data(
         if scene is None
         else [
             {"name": sensor.name or f"sensor {s + 1}", "place": plain_numbers(sensor.position, 1)}
-            for s, sensor in enumerate(scene.sensors)
+            for s, sensor in enumerate(scene.at(float(scene.times[-1])).sensors)
         ],
         **({} if plots is None else plot_data(plots, decimals)),
     }
@@ -224,9 +224,11 @@ def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
         return []
     middle = float(scene.region[2].mean())
     found = []
-    for time, scan in zip(np.round(scene.times, _DECIMALS), scene.measurements, strict=True):
-        at = np.concatenate([places(scene.sensors[s], scan[s], middle, 0.0)[:, :2] for s in named])
-        found.append({"t": float(time), "at": plain_numbers(at, decimals)})
+    for k in range(scene.num_scans):
+        scan = scene.scan(k).aligned(scene.sensors)
+        sensors = scene.at(scan.time).sensors
+        at = np.concatenate([places(sensors[s], scan.measurements[s], middle, 0.0)[:, :2] for s in named])
+        found.append({"t": round(scan.time, _DECIMALS), "at": plain_numbers(at, decimals)})
     return found
 
 

@@ -58,7 +58,7 @@ def source_view(source: Source, file: str) -> dict[str, Any]:
         names = [f"sensor {s + 1}" for s in range(source.num_sensors)]
         return {"file": file, "title": file, "scene": False, "sensors": [{"name": name} for name in names]}
     sensors = []
-    for s, sensor in enumerate(source.sensors):
+    for s, sensor in enumerate(source.at(float(source.times[-1])).sensors):
         sensors.append(
             {
                 "name": sensor.name or f"sensor {s + 1}",
@@ -133,12 +133,13 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
 
     Measurements with times of their own have no residuals: the target has moved since.
     """
-    scan = scene.scan(one.scan)
+    scan = scene.scan(one.scan).aligned(scene.sensors)
+    standing = scene.at(scan.time)
     positions = np.zeros((0, 3)) if one.positions is None else one.positions
     spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
     measured, residuals = [], []
     for s, (at, label) in enumerate(measured_places(scene, one)):
-        sensor = scene.sensors[s].position_part
+        sensor = standing.sensors[s].position_part
         z = scan.measurements[s][:, : sensor.dim]
         entry: dict[str, Any] = {"at": plain_numbers(at, decimals), "target": label.tolist()}
         if scan.sources is not None:

@@ -14,8 +14,9 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._system.door import doors
 from assoc._text.times import moment
-from assoc.costs.positions import single_positions
+from assoc.costs.positions import positions_of_scan
 from assoc.errors import AssocError, InvalidInputError
+from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.base import LARGEST
 from assoc.tracking.checking import checked
@@ -182,12 +183,19 @@ class LiveTracker:
     def warm_up(self) -> None:
         """Compile what the first step needs."""
         spare, centre = self.settings.make(), self.settings.scene.region.mean(axis=1)[None]
+        carriers = [sensor.platform.times for sensor in self.settings.scene.sensors if sensor.platform is not None]
+        begin = max((float(times[0]) for times in carriers), default=0.0)
+        pace = min([1.0, *((float(times[-1]) - begin) / 3 for times in carriers)])
         for k in range(3):
             z = [
                 sensor.measure(centre, np.zeros((1, 3))) if sensor.measures_velocity else sensor.measure(centre)
                 for sensor in self.settings.scene.sensors
             ]
-            spare.step(float(k), z, [np.array([k - 0.5 / (s + 1)]) for s in range(len(z))] if k else None)
+            spare.step(
+                begin + pace * k,
+                z,
+                [np.array([begin + pace * (k - 0.5 / (s + 1))]) for s in range(len(z))] if k else None,
+            )
 
     def take(
         self, sensor: object, time: float, values: Sequence[float], identity: tuple[int, int] = (0, 0)
@@ -348,7 +356,8 @@ class LiveTracker:
         tracks = [track for track in living if track.confirmed]
         ids = {track.track_id for track in tracks}
         ended, self.confirmed = sorted(self.confirmed - ids), ids
-        found = [single_positions(settings.scene, s, measured)[0] for s, measured in enumerate(z)]
+        scan = Scan(0, end, tuple(z), times=tuple(times)).aligned(sensors)
+        found = [positions_of_scan(settings.scene.at(end), scan, s)[0] for s in range(len(sensors))]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
         return Picture(end, tracks, ended, np.concatenate(found), owner)
 
