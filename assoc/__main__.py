@@ -16,6 +16,7 @@ from assoc._version import __version__
 PROGRAMS = {
     "simulate": ("simulate a scene", "three-radar -o scene.npz"),
     "solve": ("associate its measurements", "scene.npz --solver aco"),
+    "inspect": ("say what it understands of several radars' files", "radars.toml --picture plots.png"),
     "track": ("make tracks of scenes or of recorded radar plots", "scene.npz -o tracks.csv"),
     "live": ("make tracks of radar plots as they come", "scene.npz --page 0 < plots > tracks.csv"),
     "register": ("find biases of sensors", "scene.npz -o registered.npz"),

@@ -32,6 +32,7 @@ from assoc._cli.track.options import (
     track_parser,
     with_further,
 )
+from assoc._cli.track.radars_file import ASTERIX, read_asterix_plots
 from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
@@ -98,7 +99,8 @@ class _Tracked(NamedTuple):
 def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     file = given["file"]
     started, compiled = time.perf_counter(), compile_seconds()
-    found = (_of_scene if _is_npz(file) else _of_plots)(file, given, settings)
+    of = _of_radars if file.lower().endswith(".toml") else _of_scene if _is_npz(file) else _of_plots
+    found = of(file, given, settings)
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
     if given["verbose"]:
@@ -130,21 +132,34 @@ def _is_npz(file: str) -> bool:
 
 
 def _is_asterix(file: str) -> bool:
-    return file.lower().endswith((".ast", ".asterix", ".pcap"))
+    return file.lower().endswith(ASTERIX)
 
 
-def _read_asterix(file: str, radar: str | None) -> Recording:
-    """Plots of one radar of an ASTERIX file."""
-    from assoc.integrations.asterix import read_asterix
+def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+    """Track the radars of a description."""
+    from assoc._cli.track.radars_file import read_radars
+    from assoc.tracking import track_scene
 
-    plots = {f"{sac}/{sic}": recording for (sac, sic), recording in sorted(read_asterix(file).plots.items())}
-    if not plots:
-        raise InvalidInputError(f"{file}: holds no plots (category 048)")
-    if radar is None and len(plots) == 1:
-        return next(iter(plots.values()))
-    if radar not in plots:
-        raise InvalidInputError(f"--radar: the file holds plots of {', '.join(plots)}; name one")
-    return plots[radar]
+    given.check_use((*OF_SCENES, *OF_PLOTS), input="radars")
+    if given["origin"] is not None:
+        raise InvalidInputError(f"--origin: {file} says where the radars stand")
+    given["filter"] = given["filter"] or "imm-cv"
+    settings |= given.some(("registration",))
+    found = read_radars(file)
+    scene, scans = found.scene, range(found.scene.num_scans)
+    known = None if given["identity"] == "ignore" else found.identities
+    tracker = make_tracker(
+        given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, min(found.turns)
+    )
+    (tracks, _), count = _watched(
+        given,
+        tracker,
+        scans,
+        lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
+        lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=known),
+    )
+    tracked = scene if count == scene.num_scans else scene.part(0, count)
+    return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
 def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
@@ -215,7 +230,11 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
 def _read_plots(file: str, given: Given) -> Recording:
     from assoc.recordings import read_plots
 
-    recording = _read_asterix(file, given["radar"]) if _is_asterix(file) else read_plots(file)
+    if _is_asterix(file):
+        content, source = read_asterix_plots(file, given["radar"], "--radar")
+        recording = content.plots[source]
+    else:
+        recording = read_plots(file)
     if given["rates"] and recording.aircraft is None:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     return recording

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 from dataclasses import fields
 from importlib import import_module
 from importlib.util import find_spec
@@ -13,6 +14,7 @@ import pytest
 
 import assoc
 from assoc import solvers
+from assoc.__main__ import main
 from assoc._version import __version__ as version
 from assoc.solvers import registry
 from experiments.benchmarks import readme, rows
@@ -194,3 +196,18 @@ def test_the_page_of_stability_names_what_is_public():
     text = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     for name in re.findall(r"`([A-Za-z_]\w*)`", text.partition("| scenes and sensors")[0].partition("|---|")[2]):
         assert hasattr(assoc, name), name
+
+
+@pytest.mark.slow
+def test_commands_of_the_first_hour_run(tmp_path, monkeypatch, capsys):
+    """Those that begin with assoc, in their order; blocks of TOML are files first."""
+    pytest.importorskip("plotly")
+    monkeypatch.chdir(tmp_path)
+    for page in ("from_files",):
+        text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+        for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL):
+            (tmp_path / "radars.toml").write_text(block, encoding="utf-8")
+        commands = re.findall(r"^    assoc (.+)$", text, re.MULTILINE)
+        assert commands
+        for words in map(shlex.split, commands):
+            assert main(words) == 0, (page, words, capsys.readouterr().err)

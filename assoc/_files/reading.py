@@ -55,6 +55,8 @@ def readable(path: FilePath) -> Iterator[None]:
         yield
     except InvalidInputError:
         raise
+    except FileNotFoundError:
+        raise InvalidInputError(f"{path}: no such file") from None
     except _DAMAGED:
         raise InvalidInputError(f"{path}: is damaged, or not packed as its name says") from None
     except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # ValueError: not a valid file name

@@ -28,6 +28,10 @@ FOLLOWED_WITHIN = 1_000.0
 """Largest distance at which a track follows a target, metres, to find the target followed most."""
 
 
+UNKNOWN_HEIGHT = 2_000.0
+"""Standard deviation of a height, metres, from which maps draw a track on the ground."""
+
+
 def coordinates(positions: Array, origin: Origin) -> Array:
     """Latitude and longitude in degrees and altitude in metres of positions (n, 3) in a scene's plane, (n, 3)."""
     return geodetic(positions, origin) * [180.0 / np.pi, 180.0 / np.pi, 1.0]
@@ -94,6 +98,12 @@ def _lines(rows: pd.DataFrame) -> list[list[list[float]]]:
     return [part.tolist() for part in np.split(points, cuts)]
 
 
+def _has_heights(rows: pd.DataFrame) -> bool:
+    """Whether the altitudes of a track are known, measured or estimated from several places."""
+    sigma = rows["sigma_z"].median() if "sigma_z" in rows else 0.0
+    return bool(rows["altitude"].notna().all()) and sigma < UNKNOWN_HEIGHT
+
+
 def _feature(number: int, name: str, rows: pd.DataFrame) -> dict[str, Any]:
     parts = _lines(rows)
     geometry: dict[str, Any]
@@ -122,8 +132,9 @@ def _kml(tracks: pd.DataFrame) -> str:
         first, last = rows["time"].iloc[0], rows["time"].iloc[-1]
         ElementTree.SubElement(mark, "description").text = f"{moment(first)} to {moment(last)}, {len(rows)} rows"
         owner = ElementTree.SubElement(mark, "MultiGeometry")
+        mode = "absolute" if _has_heights(rows) else "clampToGround"
         for part in _lines(rows):
             line = ElementTree.SubElement(owner, "LineString" if len(part) > 1 else "Point")
-            ElementTree.SubElement(line, "altitudeMode").text = "absolute"
+            ElementTree.SubElement(line, "altitudeMode").text = mode
             ElementTree.SubElement(line, "coordinates").text = " ".join(",".join(map(str, point)) for point in part)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 from array import array
@@ -11,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assoc._files.reading import read_lines
+from assoc._files.reading import read_bytes, read_lines
 from assoc._system.door import door
+from assoc._system.imports import check_extra
+from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
@@ -37,7 +40,7 @@ def read_plots(
     max_disorder: float = MAX_DISORDER,
     garbled_codes: Array | None = None,
 ) -> Recording:
-    """Read radar plots from a CSV file with a header line.
+    """Read radar plots from a CSV file with a header line, or from the same table in a Parquet file.
 
     Needed are columns for time, range and bearing; Mode 3, altitude and (from a simulation) aircraft are read
     where they are there. Separators are commas, semicolons or tabs.
@@ -71,7 +74,21 @@ def read_plots(
     file = Path(path)
     if not 0 <= max_disorder < math.inf:
         raise InvalidInputError(f"max_disorder: expected seconds >= 0, got {max_disorder!r}")
-    return _read(file, read_lines(file), columns or {}, units or {}, max_disorder, garbled_codes)
+    lines = _parquet_lines(file) if file.suffix.lower() == ".parquet" else read_lines(file)
+    return _read(file, lines, columns or {}, units or {}, max_disorder, garbled_codes)
+
+
+def _parquet_lines(file: Path) -> Iterator[str]:
+    """The table of a Parquet file as lines of CSV."""
+    check_extra("pyarrow", "parquet")
+    import pandas as pd
+
+    content = read_bytes(file)
+    try:
+        frame = pd.read_parquet(io.BytesIO(content))
+    except (ValueError, OSError) as error:
+        raise InvalidInputError(f"{file}: is not a readable Parquet file ({one_line(error)[:100]})") from None
+    yield from io.StringIO(frame.to_csv(index=False))
 
 
 def _read(

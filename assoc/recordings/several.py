@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +16,15 @@ from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.recordings.rotation import estimate_rotation
 from assoc.recordings.windows import running_phase
+from assoc.scene.geodesy import Origin, geodetic
 from assoc.scene.scene import Scene
 from assoc.sensors import Radar2D
 from assoc.sensors.base import wrap_angle
 
 FULL_TURN = 2.0 * math.pi
 MOST_SCANS = 1_000_000
+EARTH = 6.37e6
+"""Radius, metres."""
 
 
 @door
@@ -29,12 +34,16 @@ def scene_of_radars(
     *,
     rotations: Sequence[float] | None = None,
     interval: float | None = None,
+    origin: Origin | None = None,
 ) -> Scene:
     """Put the plots of several radars into one scene, each with its own time.
 
     A scan holds the measurements of all radars since the previous one. The sectors that a radar covered follow from its
     rotation and from the azimuths and times of its plots; before its first plot and after its last it is taken for
     switched off.
+
+    A radar of three components measures heights: those of its plots' altitudes that are not garbled. Its plots without
+    one become a sensor of their own, and both share its detections as the plots do.
 
     Parameters
     ----------
@@ -46,10 +55,13 @@ def scene_of_radars(
         Seconds for a turn of each; left out, they are estimated.
     interval : float, optional
         Seconds from scan to scan, at most the shortest turn; by default half of it.
+    origin : tuple of latitude, longitude, height, optional
+        Of the scene's frame, radians and metres. Altitudes are then heights above the ellipsoid, else above z = 0.
 
     Returns
     -------
     Scene
+        Its sensors are those of `parts_of_radars`.
 
     Raises
     ------
@@ -74,20 +86,94 @@ def scene_of_radars(
         raise InvalidInputError(f"interval: {pace:g} s makes more than {MOST_SCANS} scans of {end - start:g} s")
     edges = start + pace * np.arange(math.floor((end - start) / pace) + 2)
     measured, stamps, sectors = [], [], []
-    for recording, turn in zip(recordings, turns, strict=True):
+    parts = parts_of_radars(recordings, radars)
+    swept = [_sectors(recording, turn, edges) for recording, turn in zip(recordings, turns, strict=True)]
+    for part in parts:
+        z = part.recording.measurements
+        if part.radar.dim == 3:
+            z = np.column_stack([z, _heights(part.recording, part.radar, origin)])
         # a plot on an edge belongs to the scan before it, but for the first
-        cut = np.searchsorted(recording.times, edges[1:-1], side="right")
-        measured.append(np.split(recording.measurements, cut))
-        stamps.append(np.split(recording.times, cut))
-        sectors.append(_sectors(recording, turn, edges))
+        cut = np.searchsorted(part.recording.times, edges[1:-1], side="right")
+        measured.append(np.split(z, cut))
+        stamps.append(np.split(part.recording.times, cut))
+        sectors.append(swept[part.number])
     return Scene(
-        radars,
+        [part.radar for part in parts],
         edges[1:],
         list(zip(*measured, strict=True)),
+        region=None if origin is None else _region(radars),  # type: ignore[arg-type]  # always an array once made
         measurement_times=list(zip(*stamps, strict=True)),
         sectors=np.stack(sectors, axis=1),
         name=" + ".join(recording.name for recording in recordings if recording.name),
+        origin=origin,
     )
+
+
+class Part(NamedTuple):
+    """Plots of a radar that are one sensor of a scene."""
+
+    number: int
+    """Of the radar."""
+    recording: Recording
+    radar: Radar2D
+
+
+def parts_of_radars(recordings: Sequence[Recording], radars: Sequence[Radar2D]) -> list[Part]:
+    """The sensors of a scene: plots with heights, where the radar measures them, and without."""
+    parts = []
+    for number, (recording, radar) in enumerate(zip(recordings, radars, strict=True)):
+        known = np.isfinite(recording.trusted_altitudes) & (radar.dim == 3)
+        share = float(known.mean())
+        if share < 1.0:
+            plain = replace(
+                radar,
+                noise=radar.covariance[:2, :2],
+                field_of_view=radar.field_of_view[:2],
+                detection_probability=radar.detection_probability * (1.0 - share),
+                name=f"{radar.name}, no height" if share else radar.name,
+            )
+            parts.append(Part(number, recording.take(~known), plain))
+        if share > 0.0:
+            # false plots have no transponder, but for a few
+            rate = radar.false_alarm_rate * (0.1 if share < 1.0 else 1.0)
+            heard = replace(radar, detection_probability=radar.detection_probability * share, false_alarm_rate=rate)
+            parts.append(Part(number, recording.take(known), heard))
+    return parts
+
+
+def identities_of_radars(
+    recordings: Sequence[Recording], radars: Sequence[Radar2D], times: Array
+) -> list[tuple[Array, ...]]:
+    """Mode 3/A codes and addresses (n, 2) of each sensor's plots, for each scan of the scene of these `times`."""
+    found = []
+    for part in parts_of_radars(recordings, radars):
+        cut = np.searchsorted(part.recording.times, times[:-1], side="right")
+        found.append(np.split(np.stack([part.recording.identities, part.recording.addresses], axis=1), cut))
+    return list(zip(*found, strict=True))
+
+
+def _heights(recording: Recording, radar: Radar2D, origin: Origin | None) -> Array:
+    """Heights above the scene's plane (n,) at which the plots have their altitudes."""
+    altitudes = recording.trusted_altitudes
+    if origin is None:
+        return altitudes
+    heights = altitudes - origin[2]
+    directions = np.stack([np.cos(recording.azimuths), np.sin(recording.azimuths)], axis=1)
+    # two rounds leave centimetres
+    for _ in range(3):
+        ground = np.sqrt(np.maximum(recording.ranges**2 - (heights - radar.position[2]) ** 2, 0.0))
+        places = np.column_stack([radar.position[:2] + ground[:, None] * directions, heights])
+        heights = heights + altitudes - geodetic(places, origin)[:, 2]
+    return heights
+
+
+def _region(radars: Sequence[Radar2D]) -> Array:
+    """The box around all that the radars see: far from the origin the ground lies below the plane."""
+    places = np.array([radar.position for radar in radars])
+    reach = np.array([radar.field_of_view[0, 1] for radar in radars])[:, None]
+    plane = np.stack([(places - reach).min(axis=0), (places + reach).max(axis=0)], axis=1)[:2]
+    farthest = float(np.hypot(*np.abs(plane).max(axis=1)))
+    return np.vstack([plane, [places[:, 2].min() - farthest**2 / (2.0 * EARTH), places[:, 2].max() + 20_000.0]])
 
 
 def _sectors(recording: Recording, turn: float, edges: Array) -> Array:

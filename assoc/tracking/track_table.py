@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -153,7 +154,12 @@ class TrackTable(Shown):
 
 @door
 def track_scene(
-    tracker: Tracker, scene: Scene, *, confirmed: bool = True, scans: Iterable[int] | None = None
+    tracker: Tracker,
+    scene: Scene,
+    *,
+    confirmed: bool = True,
+    scans: Iterable[int] | None = None,
+    identities: Sequence[Sequence[Array]] | None = None,
 ) -> tuple[TrackTable, list[Decision]]:
     """Run a tracker over the scans of a scene.
 
@@ -165,6 +171,9 @@ def track_scene(
         Whether only tracks that are confirmed and probably exist are listed (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
+    identities : sequence over scans of sequences over sensors of arrays (n, 2), optional
+        Mode 3/A code and address of each measurement, 0 where there is none: tracks get the name that most of their
+        measurements had, and trackers made with `identity` associate by them.
 
     Returns
     -------
@@ -173,18 +182,27 @@ def track_scene(
     """
     table = TrackTable(scene.origin)
     decisions: list[Decision] = []
+    names: dict[int, Counter[str]] = {}
     for k in range(scene.num_scans) if scans is None else scans:
         scan = scene.scan(k)
         try:
-            step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
+            known = None if identities is None else identities[k]
+            step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors, known)
         except KeyboardInterrupt:
             if end_is_asked():
                 # the tracker is as it was before this scan
                 break
             raise
         decisions += step.final
+        for ids, codes in zip(step.assigned, known or (), strict=False):
+            for number, (code, address) in zip(ids.tolist(), codes.tolist(), strict=True):
+                names.setdefault(number, Counter())[f"{address:06x}" if address else f"{code:04o}" if code else ""] += 1
         table.add(
             (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
         )
     table.name_targets(scene)
+    for number, found in names.items():
+        found.pop("", None)
+        if number > 0 and found:
+            table.targets.setdefault(number, found.most_common(1)[0][0])
     return table, [*decisions, *tracker.flush()]

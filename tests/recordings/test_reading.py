@@ -156,7 +156,7 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path, text, message):
 
 
 def test_other_refusals(tmp_path):
-    with pytest.raises(InvalidInputError, match="No such file"):
+    with pytest.raises(InvalidInputError, match="no such file"):
         read_plots(tmp_path / "none.csv")
     with pytest.raises(InvalidInputError, match="cannot be read"):
         read_plots(tmp_path)

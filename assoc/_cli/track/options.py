@@ -69,7 +69,7 @@ IDENTITY = Option(
     "NAME",
     "codes and addresses: use, to associate plots; score-only, to judge the tracks by them (default); or ignore",
     kinds.OneOf(("use", "score-only", "ignore")),
-    {"input": ("plots",)},
+    {"input": ("plots", "radars")},
 )
 # parameters of the life cycle that are only for some rule
 _LIFE_CYCLE = {
@@ -85,7 +85,7 @@ _SCENES = {"input": ("scenes",)}
 _PLOTS = {"input": ("plots",)}
 TRACKS = kinds.Output(".csv", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
 TRACK = (
-    Option("file", "FILE", "scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)",
+    Option("file", "FILE", "scene.npz, plots.csv (docs/recordings.md), or radars.toml (docs/from_files.md)",
            positional=True),
     Option("output", "FILE", "file for the tracks (.csv or .parquet)", TRACKS,
            short="-o", rest={"required": True}),
@@ -102,7 +102,7 @@ OF_SCENES = (
     Option("cutoff", "M", f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})",
            kinds.positive, _SCENES),
     Option("registration", "NAME", "online: estimate biases of the scene's sensors and correct for them",
-           kinds.OneOf(("online",)), _SCENES),
+           kinds.OneOf(("online",)), {"input": ("scenes", "radars")}),
     Option("smooth", "", "smooth the tracks: each position by all of its measurements", only=_SCENES),
 )  # fmt: skip
 OF_PLOTS = (

@@ -1,0 +1,170 @@
+"""``radars.toml``: several radars, their files and their places, as one scene."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from assoc._cli.inputs import read_toml
+from assoc._text.near import did_you_mean
+from assoc._text.plain import printable
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc._types import Array
+    from assoc.recordings import Recording
+    from assoc.scene.scene import Scene
+    from assoc.sensors import Radar2D
+
+ASTERIX = (".ast", ".asterix", ".pcap")
+KEYS = (
+    "name", "file", "radar", "columns", "units", "place", "noise", "detection_probability", "false_alarms", "reach_km",
+    "turn",
+)  # fmt: skip
+"""Keys of a table [[radar]]."""
+_TOP = ("name", "origin", "interval", "radar")
+# metres, where a radar's heights by Mode C have no noise of their own: steps of 100 feet, and a pressure that drifts
+_HEIGHT_NOISE = 30.0
+
+
+class Radars(NamedTuple):
+    """What a description says, and the scene of its plots."""
+
+    scene: Scene
+    recordings: list[Recording]
+    radars: list[Radar2D]
+    turns: list[float]
+    identities: list[tuple[Array, ...]]
+    """Codes and addresses of the scene's plots."""
+
+
+def read_radars(path: str) -> Radars:
+    """Read a description and its files, which are found from the folder that it is in.
+
+    Raises
+    ------
+    InvalidInputError
+        A key or a file is not as expected; the message names the file, the radar and the key.
+    """
+    from assoc.recordings.on_earth import placed
+    from assoc.recordings.several import identities_of_radars, scene_of_radars
+
+    top = read_toml(path)
+    _check_keys(path, top, _TOP)
+    tables = top.get("radar")
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise InvalidInputError(f"{path}: expected a table [[radar]] for each radar")
+    read = [_read_radar(path, number, table) for number, table in enumerate(tables, 1)]
+    origin = _place(top["origin"], f"{path}: origin") if "origin" in top else read[0][3]
+    recordings, radars = [], []
+    for recording, radar, _, place, height_noise in read:
+        own = placed(recording, radar, place, origin, height_noise)
+        recordings.append(own[0])
+        radars.append(own[1])
+    turns = [turn for _, _, turn, _, _ in read]
+    interval = None if "interval" not in top else _number(top["interval"], f"{path}: interval")
+    scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
+    identities = identities_of_radars(recordings, radars, scene.times)
+    return Radars(scene, recordings, radars, turns, identities)
+
+
+def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...]:
+    """Recording, radar, seconds of a turn, place, and noise of heights (None where there are none)."""
+    import numpy as np
+
+    from assoc.recordings import estimate_rotation, radar_of
+
+    name = str(table.get("name", number))
+    where = f"{path}: radar {printable(name)}"
+    _check_keys(where, table, KEYS)
+    recording, turn, place = _plots(path, table, where)
+    if "place" in table:
+        place = _place(table["place"], f"{where}: place")
+    if place is None:
+        raise InvalidInputError(f"{where}: place: expected [latitude, longitude, height] in degrees and metres")
+    if "turn" in table:
+        turn = _number(table["turn"], f"{where}: turn")
+    noise = table.get("noise", [])
+    if not isinstance(noise, list) or len(noise) not in (0, 2, 3):
+        raise InvalidInputError(f"{where}: noise: expected [metres, degrees] or [metres, degrees, metres of height]")
+    given = [_number(value, f"{where}: noise") for value in noise]
+    options = {
+        name: _number(table[key], f"{where}: {key}")
+        for key, name in (("detection_probability", "detection_probability"), ("false_alarms", "false_alarm_rate"))
+        if key in table
+    }
+    try:
+        if turn is None:
+            turn = estimate_rotation(recording)
+        if given:
+            options |= {"range_noise": given[0], "azimuth_noise": math.radians(given[1])}
+        radar = radar_of(recording, name=name, **options)
+    except InvalidInputError as error:
+        key = "turn" if turn is None else "noise"
+        raise InvalidInputError(f"{where}: {key}: {error}") from None
+    if "reach_km" in table:
+        view = radar.field_of_view.copy()
+        view[0, 1] = 1e3 * _number(table["reach_km"], f"{where}: reach_km")
+        recording = recording.take(np.flatnonzero(recording.ranges <= view[0, 1]))
+        from dataclasses import replace
+
+        radar = replace(radar, field_of_view=view)
+    heard = bool(np.isfinite(recording.trusted_altitudes).any())
+    return recording, radar, turn, place, (given[2] if len(given) == 3 else _HEIGHT_NOISE) if heard else None
+
+
+def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, float | None, Any]:
+    """Plots of a radar; seconds of a turn and place where the file says them."""
+    from assoc.recordings import read_plots
+
+    file = table.get("file")
+    if not isinstance(file, str):
+        raise InvalidInputError(f"{where}: file: expected the name of a file with its plots")
+    file = os.path.join(os.path.dirname(path), file)
+    if not file.lower().endswith(ASTERIX):
+        options = {key: table.get(key, {}) for key in ("columns", "units")}
+        for key, value in options.items():
+            if not isinstance(value, dict) or not all(isinstance(one, str) for one in value.values()):
+                raise InvalidInputError(f"{where}: {key}: expected a table such as {{ range = 'm' }}")
+        return read_plots(file, **options), None, None
+    content, source = read_asterix_plots(file, table.get("radar"), f"{where}: radar")
+    note = content.radars.get(source)
+    return content.plots[source], None if note is None else note.rotation, None if note is None else note.place
+
+
+def read_asterix_plots(file: str, radar: str | None, label: str) -> tuple[Any, tuple[int, int]]:
+    """The content of an ASTERIX file, and the radar chosen in it: the only one, or that named SAC/SIC."""
+    from assoc.integrations.asterix import read_asterix
+
+    content = read_asterix(file)
+    known = {f"{sac}/{sic}": (sac, sic) for sac, sic in sorted(content.plots)}
+    if not known:
+        raise InvalidInputError(f"{file}: holds no plots (category 048)")
+    if radar is None and len(known) == 1:
+        return content, next(iter(known.values()))
+    if radar not in known:
+        raise InvalidInputError(f"{label}: the file holds plots of {', '.join(known)}; name one")
+    return content, known[radar]
+
+
+def _check_keys(where: str, table: dict[str, Any], known: tuple[str, ...]) -> None:
+    for key in table:
+        if key not in known:
+            hint = did_you_mean(key, known)
+            raise InvalidInputError(f"{where}: unknown key {key!r}; {hint or 'known: ' + ', '.join(known)}")
+
+
+def _number(value: object, label: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
+        raise InvalidInputError(f"{label}: expected a number above 0, got {value!r}")
+    return float(value)
+
+
+def _place(value: object, label: str) -> tuple[float, float, float]:
+    """Latitude and longitude in radians, height."""
+    from assoc._cli.values import position_on_earth
+
+    if not isinstance(value, list) or not all(isinstance(one, (int, float)) for one in value):
+        raise InvalidInputError(f"{label}: expected [latitude, longitude, height] in degrees and metres, got {value!r}")
+    return position_on_earth(",".join(map(repr, value)), label)

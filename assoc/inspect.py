@@ -1,0 +1,128 @@
+"""``python -m assoc.inspect``: says what it understands of a description of radars, and what looks wrong.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from assoc._cli.lines import print_lines
+from assoc._cli.messages import messages
+from assoc._cli.options import Option, Parser, verbosity
+from assoc._cli.program import Program, command
+from assoc._cli.signals import EarlyEnd
+from assoc._cli.track.radars_file import read_radars
+from assoc._cli.values import Output
+from assoc._text.plain import printable
+from assoc._text.times import moment
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc._cli.track.radars_file import Radars
+
+_KEPT = ("Mode A", "an address", "a height")
+_OPTIONS = (
+    Option("file", "radars.toml", "description of radars (docs/from_files.md)", positional=True),
+    Option("picture", "FILE", "draw the radars and all plots (.png, .svg or .pdf; needs assoc[plot])",
+           Output(".png", ".svg", ".pdf", strict=True, streams=False, extras={"": ("matplotlib", "plot")})),
+    *verbosity("nothing else at present"),
+)  # fmt: skip
+
+
+def _inspect(words: list[str]) -> None:
+    given = parser().read(words)
+    given.check_outputs([given["file"]])
+    with messages(given):
+        found = read_radars(given["file"])
+        for line in _lines(found):
+            print_lines(line)
+        wrong = doubts(found)
+        print_lines("nothing looks wrong" if not wrong else "looks wrong:")
+        for line in wrong:
+            print_lines(f"  {printable(line)}")
+        if given["picture"]:
+            _draw(given["picture"], found)
+
+
+def _draw(path: str, found: Radars) -> None:
+    from matplotlib.figure import Figure
+
+    from assoc._files.output import write_atomically
+    from assoc.plotting import plot_scene
+
+    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
+    plot_scene(found.scene, ax=figure.add_subplot())
+    kind = path.rsplit(".", 1)[1].lower()
+    write_atomically(path, lambda file: figure.savefig(file, format=kind, dpi=150))
+
+
+def parser() -> Parser:
+    """Return the parser of the program."""
+    made = Parser(
+        prog="assoc.inspect",
+        usage=f"{command('inspect')} radars.toml [--picture FILE.png]",
+        description="Say what is understood of several radars' files, and what looks wrong, before tracking them.",
+    )
+    made.declare(*_OPTIONS)
+    return made
+
+
+def _lines(found: Radars) -> list[str]:
+    """What was understood, a line for each radar and for what was corrected when its file was read."""
+    lines = []
+    for recording, radar, turn in zip(found.recordings, found.radars, found.turns, strict=True):
+        sigma = radar.covariance.diagonal() ** 0.5
+        kept = (recording.decoded, recording.addresses > 0, recording.trusted_altitudes == recording.trusted_altitudes)
+        shares = [f"{100 * one.mean():.0f} % with {what}" for one, what in zip(kept, _KEPT, strict=True)]
+        parts = [
+            f"{len(recording)} plots, {moment(recording.times[0])} to {moment(recording.times[-1])}",
+            f"a turn {turn:.4g} s",
+            f"noise {sigma[0]:.4g} m, {math.degrees(sigma[1]):.3g} deg",
+            f"reach {radar.field_of_view[0, 1] / 1000:.4g} km",
+            f"P_d {radar.detection_probability:g}, {radar.false_alarm_rate:g} false plots a turn",
+            ", ".join(shares),
+            *(f"{what}: {number}" for what, number in recording.notes.items() if number),
+        ]
+        lines.append(printable(f"{radar.name}: {'; '.join(parts)}"))
+    return lines
+
+
+def doubts(found: Radars) -> list[str]:
+    """What looks wrong, a line each; units are warned of when the files are read."""
+    import numpy as np
+
+    from assoc.recordings import estimate_rotation
+
+    lines = []
+    spans = [(one.times[0], one.times[-1]) for one in found.recordings]
+    if len(spans) > 1 and max(first for first, _ in spans) >= min(last for _, last in spans):
+        lines.append("the recordings do not overlap in time: another day, or other clocks (time zones)?")
+    places = np.array([radar.position for radar in found.radars])
+    reach = np.array([radar.field_of_view[0, 1] for radar in found.radars])
+    for s, (recording, radar, turn) in enumerate(zip(found.recordings, found.radars, found.turns, strict=True)):
+        apart = np.hypot(*(places - places[s])[:, :2].T)
+        others = np.arange(len(places)) != s
+        if others.any() and (apart > reach + reach[s])[others].all():
+            lines.append(f"{radar.name}: sees nothing that another radar sees: are the places right?")
+        if np.bincount(np.unique(apart, return_inverse=True)[1])[0] > 1:
+            lines.append(f"{radar.name}: stands where another radar stands: are the places right?")
+        try:
+            seen = estimate_rotation(recording)
+        except InvalidInputError:
+            lines.append(f"{radar.name}: its plots fit no turn of {turn:.4g} s: are bearings and times right?")
+            continue
+        if abs(seen / turn - 1.0) > 0.02:
+            lines.append(f"{radar.name}: its plots turn once in {seen:.4g} s, not in {turn:.4g} s")
+        rate = len(recording) / max((recording.times[-1] - recording.times[0]) / turn, 1.0)
+        if rate < 0.5:
+            lines.append(f"{radar.name}: {rate:.2g} plots a turn: is a part of the file missing?")
+    return lines
+
+
+PROGRAM = Program("assoc.inspect", _inspect, EarlyEnd("assoc.inspect").on_signals)
+start, main = PROGRAM.start, PROGRAM.main
+
+if __name__ == "__main__":
+    raise SystemExit(start())

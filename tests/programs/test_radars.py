@@ -1,0 +1,126 @@
+"""Several radars' files to a map: positions against geometry of its own, and one line for what is wrong."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc import inspect, track
+from assoc.scene.geodesy import earth_centered
+
+pytest.importorskip("pyarrow")
+PLACES = {"north": (47.5, 8.0, 450.0), "south": (46.2, 9.0, 600.0)}
+TURNS = {"north": 4.8, "south": 5.9}
+CODES = (0o4521, 0o2000, 0o7001)
+
+
+def place_of(aircraft, times):
+    """Latitude and longitude in degrees, and metres; at 250 m/s."""
+    lat = 46.6 + 0.2 * aircraft + 2.1e-3 * times * (-1) ** aircraft
+    return lat, 8.1 + 0.25 * aircraft + 1e-3 * times, np.full_like(times, (10_000.0, 6_000.0, 3_000.0)[aircraft])
+
+
+def seen_from(radar, where):
+    """Slant range and bearing, in the radar's own frame: east and north at its place."""
+    lat, lon, height = (np.asarray(one, dtype=float) for one in PLACES[radar])
+    away = earth_centered(*(np.radians(where[0]), np.radians(where[1]), where[2])) - earth_centered(
+        np.radians(lat), np.radians(lon), height
+    )
+    p, q = np.radians([lat, lon])
+    east = np.array([-np.sin(q), np.cos(q), 0.0])
+    north = np.array([-np.sin(p) * np.cos(q), -np.sin(p) * np.sin(q), np.cos(p)])
+    return np.linalg.norm(away, axis=-1), np.arctan2(away @ east, away @ north) % (2 * np.pi)
+
+
+def table(radar, seed, heights=True):
+    rng, turn, rows = np.random.default_rng(seed), TURNS[radar], []
+    for k in range(30):
+        for aircraft in range(3):
+            # the antenna points there when it has turned so far
+            time = turn * k
+            for _ in range(3):
+                distance, bearing = seen_from(radar, place_of(aircraft, np.array(time)))
+                time = turn * (k + bearing / (2 * np.pi))
+            if rng.uniform() < 0.9:
+                level = place_of(aircraft, np.array(time))[2] / 30.48
+                rows.append((1626098400 + time, distance + rng.normal(0, 40), np.degrees(bearing) + rng.normal(0, 0.05),
+                             CODES[aircraft], level if heights and rng.uniform() < 0.9 else np.nan))  # fmt: skip
+        bearing = rng.uniform(0, 360)
+        rows.append((1626098400 + turn * (k + bearing / 360), rng.uniform(5e3, 1.5e5), bearing, 0, np.nan))
+    frame = pd.DataFrame(rows, columns=["time", "rho_m", "theta", "mode3", "altitude_fl"])
+    return frame.sort_values("time")
+
+
+def described(folder, heights=True, **changes):
+    table("north", 1, heights).to_csv(folder / "north.csv", index=False)
+    table("south", 2, heights).to_parquet(folder / "south.parquet", index=False)
+    lines = []
+    for name, file in (("north", "north.csv"), ("south", "south.parquet")):
+        own = {"name": f'"{name}"', "file": f'"{file}"', "place": list(PLACES[name]), "noise": [40.0, 0.05],
+               "detection_probability": 0.9, "false_alarms": 1.0, "reach_km": 200, **changes}  # fmt: skip
+        lines += ["[[radar]]", *(f"{key} = {value}" for key, value in own.items() if value is not None), ""]
+    (folder / "radars.toml").write_text("\n".join(lines))
+    return str(folder / "radars.toml")
+
+
+@pytest.mark.parametrize("heights", [True, False])
+def test_two_radars_to_a_map(tmp_path, heights, capsys):
+    file, out = described(tmp_path, heights), str(tmp_path / "tracks.csv")
+    assert track.main([file, "-o", out, "--map", str(tmp_path / "tracks.kml")]) == 0
+    found = pd.read_csv(out, dtype={"target": str})
+    late = found[found.time > 1626098400 + 60]
+    assert sorted(late.target.unique()) == ["2000", "4521", "7001"] and late.track_id.nunique() == 3
+    for aircraft, code in enumerate(CODES):
+        own = late[late.target == f"{code:04o}"]
+        lat, lon, height = place_of(aircraft, own.time.to_numpy() - 1626098400)
+        error = np.hypot(111_200 * (own.latitude - lat), 111_200 * np.cos(np.radians(47)) * (own.longitude - lon))
+        # neither the other direction of north, two degrees of longitude away, nor slant ranges are an error
+        assert np.median(error) < 150.0
+        if heights:
+            assert np.median(np.abs(own.altitude - height)) < 60.0
+    text = (tmp_path / "tracks.kml").read_text()
+    assert ("absolute" in text) and "4521" in text and "2021-07-12" in text
+    capsys.readouterr()
+
+
+def test_what_is_understood_and_what_looks_wrong(tmp_path, capsys):
+    file = described(tmp_path)
+    assert inspect.main([file, "--picture", str(tmp_path / "plots.png")]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"north: \d+ plots, 2021-07-12 14:00:0.* a turn 4\.8 s; noise 40 m, 0\.05 deg; reach 200 km", said)
+    assert "% with Mode A, 0 % with an address" in said and "nothing looks wrong" in said
+    assert (tmp_path / "plots.png").stat().st_size > 20_000
+    late = pd.read_csv(tmp_path / "north.csv")
+    late.assign(time=late.time + 7200).to_csv(tmp_path / "north.csv", index=False)
+    text = (tmp_path / "radars.toml").read_text()
+    (tmp_path / "radars.toml").write_text(text.replace("[46.2, 9.0, 600.0]", "[26.2, 9.0, 600.0]\nturn = 7.7"))
+    assert inspect.main([file]) == 0
+    said = capsys.readouterr().out
+    for line in (
+        "do not overlap in time",
+        "north: sees nothing that another radar sees",
+        "once in 5.9 s, not in 7.7 s",
+    ):
+        assert line in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"file": '"none.csv"'}, "none.csv: no such file"),
+        ({"place": None}, r"radar north: place: expected \[latitude, longitude, height\]"),
+        ({"place": [147.5, 8.0]}, "radar north: place: expected a latitude within"),
+        ({"noise": [40.0]}, r"radar north: noise: expected \[metres, degrees\]"),
+        ({"noise": None}, "radar north: noise: "),
+        ({"turn": -4}, "radar north: turn: expected a number above 0, got -4"),
+        ({"units": '"m"'}, "radar north: units: expected a table"),
+        ({"plaice": [1, 2]}, "unknown key 'plaice'; did you mean place"),
+    ],
+)
+def test_what_is_wrong_is_one_line(tmp_path, changes, message, capsys):
+    file = described(tmp_path, **changes)
+    for program, words in ((inspect, []), (track, ["-o", str(tmp_path / "t.csv")])):
+        assert program.main([file, *words]) == 2
+        said = capsys.readouterr().err
+        assert re.search(message, said) and said.count("\n") == 1, said
