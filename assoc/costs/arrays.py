@@ -111,6 +111,12 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     )
 
 
+def unmissed(sensors: SensorArrays, misses: Array, blind: Array) -> SensorArrays:
+    """The sensors as if those in `blind`, bool (S,), missed nothing; `misses` is ln(1 - P) of each, (S,)."""
+    free = np.where(blind, -misses, 0.0)
+    return sensors._replace(gain=sensors.gain - free, base=sensors.base - float(free.sum()))
+
+
 def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -> tuple[ScanArrays, Array]:
     """Flat arrays of one scan, and for each row its 1-based index in the scan, int32 (N,).
 

@@ -12,7 +12,7 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs import positions
-from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays, unmissed
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import fitting
@@ -41,6 +41,7 @@ def build_problem(
     speed: float | Sequence[float] = SPEED,
     target_density: float | str | None = None,
     all_tuples: bool = False,
+    blind: Array | None = None,
 ) -> AssignmentProblem:
     """Make the assignment problem of a scan: candidate tuples of measurements and their costs.
 
@@ -79,6 +80,9 @@ def build_problem(
     all_tuples : bool
         Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
         papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
+    blind : bool array (S,), optional
+        Sensors that may not see a target, so that they need not have missed it: candidates are then the tuples whose
+        cost without the misses of these sensors is negative. Costs are those of equation 5, misses included.
 
     Returns
     -------
@@ -113,6 +117,9 @@ def build_problem(
     bare = sensor_arrays(scene)
     prior = position_prior(scene, bare, target_density)
     sensors = with_prior(bare, prior)
+    if blind is not None and blind.any():
+        misses = np.log1p([-sensor.detection_probability for sensor in scene.sensors])
+        sensors = unmissed(sensors, misses, blind)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
@@ -120,6 +127,8 @@ def build_problem(
     limits = {"number": chosen.index, "max_tuples": int(most)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, chosen, speed), prior=prior, **limits)
+    if blind is not None and blind.any():
+        costs = costs - np.where(blind & (rows < 0), misses, 0.0).sum(axis=1)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, chosen.sizes)
 

@@ -37,8 +37,8 @@ def timed_problem(
     A tuple has at least one measurement that determines a position: bearings alone are not compared over time.
     """
     timed = _timed_scan(scene, scan, gate_probability, speed)
-    looked = timed.looked()
-    found = grow_timed_tuples(timed, _terms(scene), looked, max_tuples)
+    terms = _terms(scene)
+    found = grow_timed_tuples(timed, terms, timed.misses(terms), max_tuples)
     rows = found.rows[np.count_nonzero(found.rows, axis=1) > 1]
     costs = found.costs[np.count_nonzero(found.rows, axis=1) > 1] - _fusion(timed, rows)
     good = costs < 0
@@ -50,8 +50,9 @@ def timed_costs(scene: Scene, scan: Scan, tuples: Array, speed: float | Sequence
     timed = _timed_scan(scene, scan, 1.0, speed)
     rows = _checked(timed, tuples)
     followed = timed.follow(np.full(len(rows), -1), rows)
-    looked = timed.looked()[timed.anchors(rows, followed.lead)]
-    costs = score_costs(timed, followed, rows, _terms(scene), looked) - _fusion(timed, rows)
+    terms = _terms(scene)
+    misses = timed.misses(terms)[timed.anchors(rows, followed.lead)]
+    costs = score_costs(timed, followed, rows, terms, misses) - _fusion(timed, rows)
     return np.where(np.count_nonzero(rows, axis=1) == 1, 0.0, costs)
 
 

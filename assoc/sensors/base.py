@@ -218,6 +218,22 @@ class Sensor(ABC):
         """Volume V of the field of view in measurement space (m, rad and their products)."""
         return float(np.prod(self.field_of_view[:, 1] - self.field_of_view[:, 0]))
 
+    @cached_property
+    def limits(self) -> tuple[tuple[int, float, float], ...]:
+        """Components that the field of view limits, with their bounds; ends that exclude nothing are infinite."""
+        found = []
+        for axis, (low, high) in enumerate(self.field_of_view.tolist()):
+            name = self.components[axis]
+            if self.angular[axis] and high - low >= 2.0 * math.pi * (1.0 - 1e-9):
+                continue
+            if name == "range" and low <= 0.0 or name == "elevation" and low <= -math.pi / 2:
+                low = -math.inf
+            if name == "elevation" and high >= math.pi / 2:
+                high = math.inf
+            if math.isfinite(low) or math.isfinite(high):
+                found.append((axis, low, high))
+        return tuple(found)
+
     @property
     def measures_velocity(self) -> bool:
         """Whether measurements depend on the target's velocity: `measure` then needs velocities."""

@@ -25,7 +25,7 @@ from assoc.tracking.state import Nursery, TrackerState
 from assoc.tracking.track_batch import one_state
 
 FORMAT = "assoc.tracker"
-VERSION = 2
+VERSION = 3
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
@@ -172,8 +172,8 @@ def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None
         if value.dtype.kind == "f":
             saved.require(np.isfinite(value).all(), name, "finite numbers")
     saved.require(((ids >= 1) & (ids < next_id)).all(), "track_id", "ids from 1 up to the next one")
-    for name in ("detections", "missed", "hits"):
-        saved.require((saved[name] >= 0).all(), name, "whole numbers >= 0")
+    for name in ("detections", "missed", "hits", "hidden"):
+        saved.require((saved[name] >= 0).all(), name, "numbers >= 0")
     widest = max(sensor.dim for sensor in settings.sensors)
     for name, model in arrays_of(one_state(settings.filter)).items():
         key, value = f"state.{name}", saved[f"state.{name}"]

@@ -89,24 +89,26 @@ class LifeCycle:
         window = (detections & np.int64((1 << self.n) - 1)).astype(np.uint64)
         return np.asarray(count_bits(window) >= self.m)
 
-    def patience(self, miss: Array, pace: float) -> float:
-        """Seconds without a detection after which a track is deleted.
+    def patience(self, miss: Array, pace: float) -> Array:
+        """Seconds without a detection, in view, after which tracks are deleted, (T,).
 
         Parameters
         ----------
-        miss : array (S,)
-            ln(1 - P_D) of the sensors.
+        miss : array (T, S)
+            Score of a miss of each track by each sensor.
         pace : float
             Usual seconds from scan to scan; 0 while it is not known.
         """
         if self.deletion_time is not None:
-            return self.deletion_time
+            return np.full(len(miss), self.deletion_time)
         if pace == 0:
-            return math.inf
-        return max(_LEAST_SCANS, math.log(OVERLOOKED) / float(miss.sum())) * pace
+            return np.full(len(miss), math.inf)
+        # nobody's miss has no end
+        together = np.minimum(miss.sum(axis=1), -1e-12)
+        return np.asarray(np.maximum(_LEAST_SCANS, math.log(OVERLOOKED) / together) * pace)
 
     def deletes(
-        self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array, patience: float
+        self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array, patience: Array
     ) -> Array:
         """Which tracks are to be deleted.
 
@@ -116,10 +118,10 @@ class LifeCycle:
         score, best : arrays (T,)
             The score now and its largest value so far.
         silent : array (T,)
-            Seconds since the last detection.
+            Seconds since the last detection, those out of view of all sensors left out.
         missed : int array (T,)
             Scans in a row without a detection.
-        patience : float
+        patience : array (T,)
             Seconds; see `patience`.
         """
         if self.deletion == "time":

@@ -1,10 +1,17 @@
-"""Where sensors looked: how often in a scan, which tracks they could see, and which were missed for too long."""
+"""Where sensors looked: how often in a scan, what a miss of each track says, and which were missed for too long.
+
+A sensor that cannot see a track has not missed it: its detection probability counts times the share of the track's
+predicted density in its view (`assoc.costs.views`).
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.views import log_missed, places_of, share_in_view
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
@@ -12,6 +19,8 @@ from assoc.tracking.track_batch import TrackBatch
 _FORGETTING = 0.05
 # turns in a scan; with fewer all sensors are taken to be off, and no track is deleted
 _LEAST_TURN = 1e-3
+# a scan counts for a track if this share of it is in view of a sensor
+_LOOKED = 0.5
 
 
 def keep_pace(progress: Progress) -> Progress:
@@ -26,35 +35,53 @@ def keep_pace(progress: Progress) -> Progress:
     return progress.with_state(pace=state.pace + (dt - state.pace) * share, turns=turns)
 
 
-def excuse(progress: Progress) -> Progress:
-    """Undo the effect of misses on existence for tracks outside the field of view of a sensor that looked."""
-    tracks = progress.state.tracks
-    overlooked: Array = (out_of_view(progress) & looked(progress)) @ progress.settings.terms.miss
-    return progress.with_state(tracks=tracks.not_overlooked(-overlooked))
+def count_out_of_view(progress: Progress) -> Progress:
+    """Add the time since the last scan to that for which no sensor could see a track, for those inside the region."""
+    dt, tracks, settings = progress.elapsed, progress.state.tracks, progress.settings
+    if dt == 0.0 or not len(tracks):
+        return progress
+    states = tracks.states if progress.timed is None else progress.timed.late
+    hidden = ~in_view(progress, states).any(axis=1)
+    if not hidden.any():
+        return progress
+    region, axes = settings.place.region, len(settings.filter.motion.position)
+    where = places_of(settings.filter, states)[0][:, :axes]
+    hidden &= ((where >= region[:axes, 0]) & (where <= region[:axes, 1])).all(axis=1)
+    return progress.with_state(tracks=tracks.hidden_for(np.where(hidden, dt, 0.0)))
 
 
-def out_of_view(progress: Progress) -> Array:
-    """Which tracks are outside of which sensors' fields of view, and so not missed, bool (T, S)."""
-    where, views = _where(progress), [sensor.position_part for sensor in progress.settings.sensors]
-    return ~np.stack([sensor.in_view(sensor.measure(where)) for sensor in views], axis=1)
+def in_view(progress: Progress, states: Any) -> Array:
+    """Which tracks are in which sensors' fields of view by their means, bool (T, S)."""
+    where = places_of(progress.settings.filter, states)[0]
+    views = [sensor.position_part for sensor in progress.settings.sensors]
+    return np.stack([view.in_view(view.measure(where)) for view in views], axis=1)
 
 
-def looked(progress: Progress) -> Array:
-    """Which sensors looked towards which tracks, bool (T, S)."""
-    sectors, sensors = progress.scan.sectors, progress.settings.sensors
+def dwells(progress: Progress, states: Any) -> Array:
+    """Which sensors looked at which tracks in this scan by their means, bool (T, S)."""
+    sectors, where = progress.scan.sectors, places_of(progress.settings.filter, states)[0]
+    seen = in_view(progress, states)
     if sectors is None:
-        return np.ones((len(progress.state.tracks), len(sensors)), dtype=np.bool_)
-    away = _where(progress)[:, None] - np.array([sensor.position for sensor in sensors])
-    azimuths = np.arctan2(away[..., 1], away[..., 0])
-    return np.stack([looked_at(sector, azimuth) for sector, azimuth in zip(sectors, azimuths.T, strict=True)], axis=1)
+        return seen
+    away = where[:, None] - np.array([sensor.position for sensor in progress.settings.sensors])
+    azimuths = np.arctan2(away[..., 1], away[..., 0]).T
+    return seen & np.stack([looked_at(*both) for both in zip(sectors, azimuths, strict=True)], axis=1)
 
 
-def _where(progress: Progress) -> Array:
-    """Positions of the tracks, (T, 3)."""
-    tracks, position = progress.state.tracks, list(progress.settings.filter.motion.position)
-    where = np.zeros((len(tracks), 3))
-    where[:, : len(position)] = tracks.states.mean[:, position]
-    return where
+def misses(progress: Progress, states: Any) -> Array:
+    """Score of a miss of tracks predicted to a scan of one instant by each sensor, (T, S)."""
+    return np.stack([misses_of(progress, states, s) for s in range(len(progress.settings.sensors))], axis=1)
+
+
+def misses_of(progress: Progress, states: Any, s: int) -> Array:
+    """`misses` of sensor s alone, (T,)."""
+    share = share_in_view(progress.settings.sensors[s], *places_of(progress.settings.filter, states))
+    return log_missed(progress.settings.terms.miss[s], share)
+
+
+def looked(progress: Progress, misses: Array) -> Array:
+    """Whether any sensor looked at tracks, by their scores of a miss (T, S); bool (T,)."""
+    return np.asarray((misses <= log_missed(progress.settings.terms.miss, np.array(_LOOKED))).any(axis=1))
 
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
@@ -64,5 +91,14 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     most = float(state.turns.max())
     if most < _LEAST_TURN:
         return np.zeros(len(tracks), dtype=np.bool_)
-    patience = settings.life_cycle.patience(settings.terms.miss * (state.turns / most), state.pace / most)
-    return tracks.to_delete(settings.life_cycle, progress.scan.time, patience)
+    seen = in_view(progress, tracks.states)
+    # nothing is lost with a tentative track that no sensor sees
+    seen |= ~(tracks.confirmed | seen.any(axis=1))[:, None]
+    patience = settings.life_cycle.patience(
+        np.where(seen, settings.terms.miss, 0.0) * (state.turns / most), state.pace / most
+    )
+    gone = tracks.to_delete(settings.life_cycle, progress.scan.time, patience)
+    # out of view for so long that nobody knows where it is
+    hidden = np.flatnonzero(tracks.hidden > 0.0)
+    gone[hidden] |= ~settings.births.narrow(places_of(settings.filter, tracks.states[hidden])[1])
+    return gone

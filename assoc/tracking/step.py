@@ -27,7 +27,7 @@ from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimat
 from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
 from assoc.tracking.checking import checked_measurements, checked_time
 from assoc.tracking.identity_evidence import checked_identities
-from assoc.tracking.looks import excuse, keep_pace
+from assoc.tracking.looks import count_out_of_view, keep_pace
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState, rng_of
@@ -46,13 +46,13 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([take_over] if nursing else []),
         predict,
         *([remember_tracks] if settings.adapt else []),
+        count_out_of_view,
         associate,
         live,
         *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_nursery] if nursing else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
-        excuse,
         report,
     ]
 
@@ -236,4 +236,4 @@ def report(progress: Progress) -> Progress:
 
 def grow_nursery(progress: Progress) -> Progress:
     """Step the nursery with the measurements that no track took."""
-    return step_nursery(progress, [keep_pace, predict, associate, live, excuse, report])
+    return step_nursery(progress, [keep_pace, predict, count_out_of_view, associate, live, report])

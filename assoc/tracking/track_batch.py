@@ -19,12 +19,13 @@ MASK = (1 << HISTORY) - 1
 """Number of last scans whose detections are stored, one bit each."""
 
 
-SCORE, BEST, STARTED, LAST, EXISTS = 0, 1, 2, 3, 4
+SCORE, BEST, STARTED, LAST, EXISTS, HIDDEN = 0, 1, 2, 3, 4, 5
 """Columns of the numbers of a batch."""
 ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
 """Columns of the counts of a batch."""
 
-_NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST, "existence": EXISTS}
+_NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST, "existence": EXISTS,
+            "hidden": HIDDEN}  # fmt: skip
 _COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
 _HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence")
 
@@ -43,8 +44,9 @@ class TrackBatch:
     ----------
     states
         The filter's states, all at one time.
-    numbers : array (T, 5)
-        Score, best score, start (s), last detection (s), log odds of existence.
+    numbers : array (T, 6)
+        Score, best score, start (s), last detection (s), log odds of existence, seconds since the last detection out of
+        view.
     counts : int64 array (T, 5)
         Track id, confirmed, detections, missed, hits.
     """
@@ -59,6 +61,7 @@ class TrackBatch:
     started = _column("numbers", STARTED, "Seconds, (T,).")
     last_detection = _column("numbers", LAST, "Seconds, (T,).")
     existence = _column("numbers", EXISTS, "Logarithm of the odds that the target is still there, (T,).")
+    hidden = _column("numbers", HIDDEN, "Seconds out of view of all sensors since the last detection, (T,).")
     track_id = _column("counts", ID, "Ids, int64 (T,).")
     detections = _column("counts", BITS, "One bit a scan, the last one lowest: whether it was detected; int64 (T,).")
     missed = _column("counts", MISSED, "Scans in a row without a detection, int64 (T,).")
@@ -80,7 +83,7 @@ class TrackBatch:
     def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> TrackBatch:
         """New tracks, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
-        numbers, counts = np.empty((count, 5)), np.zeros((count, 5), dtype=np.int64)
+        numbers, counts = np.zeros((count, 6)), np.zeros((count, 5), dtype=np.int64)
         numbers[:, SCORE] = numbers[:, BEST] = numbers[:, EXISTS] = score
         numbers[:, STARTED] = numbers[:, LAST] = when
         counts[:, ID] = track_id
@@ -115,6 +118,7 @@ class TrackBatch:
         np.maximum(numbers[:, BEST], numbers[:, SCORE], out=numbers[:, BEST])
         if detected_at is not None:
             np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
+            numbers[~np.isnan(detected_at), HIDDEN] = 0.0
         return TrackBatch(states, numbers, self.counts)
 
     def survived(self, lifetimes: float) -> TrackBatch:
@@ -127,10 +131,10 @@ class TrackBatch:
         numbers[:, EXISTS] = -lifetimes - gone
         return TrackBatch(self.states, numbers, self.counts)
 
-    def not_overlooked(self, gain: Array) -> TrackBatch:
-        """The same tracks with `gain` (T,) added to the log odds of existence (not to the score)."""
+    def hidden_for(self, seconds: Array) -> TrackBatch:
+        """The same tracks, out of view of all sensors for so many more seconds (T,)."""
         numbers = self.numbers.copy()
-        numbers[:, EXISTS] += gain
+        numbers[:, HIDDEN] += seconds
         return TrackBatch(self.states, numbers, self.counts)
 
     def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
@@ -160,9 +164,9 @@ class TrackBatch:
         """Confirm the tracks that meet the criterion."""
         return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections))
 
-    def to_delete(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
+    def to_delete(self, life_cycle: LifeCycle, time: float, patience: Array) -> Array:
         """Which tracks are to be deleted; see `LifeCycle.deletes`."""
-        silent = time - self.last_detection
+        silent = time - self.last_detection - self.hidden * self.confirmed
         return life_cycle.deletes(self.confirmed, self.score, self.best, silent, self.missed, patience)
 
     def arrays(self) -> dict[str, Array]:

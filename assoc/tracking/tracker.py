@@ -230,7 +230,8 @@ class Tracker:
             measurements use `assoc.tracking.LatePlots`.
         sectors : array_like (S, 2), optional
             Azimuths between which each sensor looked since the last scan, see `assoc.Scene`: a sensor misses only
-            what it looked at. No sensor may have looked in a direction twice. Default: all looked everywhere.
+            what it looked at. No sensor may have looked in a direction twice. A sector without width: it did not
+            look, as one that is off or reports on its own (AIS). Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
             Mode 3/A code and ICAO address of each measurement, 0 where it has none; ignored by trackers that were
             made without `identity`.

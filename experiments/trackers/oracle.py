@@ -14,6 +14,7 @@ from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
+from assoc.tracking.looks import misses
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.track_batch import TrackBatch
@@ -36,22 +37,24 @@ class Oracle(Method):
         rows, fresh = self._true_rows(progress)
         settings, states = progress.settings, progress.state.tracks.states
         terms = settings.terms
-        gain = np.full(len(rows), float(terms.miss.sum()))
+        missed = misses(progress, states)
+        gain = missed.sum(axis=1)
         for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
             seen = np.flatnonzero(rows[:, s])
             if not len(seen):
                 continue
             done = settings.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
-            gain[seen] += done.log_likelihood + terms.detection[s] - terms.miss[s]
+            gain[seen] += done.log_likelihood + terms.detection[s] - missed[seen, s]
             rest = np.setdiff1d(np.arange(len(rows)), seen)
             back = np.argsort(np.concatenate([seen, rest]), kind="stable")
             states = concatenate([done.state, states[rest]])[back]
-        return self._noted(progress, associated(progress, states, gain, rows, fresh))
+        return self._noted(progress, associated(progress, states, gain, rows, fresh, missed))
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
         rows, fresh = self._true_rows(progress)
-        return self._noted(progress, associated_in_order(progress, timed, timed.looked(), rows, fresh))
+        missed = timed.misses(progress.settings.terms)
+        return self._noted(progress, associated_in_order(progress, timed, missed, rows, fresh))
 
     def _true_rows(self, progress: Progress) -> tuple[Array, Array]:
         """Measurements of each track, and of the targets without one."""

@@ -8,7 +8,7 @@ import numpy as np
 from assoc.sensors import PositionSensor
 
 Q_SIGMA, SPEED, BIRTH = 2.0, 30.0, 0.3
-REGION = np.array([[0.0, 1000.0], [0.0, 1000.0], [0.0, 500.0]])
+REGION = np.array([[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]])
 
 
 def sensor(P=0.8, rate=2.0, sigma=10.0):

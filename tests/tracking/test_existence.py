@@ -58,8 +58,8 @@ def test_a_detection_brings_a_track_back(kind):
 
 @pytest.mark.parametrize("kind", TRACKERS.values())
 def test_what_no_sensor_can_see_is_not_missed(kind):
-    # the sensors see up to x = 1000 m
-    tracker = tracker_of(kind, np.array([1500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    # the sensors see up to x = 2000 m
+    tracker = tracker_of(kind, np.array([2500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
     tracker.step(2.0, NOTHING)
     (track,) = tracker.tracks
     assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
@@ -68,7 +68,7 @@ def test_what_no_sensor_can_see_is_not_missed(kind):
 @pytest.mark.parametrize("kind", TRACKERS.values())
 @pytest.mark.parametrize("width", [0.0, 2.0 * math.pi, None])
 def test_nor_is_it_where_measurements_have_times_of_their_own(kind, width):
-    tracker = tracker_of(kind, np.array([1500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    tracker = tracker_of(kind, np.array([2500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
     sectors = None if width is None else [[0.0, width]] * 2
     tracker.step(2.0, NOTHING, [np.zeros(0)] * 2, sectors)
     (track,) = tracker.tracks

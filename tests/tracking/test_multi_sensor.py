@@ -42,9 +42,9 @@ def test_tuple_costs_are_stacked_densities_against_clutter():
     mean = np.concatenate([rng.uniform(400, 420, (2, 3)), np.zeros((2, 3))], axis=1)
     cov = np.stack([plain.predict(*plain.start(m[:3], 100 * np.eye(3)), 1.0)[1] for m in mean])
     z = [rng.uniform(390, 430, (2, 3)), rng.uniform(390, 430, (3, 3))]
-    found = grow_track_tuples(
-        filter_, Gaussian(mean, cov), z, SENSORS, score_terms(SENSORS), gate_probability=1 - 1e-12
-    )
+    terms = score_terms(SENSORS)
+    misses = np.broadcast_to(terms.miss, (2, 2))
+    found = grow_track_tuples(filter_, Gaussian(mean, cov), z, SENSORS, terms, misses, gate_probability=1 - 1e-12)
     listed = {
         (t, *row): cost for t, row, cost in zip(found.track.tolist(), found.rows.tolist(), found.costs, strict=True)
     }

@@ -20,10 +20,10 @@ from assoc._types import Array
 from assoc.costs.tracks.gating import angular_components, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import gate_of, join, require_states
+from assoc.costs.views import log_missed, places_of, share_in_view
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
-from assoc.scene.own_times import looked_at
 from assoc.sensors import Platform, Sensor
 
 # a gate moves on a curve, the box on a straight line: it is longer by this factor
@@ -233,21 +233,17 @@ class TimedScan:
         back = np.argsort(np.concatenate([seen, missed]), kind="stable")
         return concatenate([moved, self.late[track[missed]]])[back]
 
-    def looked(self) -> Array:
-        """Whether each sensor covered each track and each measurement (as anchors), bool (A, S)."""
-        total = int(self.offsets[-1])
-        result = np.ones((total, len(self.sensors)), dtype=np.bool_)
-        if self.sectors is None:
-            return result
-        points = np.zeros((total, 3))
-        axes = self.filter.motion.position
-        points[: len(self.late), : len(axes)] = self.late.mean[:, list(axes)]
-        points[len(self.late) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
-        for s, (sensor, sector) in enumerate(zip(self.sensors, self.sectors, strict=True)):
-            away = points - sensor.position
-            result[:, s] = looked_at(sector, np.arctan2(away[:, 1], away[:, 0]))
+    def misses(self, terms: ScoreTerms) -> Array:
+        """Score of a miss of each track and each measurement's target (as anchors) by each sensor, (A, S)."""
+        known = places_of(self.filter, self.late)
+        points = np.concatenate([known[0], *self.places.positions])
+        spreads = np.concatenate([known[1], *self.places.covariances])
+        result = np.empty((len(points), len(self.sensors)))
+        for s, sensor in enumerate(self.sensors):
+            share = share_in_view(sensor, points, spreads, None if self.sectors is None else self.sectors[s])
             # a sensor covers its own measurements, in spite of rounding
-            result[self.offsets[s] : self.offsets[s + 1], s] = True
+            share[self.offsets[s] : self.offsets[s + 1]] = 1.0
+            result[:, s] = log_missed(terms.miss[s], share)
         return result
 
     def anchors(self, rows: Array, lead: Array) -> Array:
@@ -364,7 +360,7 @@ def _put(states: Any, rows: Array, new: Any) -> Any:
     return state_from(type(states), arrays)
 
 
-def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tuples: int) -> TimedTuples:
+def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TimedTuples:
     """Candidate tuples of tracks, or of new targets, and one measurement or none of each sensor.
 
     Parameters
@@ -385,7 +381,7 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
     count, width = len(scan.states), len(scan.sensors)
     track, anchor = np.arange(count), np.arange(count)
     rows = np.zeros((count, width), dtype=np.int32)
-    costs = -(looked[:count] @ terms.miss)
+    costs = -misses[:count].sum(axis=1)
     alone = costs.copy()
     done: list[int] = []
     for s in scan.order:
@@ -395,12 +391,12 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
                 f"{len(new.parent) + len(track)} candidate tuples of tracks and measurements, "
                 f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
             )
-        value = score_costs(scan, new.followed, new.rows, terms, looked[anchor[new.parent]])
+        value = score_costs(scan, new.followed, new.rows, terms, misses[anchor[new.parent]])
         starts = np.flatnonzero(scan.places.fit[s])
         single = np.zeros((len(starts), width), dtype=np.int32)
         single[:, s] = starts + 1
         start_anchor = scan.offsets[s] + starts
-        begun = terms.miss[s] - looked[start_anchor] @ terms.miss - scan.places.births[s][starts]
+        begun = terms.miss[s] - misses[start_anchor].sum(axis=1) - scan.places.births[s][starts]
         costs = np.concatenate([costs, value, begun])
         rows = np.concatenate([rows, new.rows, single])
         track = np.concatenate([track, track[new.parent], np.full(len(starts), -1)])
@@ -414,10 +410,10 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
     return TimedTuples(track[order], rows[order], costs[order])
 
 
-def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTerms, looked: Array) -> Array:
-    """Costs of followed tuples, given which sensors covered each, bool (M, S)."""
+def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTerms, misses: Array) -> Array:
+    """Costs of followed tuples, given the score of a miss of each by each sensor, (M, S)."""
     seen = rows > 0
-    gain = followed.log_likelihood + seen @ terms.detection + (looked & ~seen) @ terms.miss
+    gain = followed.log_likelihood + seen @ terms.detection + np.where(seen, 0.0, misses).sum(axis=1)
     for s, births in enumerate(scan.places.births):
         mine = np.flatnonzero(followed.lead == s)
         gain[mine] += births[rows[mine, s] - 1] - terms.detection[s]

@@ -93,6 +93,7 @@ def grow_track_tuples(
     measurements: Sequence[Array],
     sensors: Sequence[Measurement],
     terms: ScoreTerms,
+    misses: Array,
     *,
     gate_probability: float,
     max_tuples: int = MAX_TUPLES,
@@ -108,6 +109,8 @@ def grow_track_tuples(
     sensors : sequence of Sensor
     terms : ScoreTerms
         Of these sensors.
+    misses : array (T, S)
+        Score of a miss of each track by each sensor: ln(1 - P_d), less where it cannot see the track.
     gate_probability : float
         Share of true measurements that a gate lets through.
     max_tuples : int
@@ -128,7 +131,7 @@ def grow_track_tuples(
     rows = np.zeros((count, len(sensors)), dtype=np.int32)
     costs = np.zeros(count)
     grown = states
-    alone, ahead = -float(terms.miss.sum()), _ahead(sensors, terms)
+    alone, ahead = -misses.sum(axis=1), _ahead(sensors, terms, misses)
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
         gate = gate_of(sensor, gate_probability)
         near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
@@ -146,23 +149,23 @@ def grow_track_tuples(
         done = _corrected(filter, grown, z, sensor, gate, parent, found)
         new = rows[done.track]
         new[:, s] = done.measurement + 1
-        missed = costs - terms.miss[s]
+        missed = costs - misses[track, s]
         costs = np.concatenate([missed, costs[done.track] - done.log_likelihood - terms.detection[s]])
         rows = np.concatenate([rows, new])
         track = np.concatenate([track, track[done.track]])
         grown = concatenate([grown, done.states])
         # the sensors left must be able to bring the cost below that of a track all missed
-        hopeful = np.flatnonzero((costs - ahead[s + 1] < alone) | ~rows.any(axis=1))
+        hopeful = np.flatnonzero((costs - ahead[s + 1] < alone[track]) | ~rows.any(axis=1))
         if len(hopeful) < len(rows):
             costs, rows, track, grown = costs[hopeful], rows[hopeful], track[hopeful], grown[hopeful]
     order = np.lexsort((*rows.T[::-1], track))
     return TrackTuples(track[order], rows[order], costs[order], grown[order])
 
 
-def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms) -> Array:
+def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms, misses: Array) -> Array:
     """The most that sensors s, s + 1, ... can take off a cost, (S + 1,): no density is above the noise's own."""
     peak = [-0.5 * float(np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1]) for sensor in sensors]
-    gain = np.maximum(terms.detection + np.array(peak), terms.miss)
+    gain = np.maximum(terms.detection + np.array(peak), misses.max(axis=0, initial=-np.inf))
     return np.append(np.cumsum(gain[::-1])[::-1], 0.0)
 
 

@@ -14,7 +14,7 @@ from assoc.filters.imm import Mixture
 from assoc.scene.own_times import FULL_TURN
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
-from assoc.tracking.looks import looked, out_of_view
+from assoc.tracking.looks import dwells
 from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
 
@@ -42,11 +42,10 @@ def learn(progress: Progress) -> Progress:
     late = tracks
     if progress.timed is not None and len(tracks):
         late = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
-    there = progress.with_state(tracks=late)
-    dwells = ~out_of_view(there) & looked(there)
+    looks = dwells(progress, late.states)
     rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
     if len(tracks):
-        _seek(progress, late, rows, dwells)
+        _seek(progress, late, rows, looks)
     hits = rows > 0
     sectors = progress.scan.sectors
     turns = np.ones(len(settings.sensors)) if sectors is None else (sectors[:, 1] - sectors[:, 0]) / FULL_TURN
@@ -55,7 +54,7 @@ def learn(progress: Progress) -> Progress:
     # before tracks are confirmed, targets look like false alarms
     if state.scan >= 3:
         estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
-    estimates = estimates.counted(tracks.track_id, dwells | hits, hits)
+    estimates = estimates.counted(tracks.track_id, looks | hits, hits)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
     if len(fresh):
         estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
@@ -78,12 +77,12 @@ def _rows(progress: Progress, ids: Array) -> Array:
     return rows
 
 
-def _seek(progress: Progress, late: TrackBatch, rows: Array, dwells: Array) -> None:
+def _seek(progress: Progress, late: TrackBatch, rows: Array, looks: Array) -> None:
     """Add measurements outside of the gates of tracks that were missed: without them, noise would seem smaller."""
     settings, step = progress.settings, progress.step
     assert step is not None
     for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
-        missed = np.flatnonzero((rows[:, s] == 0) & dwells[:, s] & (late.missed == 0))
+        missed = np.flatnonzero((rows[:, s] == 0) & looks[:, s] & (late.missed == 0))
         free = np.flatnonzero(~np.isin(step.assigned[s], late.track_id))
         if not len(missed) or not len(free):
             continue

@@ -7,25 +7,15 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.problem import AssignmentProblem
+from assoc.tracking.looks import looked
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
 
 
-def scan_problem(progress: Progress) -> AssignmentProblem:
-    """Candidate tuples of the scan, regardless of tracks."""
-    settings = progress.settings
-    return build_problem(
-        settings.place, progress.scan, gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
-        speed=settings.initiation.speed,
-    )  # fmt: skip
-
-
-def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array) -> Association:
+def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array, missed: Array) -> Association:
     """Apply the chosen tuples of a scan of one instant.
 
     Parameters
@@ -40,30 +30,30 @@ def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: 
         Their measurements, 1-based, 0 missed.
     born : int array (K, S)
         Tuples that belong to no track.
+    missed : array (T, S)
+        Scores of a miss of the tracks; see `assoc.tracking.looks.misses`.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
-    return _joined(progress, tracks, rows, _begin(progress, born), None)
+    return _joined(progress, tracks, rows, _begin(progress, born), missed)
 
 
-def associated_in_order(progress: Progress, timed: TimedScan, looked: Array, rows: Array, born: Array) -> Association:
-    """Like `associated`, for measurements with times of their own; `looked` is `TimedScan.looked`."""
+def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, rows: Array, born: Array) -> Association:
+    """Like `associated`, for measurements with times of their own; `missed` is `TimedScan.misses`."""
     track, terms = np.arange(len(rows)), progress.settings.terms
     followed = timed.follow(track, rows)
-    gain = -score_costs(timed, followed, rows, terms, looked[track])
+    gain = -score_costs(timed, followed, rows, terms, missed[track])
     when = np.where(rows.any(axis=1), followed.when, np.nan)
     tracks = progress.state.tracks.scored(timed.at_end(followed, track), gain, when)
-    return _joined(
-        progress, tracks, rows, _begin_in_order(progress, timed, born), np.asarray(looked[track].any(axis=1))
-    )
+    return _joined(progress, tracks, rows, _begin_in_order(progress, timed, born, missed), missed[track])
 
 
 def _joined(
-    progress: Progress, tracks: TrackBatch, rows: Array, new: tuple[TrackBatch, Array], looked: Array | None
+    progress: Progress, tracks: TrackBatch, rows: Array, new: tuple[TrackBatch, Array], missed: Array
 ) -> Association:
-    """Join tracks and new tracks; `looked`: which of the tracks any sensor looked at (None: all)."""
+    """Join tracks and new tracks; `missed`: scores of a miss of the tracks, (T, S)."""
     begun = np.ones(len(new[0]), dtype=np.bool_)
-    looked = None if looked is None else np.concatenate([looked, begun])
-    batch = TrackBatch.concatenate([tracks, new[0]]).counted(np.concatenate([rows.any(axis=1), begun]), looked)
+    at_all = np.concatenate([looked(progress, missed), begun])
+    batch = TrackBatch.concatenate([tracks, new[0]]).counted(np.concatenate([rows.any(axis=1), begun]), at_all)
     return Association(batch, owners(np.concatenate([rows, new[1]]), batch.track_id, progress.scan.sizes))
 
 
@@ -79,11 +69,12 @@ def _begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
     rows, positions, covariances = tuples[order], positions[order], covariances[order]
     states = settings.initiation.start(settings.filter, positions, covariances)
     costs = tuple_costs(settings.place, scan, rows, speed=settings.initiation.speed)
-    score = settings.births.scores(rows, costs, covariances)
+    costs -= settings.births.overlooked(rows, positions, covariances)
+    score = settings.births.scores(rows, costs, positions, covariances)
     return TrackBatch.new(states, progress.work.new_ids(len(order)), score, scan.time), rows
 
 
-def _begin_in_order(progress: Progress, timed: TimedScan, born: Array) -> tuple[TrackBatch, Array]:
+def _begin_in_order(progress: Progress, timed: TimedScan, born: Array, missed: Array) -> tuple[TrackBatch, Array]:
     """`_begin` where measurements have times of their own."""
     settings = progress.settings
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
@@ -94,8 +85,8 @@ def _begin_in_order(progress: Progress, timed: TimedScan, born: Array) -> tuple[
     fresh = np.full(len(rows), -1)
     followed = timed.follow(fresh, rows)
     states = timed.at_end(followed, fresh)
-    looked = timed.looked()[timed.anchors(rows, followed.lead)]
-    score = -score_costs(timed, followed, rows, settings.terms, looked)
+    anchors = timed.anchors(rows, followed.lead)
+    score = -score_costs(timed, followed, rows, settings.terms, missed[anchors])
     order = np.lexsort(states.mean[:, list(settings.filter.motion.position)].T)
     batch = TrackBatch.new(states[order], progress.work.new_ids(len(order)), score[order], followed.when[order])
     batch.numbers[:, STARTED] = followed.first[order]

@@ -45,6 +45,7 @@ from assoc.ranking.pairs.permutations import without_permutations
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
+from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
@@ -141,7 +142,7 @@ class JointProbabilistic(Method):
         for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
             gate = gate_of(sensor, settings.gate_probability)
             pairs = track_pairs(settings.filter, tracks.states, z, sensor, gate)
-            missed = np.full(len(tracks), terms.miss[s])
+            missed = misses_of(progress, tracks.states, s)
             scored = ScoredPairs(pairs.track, pairs.measurement, terms.detection[s] + pairs.log_likelihood)
             known, update = self._probabilities(tracks.track_id, tracks.existence, missed, scored, len(z))
             tracks, hit = _take_in(tracks, pairs, known.share, update, time)
@@ -156,21 +157,24 @@ class JointProbabilistic(Method):
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             found.append(known)
             assigned.append(ids)
-        return Association(tracks.counted(seen), assigned, tuple(found))
+        return Association(
+            tracks.counted(seen, np.asarray(in_view(progress, tracks.states).any(axis=1))), assigned, tuple(found)
+        )
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
-        terms, tracks, looked = progress.settings.terms, progress.state.tracks, timed.looked()
+        terms, tracks = progress.settings.terms, progress.state.tracks
+        misses = timed.misses(terms)
         # the sensors processed so far: only they can have missed a track
-        past, old, sensors = np.zeros_like(looked), len(tracks), range(looked.shape[1])
+        past, old, sensors = np.zeros_like(misses), len(tracks), range(misses.shape[1])
         parts = TrackParts.of_tracks(old, len(sensors))
         track_id, odds = tracks.track_id, tracks.existence
         seen, anchor = np.zeros(old, dtype=np.bool_), np.arange(old)
         assigned, found, done = {}, {}, list[int]()
         for s in timed.order:
-            past[:, s] = looked[:, s]
+            past[:, s] = misses[:, s]
             grown = parts.grown(timed, s, done, terms, past)
-            missed = looked[anchor, s] * terms.miss[s]
+            missed = misses[anchor, s]
             count = len(timed.times[s])
             known, update = self._probabilities(track_id, odds, missed, grown.pairs, count)
             of_pair = known.share / update.after[grown.pairs.track]
@@ -179,7 +183,7 @@ class JointProbabilistic(Method):
             free = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
             free = free[np.lexsort((*timed.places.positions[s][free].T, timed.times[s][free]))]
             first = timed.offsets[s] + free
-            begun = timed.places.births[s][free] + past[first] @ terms.miss - terms.miss[s]
+            begun = timed.places.births[s][free] + past[first].sum(axis=1) - terms.miss[s]
             ids[free] = progress.work.new_ids(len(free))
             parts = parts.begun(len(odds), first, s, free, begun)
             anchor, track_id = np.append(anchor, first), np.append(track_id, ids[free])
@@ -192,7 +196,7 @@ class JointProbabilistic(Method):
         new = TrackBatch.new(states[old:], track_id[old:], odds[old:], when[old:])
         new.numbers[:, STARTED] = started[old:]
         known_before = tracks.scored(states[:old], odds[:old] - tracks.existence, when[:old])
-        at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(new), dtype=np.bool_)])
+        at_all = np.concatenate([looked(progress, misses[:old]), np.ones(len(new), dtype=np.bool_)])
         batch = TrackBatch.concatenate([known_before, new]).counted(seen, at_all)
         return Association(batch, [assigned[s] for s in sensors], tuple(found[s] for s in sensors))
 

@@ -9,9 +9,10 @@ from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
 from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
-from assoc.tracking.associate.all_sensors import associated, associated_in_order, scan_problem
+from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.looks import misses
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.tracker import Tracker
 
@@ -24,8 +25,10 @@ class MultiSensor(Method):
     def at_once(self, progress: Progress) -> Association:
         """Tracks are the first list of the problem, the sensors the others."""
         settings, scan, tracks = progress.settings, progress.scan, progress.state.tracks
+        missed = misses(progress, tracks.states)
         tuples = grow_track_tuples(
             settings.filter, tracks.states, list(scan.measurements), settings.sensors, settings.terms,
+            missed,
             gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
         )  # fmt: skip
         gain = -tuples.costs
@@ -38,12 +41,13 @@ class MultiSensor(Method):
         solution = progress.work.assign(problem)
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return associated(progress, tuples.states[kept], gain[kept], tuples.rows[kept], born)
+        return associated(progress, tuples.states[kept], gain[kept], tuples.rows[kept], born, missed)
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
-        settings, scores, looked = progress.settings, progress.state.tracks.score, timed.looked()
-        tuples = grow_timed_tuples(timed, settings.terms, looked, settings.max_tuples)
+        settings, scores = progress.settings, progress.state.tracks.score
+        missed = timed.misses(settings.terms)
+        tuples = grow_timed_tuples(timed, settings.terms, missed, settings.max_tuples)
         known = tuples.track >= 0
         value = -tuples.costs
         value[known] = doubted_gain(scores[tuples.track[known]], value[known])
@@ -59,16 +63,17 @@ class MultiSensor(Method):
         rows = np.zeros((len(scores), len(settings.sensors)), dtype=np.int32)
         rows[np.flatnonzero(contested)[taken[:, 0] - 1]] = taken[:, 1:]
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return associated_in_order(progress, timed, looked, rows, born)
+        return associated_in_order(progress, timed, missed, rows, born)
 
 
 def _new_targets(progress: Progress) -> tuple[Array, Array]:
     """Tuples without a track that are better than false alarms, and their costs with the birth density."""
-    problem, births = scan_problem(progress), progress.settings.births
+    births = progress.settings.births
+    problem = births.problem(progress.scan)
     if not problem.num_tuples:
         return problem.tuples, problem.costs
     # where new targets are more frequent than false alarms, single measurements may be new targets, too
-    scores = births.scores(problem.tuples, problem.costs, births.fused(progress.scan, problem.tuples)[1])
+    scores = births.scores(problem.tuples, problem.costs, *births.fused(progress.scan, problem.tuples)[:2])
     good = scores > 0
     return problem.tuples[good], -scores[good]
 

@@ -16,6 +16,7 @@ from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
@@ -45,7 +46,7 @@ class NearestNeighbour(Method):
             gate = gate_of(sensor, settings.gate_probability)
             pairs = track_pairs(settings.filter, tracks.states, z, sensor, gate)
             gain = settings.terms.detection[s] + pairs.log_likelihood
-            missed = np.full(len(tracks), settings.terms.miss[s])
+            missed = misses_of(progress, tracks.states, s)
             chosen = self._choose(progress, pairs.track, pairs.measurement, gain, missed, tracks.score, len(z))
             hit = np.zeros(len(tracks), dtype=np.bool_)
             hit[pairs.track[chosen]] = True
@@ -62,24 +63,24 @@ class NearestNeighbour(Method):
             tracks = TrackBatch.concatenate([tracks, TrackBatch.new(states[order], new, score[order], time)])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
-        return Association(tracks.counted(seen), assigned)
+        return Association(tracks.counted(seen, np.asarray(in_view(progress, tracks.states).any(axis=1))), assigned)
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
         settings, terms, tracks = progress.settings, progress.settings.terms, progress.state.tracks
-        looked, old = timed.looked(), len(tracks)
+        misses, old = timed.misses(terms), len(tracks)
         # the sensors processed so far: only they can have missed a track
-        past = np.zeros_like(looked)
+        past = np.zeros_like(misses)
         anchor = track = np.arange(old)
         rows, score = np.zeros((old, len(settings.sensors)), dtype=np.int32), tracks.score
         gain = np.zeros(old)
         done: list[int] = []
         for s in timed.order:
-            past[:, s] = looked[:, s]
+            past[:, s] = misses[:, s]
             grown = timed.grown(s, done, anchor, track, rows)
             parent = grown.parent
             value = -score_costs(timed, grown.followed, grown.rows, terms, past[anchor[parent]]) - gain[parent]
-            missed = looked[anchor, s] * terms.miss[s]
+            missed = misses[anchor, s]
             count = len(timed.times[s])
             chosen = self._choose(progress, parent, grown.measurement, value, missed, score + gain, count)
             hit = np.zeros(len(rows), dtype=np.bool_)
@@ -92,7 +93,7 @@ class NearestNeighbour(Method):
             unused = np.flatnonzero(free)
             single = np.zeros((len(unused), rows.shape[1]), dtype=np.int32)
             single[:, s] = unused + 1
-            begun = timed.places.births[s][unused] + past[timed.offsets[s] + unused] @ terms.miss - terms.miss[s]
+            begun = timed.places.births[s][unused] + past[timed.offsets[s] + unused].sum(axis=1) - terms.miss[s]
             anchor, track = np.append(anchor, timed.offsets[s] + unused), np.append(track, np.full(len(unused), -1))
             rows, gain = np.concatenate([rows, single]), np.append(gain, begun)
             score = np.append(score, np.zeros(len(unused)))
@@ -105,7 +106,7 @@ class NearestNeighbour(Method):
         new = TrackBatch.new(states[order], progress.work.new_ids(len(order)), gain[order], when[order])
         new.numbers[:, STARTED] = followed.first[order]
         batch = TrackBatch.concatenate([tracks.scored(states[:old], gain[:old], when[:old]), new])
-        at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(order), dtype=np.bool_)])
+        at_all = np.concatenate([looked(progress, misses[:old]), np.ones(len(order), dtype=np.bool_)])
         assigned = owners(np.concatenate([rows[:old], rows[order]]), batch.track_id, progress.scan.sizes)
         return Association(batch.counted(np.asarray(seen), at_all), assigned)
 

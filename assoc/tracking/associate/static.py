@@ -14,9 +14,10 @@ from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
-from assoc.tracking.associate.all_sensors import associated, associated_in_order, scan_problem
+from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.looks import misses
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.tracker import Tracker
 
@@ -28,30 +29,32 @@ class StaticFusion(Method):
 
     def at_once(self, progress: Progress) -> Association:
         """Fuse the scan, then assign the fused tuples to tracks."""
-        tracks, terms = progress.state.tracks, progress.settings.terms
-        fused = progress.work.assign(scan_problem(progress)).tuples
-        track, which, costs, corrected = _pairs(progress, fused)
-        count, alone = len(tracks), -float(terms.miss.sum())
+        tracks = progress.state.tracks
+        fused = progress.work.assign(progress.settings.births.problem(progress.scan)).tuples
+        missed = misses(progress, tracks.states)
+        track, which, costs, corrected = _pairs(progress, fused, missed)
+        count = len(tracks)
         # every track may be missed: (track, 0), with the state as predicted
         pairs = np.stack([np.append(track, np.arange(count)), np.append(which + 1, np.zeros(count, np.int64))], axis=1)
         pairs[:, 0] += 1
-        gain = -np.append(costs, np.full(count, alone))
+        gain = -np.append(costs, -missed.sum(axis=1))
         value = doubted_gain(tracks.score[pairs[:, 0] - 1], gain)
         solution = progress.work.assign(AssignmentProblem(pairs, -value, [count, len(fused)]))
         kept = solution.indices[solution.indices < len(pairs)]
         kept = kept[np.argsort(pairs[kept, 0])]
         chosen = pairs[kept, 1]
-        rows = np.zeros((count, len(terms.miss)), dtype=np.int32)
+        rows = np.zeros(missed.shape, dtype=np.int32)
         rows[chosen > 0] = fused[chosen[chosen > 0] - 1]
         free = np.ones(len(fused) + 1, dtype=np.bool_)
         free[chosen] = False
         after = concatenate([corrected, tracks.states])[kept]
-        return associated(progress, after, gain[kept], rows, fused[free[1:]])
+        return associated(progress, after, gain[kept], rows, fused[free[1:]], missed)
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
-        scores, looked = progress.state.tracks.score, timed.looked()
-        fused = np.asarray(progress.work.assign(scan_problem(progress)).tuples, dtype=np.int32)
+        scores, terms = progress.state.tracks.score, progress.settings.terms
+        missed = timed.misses(terms)
+        fused = np.asarray(progress.work.assign(progress.settings.births.problem(progress.scan)).tuples, dtype=np.int32)
         count = len(scores)
         track, which = [np.arange(count)], [np.full(count, -1)]
         lead = np.argmax(fused > 0, axis=1)
@@ -65,7 +68,7 @@ class StaticFusion(Method):
         pairs, fused_of = np.concatenate(track), np.concatenate(which)
         rows = np.concatenate([fused, np.zeros((1, fused.shape[1]), dtype=np.int32)])[fused_of]
         followed = timed.follow(pairs, rows)
-        gain = -score_costs(timed, followed, rows, progress.settings.terms, looked[pairs])
+        gain = -score_costs(timed, followed, rows, terms, missed[pairs])
         good = np.flatnonzero(followed.inside)
         value = doubted_gain(scores[pairs[good]], gain[good])
         columns = np.stack([pairs[good] + 1, fused_of[good] + 1], axis=1)
@@ -74,11 +77,11 @@ class StaticFusion(Method):
         kept = kept[np.argsort(pairs[kept])]
         free = np.ones(len(fused) + 1, dtype=np.bool_)
         free[fused_of[kept]] = False
-        return associated_in_order(progress, timed, looked, rows[kept], fused[free[:-1]])
+        return associated_in_order(progress, timed, missed, rows[kept], fused[free[:-1]])
 
 
-def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
-    """Tracks and tuples within the gates: rows of both, costs, and the corrected states."""
+def _pairs(progress: Progress, fused: Array, missed: Array) -> tuple[Array, Array, Array, Any]:
+    """Tracks and tuples within the gates: rows of both, costs, and the corrected states; `missed` as of `misses`."""
     settings, states = progress.settings, progress.state.tracks.states
     filter, terms, probability = settings.filter, settings.terms, settings.gate_probability
     seen_by = list(enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)))
@@ -96,11 +99,11 @@ def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
     nis, freedom = np.zeros(len(track)), np.zeros(len(track), dtype=np.int64)
     for s, (z, sensor) in seen_by:
         seen = np.flatnonzero(fused[which, s] > 0)
-        costs -= terms.miss[s]
+        costs -= missed[track, s]
         if not len(seen):
             continue
         done = filter.update(corrected[seen], np.ascontiguousarray(z[fused[which[seen], s] - 1]), sensor)
-        costs[seen] -= done.log_likelihood + terms.detection[s] - terms.miss[s]
+        costs[seen] -= done.log_likelihood + terms.detection[s] - missed[track[seen], s]
         nis[seen] += done.nis
         freedom[seen] += sensor.dim
         rest = np.setdiff1d(np.arange(len(track)), seen)
@@ -108,7 +111,7 @@ def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
         corrected = concatenate([done.state, corrected[rest]])[back]
     largest = int(sum(sensor.dim for sensor in settings.sensors))
     inside = nis <= chi_square_quantiles(probability, largest)[freedom]
-    inside &= costs < -float(terms.miss.sum())
+    inside &= costs < -missed.sum(axis=1)[track]
     return track[inside], which[inside], costs[inside], corrected[inside]
 
 

@@ -80,8 +80,8 @@ class TrackParts(NamedTuple):
         done : sequence of int
             Sensors processed before.
         terms : ScoreTerms
-        past : bool array (A, S)
-            Which sensors, of those processed and this one, looked at each anchor.
+        past : array (A, S)
+            Score of a miss of each anchor by the sensors processed before and this one, 0 by others.
         """
         found = timed.grown(s, done, self.anchor, self.track, self.rows)
         score = -score_costs(timed, found.followed, found.rows, terms, past[self.anchor[found.parent]])

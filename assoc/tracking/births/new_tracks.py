@@ -17,7 +17,9 @@ from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances, positions_of_scan, single_positions
 from assoc.costs.tracks.own_times import Places
 from assoc.costs.tracks.scores import ScoreTerms, log_birth
+from assoc.costs.views import blind_somewhere, log_missed, share_in_view
 from assoc.filters.base import Filter
+from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.tracking.births.initiation import Initiation
@@ -65,14 +67,16 @@ class NewTracks:
         )
         # a target that first appears at a sensor was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
+        self._blind = blind_somewhere(place.sensors, place.region)
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
         """Positions, covariances, and which are precise enough to start a track."""
         positions, covariances = positions_and_covariances(self._place, scan, tuples)
-        return positions, covariances, self._narrow(covariances)
+        return positions, covariances, self.narrow(covariances)
 
-    def _narrow(self, covariances: Array) -> Array:
+    def narrow(self, covariances: Array) -> Array:
+        """Which positions are precise enough to start a track, by their covariances (K, 3, 3); bool (K,)."""
         # where no sensor measures heights, they come from the scene's region: they need not be precise
         limit = self._widest**2
         if len(self._filter.motion.position) == 1:
@@ -83,20 +87,41 @@ class NewTracks:
         """Birth term of new targets' scores, by the covariances of their positions."""
         return log_birth(covariances, self._place.region, self._initiation.birth_rate)
 
-    def scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
-        """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
+    def problem(self, scan: Scan) -> AssignmentProblem:
+        """Candidate tuples of a scan, regardless of tracks.
+
+        Costs are those of `build_problem`, but that a sensor misses only what it can see.
+        """
+        problem = build_problem(self._place, scan, speed=self._initiation.speed, blind=self._blind, **self._limits)
+        if not self._blind.any() or not scan.at_once:
+            return problem
+        costs = problem.costs - self.overlooked(problem.tuples, *self.fused(scan, problem.tuples)[:2])
+        return AssignmentProblem(problem.tuples[costs < 0], costs[costs < 0], problem.sizes)
+
+    def overlooked(self, rows: Array, positions: Array, covariances: Array) -> Array:
+        """What equation 5 counts too much for misses of sensors that cannot see tuples (K, S), (K,)."""
+        total = np.zeros(len(rows))
+        for s in np.flatnonzero(self._blind).tolist():
+            here = np.flatnonzero(rows[:, s] == 0)
+            share = share_in_view(self._place.sensors[s], positions[here], covariances[here])
+            total[here] += log_missed(self._terms.miss[s], share) - self._terms.miss[s]
+        return total
+
+    def scores(self, rows: Array, costs: Array, positions: Array, covariances: Array) -> Array:
+        """Scores of tuples (K, S) as new targets, by their costs (misses in view alone) and places."""
         seen = rows > 0
         # `tuple_costs` treats single measurements as false alarms
-        alone = seen @ self._terms.birth + ~seen @ self._terms.miss
+        alone = seen @ self._terms.birth + ~seen @ self._terms.miss + self.overlooked(rows, positions, covariances)
         return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
 
     def singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
         """New tracks of single measurements (n, d) of sensor s: states, mask of those used, positions, scores."""
         positions, covariances = single_positions(self._place, s, measured)
-        fit = self._narrow(covariances)
+        fit = self.narrow(covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
-        scores = self._appears[s] + self._log_birth(covariances)
+        later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
+        scores = self._appears[s] + self.overlooked(later, positions, covariances) + self._log_birth(covariances)
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
     def places(self, scan: Scan) -> Places:
@@ -106,7 +131,7 @@ class NewTracks:
             where, spread = positions_of_scan(self._place, scan, s)
             positions.append(where)
             covariances.append(np.asarray(spread))
-            fit.append(self._narrow(covariances[s]))
+            fit.append(self.narrow(covariances[s]))
             births.append(self._terms.birth[s] + self._log_birth(covariances[s]))
         return Places(positions, covariances, fit, births)
 
@@ -128,7 +153,7 @@ class NewTracks:
         if sum(len(rows) > 0 for rows in numbers) < 2:
             return None
         left = Scan(scan.index, scan.time, tuple(z[rows] for z, rows in zip(scan.measurements, numbers, strict=True)))
-        problem = build_problem(self._place, left, speed=self._initiation.speed, **self._limits)
+        problem = self.problem(left)
         several = np.count_nonzero(problem.tuples, axis=1) > 1
         if not several.any():
             return None
@@ -137,4 +162,4 @@ class NewTracks:
         number_of = [np.concatenate([[0], rows + 1]) for rows in numbers]
         rows = np.stack([number[tuples[:, s]] for s, number in enumerate(number_of)], axis=1).astype(np.int32)
         rows, costs, positions, covariances = rows[fit], costs[fit], positions[fit], covariances[fit]
-        return Crossings(rows, costs, self.scores(rows, costs, covariances), positions, covariances)
+        return Crossings(rows, costs, self.scores(rows, costs, positions, covariances), positions, covariances)

@@ -20,7 +20,7 @@ from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.looks import out_of_view
+from assoc.tracking.looks import in_view
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import Nursery, TrackerState
@@ -64,7 +64,7 @@ def end_ghosts(progress: Progress) -> Progress:
     if progress.timed is not None:
         return progress
     detected = progress.settings.method.detected(state, step)
-    unseen = state.nursery.unseen.after(state.tracks.track_id, detected, ~out_of_view(progress))
+    unseen = state.nursery.unseen.after(state.tracks.track_id, detected, in_view(progress, state.tracks.states))
     progress = progress.with_state(nursery=state.nursery._replace(unseen=unseen))
     ghosts = unseen.ghosts(miss)
     if not len(ghosts):

@@ -18,7 +18,7 @@ from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
-from assoc.tracking.track_batch import BEST, BITS, EXISTS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
+from assoc.tracking.track_batch import BEST, BITS, EXISTS, HIDDEN, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
 
 class Tables(NamedTuple):
@@ -158,6 +158,7 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
             i = row - old - pairs
             new_numbers[k, SCORE] = new_numbers[k, BEST] = new_numbers[k, EXISTS] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
+            new_numbers[k, HIDDEN] = 0.0
             new_counts[k, ID] = ids[i]
             copy_to(new_history[k, : rows.shape[1]], rows[i])
             continue
@@ -171,6 +172,7 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
         new_numbers[k, BEST] = max(numbers[source, BEST], score[row])
         if row >= old:
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
+            new_numbers[k, HIDDEN] = 0.0
             new_history[k, column] = measurement[row - old] + 1
     return kept, grown.chosen[kept], new_numbers, new_counts, new_history, new_born
 

@@ -17,6 +17,7 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
 from assoc.filters.batches import concatenate
+from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
 
@@ -140,7 +141,7 @@ class AtOnce(Growth):
         self._offered = [self._states, pairs.states, begun]
         numbers = np.flatnonzero(fit)
         births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
-        missed, gain = np.full(len(self.rows), terms.miss[s]), pairs.log_likelihood + terms.detection[s]
+        missed, gain = misses_of(self._progress, self._states, s), pairs.log_likelihood + terms.detection[s]
         return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
@@ -171,9 +172,10 @@ class AtOnce(Growth):
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
     def finished(self) -> Grown:
-        """The branches at the end of the scan; all were looked at."""
+        """The branches at the end of the scan."""
         seen = np.where(self.rows.any(axis=1), self._progress.scan.time, np.nan)
-        return Grown(self._states, seen, seen, np.ones(len(seen), dtype=np.bool_))
+        at_all = np.asarray(in_view(self._progress, self._states).any(axis=1))
+        return Grown(self._states, seen, seen, at_all)
 
 
 class InOrder(Growth):
@@ -182,24 +184,24 @@ class InOrder(Growth):
     def __init__(self, progress: Progress, timed: TimedScan) -> None:
         super().__init__(progress)
         self.order, self._timed = timed.order, timed
-        self._looked = timed.looked()
+        self._misses = timed.misses(progress.settings.terms)
         # the sensors processed so far: only they can have missed a branch
-        self._past = np.zeros_like(self._looked)
+        self._past = np.zeros_like(self._misses)
         self._anchor, self._done = self.origin, list[int]()
         self._gained, self._total = np.zeros(len(self.origin)), np.zeros(0)
 
     def offers(self, s: int) -> Offers:
         """Candidates by the measurements of sensor s, filtered in time order with those of earlier sensors."""
         timed, terms, past = self._timed, self._progress.settings.terms, self._past
-        past[:, s] = self._looked[:, s]
+        past[:, s] = self._misses[:, s]
         grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows)
         self._total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
         self._own = np.flatnonzero(timed.places.fit[s])
         anchor, when = timed.offsets[s] + self._own, timed.times[s][self._own]
-        score = timed.places.births[s][self._own] + past[anchor] @ terms.miss - terms.miss[s]
+        score = timed.places.births[s][self._own] + past[anchor].sum(axis=1) - terms.miss[s]
         turn = np.lexsort((*timed.places.positions[s][self._own].T, when))
         births = self._births(self._own, s, turn, when, score)
-        missed = self._looked[self._anchor, s] * terms.miss[s]
+        missed = self._misses[self._anchor, s]
         gain = self._total - self._gained[grown.parent]
         return Offers(missed, grown.parent, grown.measurement, gain, grown.followed.when, births)
 
@@ -213,8 +215,8 @@ class InOrder(Growth):
         """The branches at the end of the scan."""
         followed = self._timed.follow(self.origin, self.rows)
         last = np.where(self.rows.any(axis=1), followed.when, np.nan)
-        looked = np.asarray(self._looked[self._anchor].any(axis=1))
-        return Grown(self._timed.at_end(followed, self.origin), followed.first, last, looked)
+        at_all = looked(self._progress, self._misses[self._anchor])
+        return Grown(self._timed.at_end(followed, self.origin), followed.first, last, at_all)
 
 
 def growth_of(progress: Progress, timed: TimedScan | None) -> AtOnce | InOrder:
