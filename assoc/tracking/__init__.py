@@ -14,6 +14,7 @@ from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.live_tracker import LiveTracker
 from assoc.tracking.live.pictures import Picture
+from assoc.tracking.moving import MovingTargets
 from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
@@ -42,6 +43,7 @@ __all__ = [
     "LatePlots",
     "LifeCycle",
     "LiveTracker",
+    "MovingTargets",
     "MultiSensorTracker",
     "NearestNeighbourTracker",
     "PairProbabilities",

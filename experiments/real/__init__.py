@@ -1,0 +1,1 @@
+"""Experiments on real recordings, given by their path."""

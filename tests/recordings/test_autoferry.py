@@ -1,0 +1,96 @@
+"""The Autoferry format, in small files with all its oddities, and the experiment on it."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from assoc import InvalidInputError
+from assoc.recordings.autoferry import merged, read_autoferry
+from assoc.sensors import BearingSensor
+
+
+def frame(time, sensor, measurement, own=(10.0, 20.0)):
+    return {
+        "sensorID": sensor,
+        "measurements": [],
+        "ownshipPosition": list(own),
+        "time": time,
+        "measurement": measurement,
+    }
+
+
+FRAMES = [
+    frame(105.0, 2, [[100.0, -40.0, 400.0], [0.0, 30.0, 0.0]], (12.0, 22.0)),
+    frame(101.0, 1, [7.0, 3.0]),
+    frame(102.0, 1, []),
+    frame(103.0, 3, -0.5),
+    frame(103.5, 3, [0.1, 0.2]),
+    frame(104.2, 4, [0.0, math.pi / 2], (11.0, 21.0)),
+]
+BOATS = [
+    [{"targetID": 1, "position": [110.0, 20.0, 0], "time": 1.0}, {"targetID": 2, "position": [0, 50, 0], "time": 1}]
+]
+
+
+def write(folder, frames=FRAMES, boats=BOATS * 6):
+    paths = [folder / f"scenario7_{part}.json" for part in ("detections", "groundTruth")]
+    for path, content in zip(paths, (frames, boats), strict=True):
+        path.write_text(json.dumps(content))
+    return paths
+
+
+def test_frames_become_scans_of_sensors_on_the_ferry(tmp_path):
+    scene = read_autoferry(*write(tmp_path))
+    assert [sensor.name for sensor in scene.sensors] == ["lidar", "radar", "infrared", "colour"]
+    # in order of time, and of a camera one frame a second
+    np.testing.assert_allclose(scene.times, [0.0, 1.0, 2.0, 3.2, 4.0])
+    looking = [np.flatnonzero(sectors[:, 1] > sectors[:, 0]).tolist() for sectors in scene.sectors]
+    assert looking == [[0], [0], [2], [3], [1]]
+    lidar, radar, camera = (scene.scan(k).aligned(scene.sensors).measurements for k in (0, 4, 3))
+    # x east, y north; beyond the radar's reach nothing is read
+    np.testing.assert_allclose(lidar[0], [[23.0, 17.0]])
+    np.testing.assert_allclose(radar[1], [[22.0, 112.0], [52.0, -28.0]])
+    np.testing.assert_allclose(camera[3], [[math.pi / 2], [0.0]], atol=1e-12)
+    standing = scene.at(3.2).sensors[3]
+    assert isinstance(standing, BearingSensor)
+    np.testing.assert_allclose(standing.position, [21.0, 11.0, 0.0])
+    np.testing.assert_allclose(scene.truth.positions[0], [[20.0, 110.0, 0.0], [50.0, 0.0, 0.0]])
+
+
+def test_some_sensors_with_other_parameters(tmp_path):
+    scene = read_autoferry(*write(tmp_path), sensors={"radar": {"reach": 500.0, "false_alarm_rate": 7.0}}, extent=1.0)
+    assert len(scene.sensors) == 1 and scene.sensors[0].false_alarm_rate == 7.0
+    assert [len(z) for z in scene.scan(0).measurements] == [3]
+
+
+def test_detections_near_each_other_are_one_target():
+    points = np.array([[0.0, 0.0], [50.0, 0.0], [8.0, 0.0], [16.0, 0.0]])
+    np.testing.assert_allclose(merged(points, 10.0), [[8.0, 0.0], [50.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("nothing", "is not JSON"),
+        ({"a": 1}, "expected a list of frames, got dict"),
+        ([], "holds no frames"),
+        ([{**FRAMES[0], "measurement": [1.0, 2.0, 3.0]}], "frame 0: expected time, sensorID"),
+        ([FRAMES[1], {"time": 3.0}], "frame 1: expected time, sensorID"),
+        ([{**FRAMES[1], "ownshipPosition": [math.inf, 0.0]}], "frame 0: .*finite"),
+    ],
+)
+def test_bad_files_name_the_frame(tmp_path, content, message):
+    path = tmp_path / "scenario1_detections.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    with pytest.raises(InvalidInputError, match=f"scenario1_detections.json: .*{message}"):
+        read_autoferry(path)
+
+
+def test_truth_of_other_frames_and_unknown_sensors(tmp_path):
+    paths = write(tmp_path, boats=BOATS * 2)
+    with pytest.raises(InvalidInputError, match="has 2 frames, the detections 6"):
+        read_autoferry(*paths)
+    with pytest.raises(InvalidInputError, match="unknown name 'sonar'; known: lidar, radar"):
+        read_autoferry(paths[0], sensors=("sonar",))
