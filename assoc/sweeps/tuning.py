@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,6 @@ from assoc.sweeps.space import Range, Space, Values
 from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
 from assoc.sweeps.study import Counts, Study
 from assoc.sweeps.summary import by_problem
-from assoc.sweeps.worker import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,57 +132,35 @@ def tune(
     if not any(isinstance(choice, Range) or len(choice.values) > 1 for choice in ranges.values()):
         raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
     sources = study_sources(sources)
-    every = (
-        [list(range(source.num_scans)) for source in sources] if scans is None else [list(numbers) for numbers in scans]
-    )
-    training, test, words = _split(every, repeats)
+    every = [range(source.num_scans) for source in sources] if scans is None else scans
+    training, test, words = _split([list(numbers) for numbers in every], repeats)
 
-    def study(settings: Sequence[Setting], scans: Sequence[Sequence[int]], repeats: range) -> Study:
-        return Study(sources, settings, repeats, seed, time_limit, gating or {}, scans)
+    def study(settings: Sequence[Setting], held_out: bool = False) -> Study:
+        seeds = range(repeats, 2 * repeats) if held_out else range(repeats)
+        return Study(sources, settings, seeds, seed, time_limit, gating or {}, test if held_out else training)
 
-    fixed = {
-        name: choice.values[0]
-        for name, choice in ranges.items()
-        if isinstance(choice, Values) and len(choice.values) == 1
-    }
-    default = Setting(solver, fixed)
-    with Store(folder, study([default], training, range(repeats)).manifest) as store:
-        total = Counts(0, 0)
-
-        memory = _Memory(folder)
-
-        def evaluate(settings: Sequence[Setting], scans: Sequence[Sequence[int]], repeats: range) -> Study:
-            part = study(settings, scans, repeats)
-            before = Counts(total.total, total.before, total.new, total.solving)
-
-            def shown(counts: Counts) -> None:
-                total.total = max(before.done + counts.total, size)
-                total.before, total.new = before.before + counts.before, before.new + counts.new
-                if progress is not None:
-                    progress(total)
-
-            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, on_result=memory.add)
-            return part
-
-        length = sum(map(len, training)) * repeats
-        size = length * trials + 2 * sum(map(len, test)) * repeats
-        runs = memory.of(evaluate([default], training, range(repeats)))
-        cutoff = time_limit if time_limit is not None else float(np.nanmax(runs[2], initial=1e-6))
-        untuned = float(scores(*runs, target, cutoff).mean())
-        sampler = optuna.samplers.TPESampler(seed=seed)
-        search = optuna.create_study(sampler=sampler)
+    single = {name: choice.values for name, choice in ranges.items() if isinstance(choice, Values)}
+    default = Setting(solver, {name: values[0] for name, values in single.items() if len(values) == 1})
+    size = study([default]).size * trials + study([default], held_out=True).size * 2
+    with Store(folder, study([default]).manifest) as store:
+        runs = _Runs(store, size, progress, {"jobs": jobs, "scheduler": scheduler})
+        first = runs.of(study([default]))
+        cutoff = time_limit if time_limit is not None else float(np.nanmax(first[2], initial=1e-6))
+        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
         search.enqueue_trial(_point(default, ranges))
         values: dict[Setting, float] = {}
         for _ in range(trials):
             trial = search.ask()
             setting = Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
             if setting not in values:
-                runs = memory.of(evaluate([setting], training, range(repeats)))
-                values[setting] = float(scores(*runs, target, cutoff).mean())
+                values[setting] = float(scores(*runs.of(study([setting])), target, cutoff).mean())
             search.tell(trial, values[setting])
         tuned = min(values, key=lambda setting: values[setting])
-        held = _frame(folder, evaluate([default, tuned], test, range(repeats, 2 * repeats)))
-    report = _report(solver, target, trials, tuned, default, (untuned, values[tuned]), held, cutoff, words)
+        training_scores = float(scores(*first, target, cutoff).mean()), values[tuned]
+        last = study([default, tuned], held_out=True)
+        runs.of(last)
+        held = _frame(folder, last)
+    report = _report(solver, target, trials, tuned, default, training_scores, held, cutoff, words)
     _save(Path(folder) / REPORT, report)
     return report
 
@@ -271,27 +248,48 @@ def _point(default: Setting, space: Mapping[str, Space]) -> dict[str, Any]:
     return point
 
 
-class _Memory:
-    """Cost, bound and time of all runs in the folder, updated with each result."""
+class _Runs:
+    """The runs of studies, done where the folder lacks them: cost, bound and time of each.
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self._runs: dict[RunKey, tuple[float | None, float | None, float | None]] = {}
-        for entry in read_log(folder):
+    Parameters
+    ----------
+    store : Store
+        Open.
+    size : int
+        Runs of all studies together, about.
+    progress : callable or None
+        Called with the `Counts` of all studies so far.
+    where : mapping
+        Where runs are done (`Study.run`).
+    """
+
+    def __init__(
+        self, store: Store, size: int, progress: Callable[[Counts], object] | None, where: Mapping[str, Any]
+    ) -> None:
+        self._store, self._size, self._progress, self._where = store, size, progress, where
+        self._total = Counts(0, 0)
+        self._known: dict[RunKey, tuple[float | None, float | None, float | None]] = {}
+        for entry in read_log(store.folder):
             if entry is not None and "setting_key" not in entry:
                 self._add(entry)
-
-    def add(self, result: Result) -> None:
-        self._add(result.columns)
 
     def _add(self, columns: Mapping[str, list[Any]]) -> None:
         values = zip(columns["cost"], columns["lower_bound"], columns["time"], strict=True)
         for key, value in zip(run_keys(columns), values, strict=True):
-            self._runs.setdefault(key, value)
+            self._known.setdefault(key, value)
 
     def of(self, study: Study) -> tuple[Floats, Floats, Floats]:
         """Costs, bounds and times of the runs of a study, NaN where there are none."""
-        found = [self._runs[key] for key in study.keys()]
-        cost, bound, time = np.array(found, dtype=float).T
+        total, before = self._total, replace(self._total)
+
+        def shown(counts: Counts) -> None:
+            total.total = max(before.done + counts.total, self._size)
+            total.before, total.new = before.before + counts.before, before.new + counts.new
+            if self._progress is not None:
+                self._progress(total)
+
+        study.run_in(self._store, **self._where, progress=shown, on_result=lambda result: self._add(result.columns))
+        cost, bound, time = np.array([self._known[key] for key in study.keys()], dtype=float).T
         return cost, bound, time
 
 
