@@ -12,16 +12,8 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from experiments.common.instances.synthetic import axial_known_optimum, axial_random
 from tests.oracles import brute_force, gated_problem, small_problems
+from tests.packing.test_dimensionwise import feasible
 from tests.sizes import few_or_all
-
-
-def _feasible(packing, owner):
-    columns = np.unique(owner[owner >= 0])
-    rows = packing.cols[columns]
-    count = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
-    assert ((owner >= 0) == (count == 1)).all()
-    assert count.max(initial=0) <= 1
-    assert (count[~packing.slack] == 1).all()
 
 
 def _searched(problem, steps, size, rng):
@@ -42,7 +34,7 @@ def _searched(problem, steps, size, rng):
         change, _ = search.search(piece.arrays, cover.owner, rng, steps, nodes=10**6)
         assert change <= 1e-9
         assert cover.weight == pytest.approx(before + change, abs=1e-9)
-        _feasible(piece, cover.owner)
+        feasible(piece, cover.owner)
         total += cover.weight
     return total
 

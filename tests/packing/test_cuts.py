@@ -9,12 +9,11 @@ from assoc.packing.branching import search as branch_and_bound
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
-from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values
+from assoc.packing.simplex.basis import primal_values
 from assoc.packing.simplex.cuts import odd_sets
-from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
-from assoc.packing.simplex.program import all_allowed, certified, make_feasible, program_of, weight_limit
+from assoc.packing.simplex.program import all_allowed, certified, make_feasible
 from tests.oracles import gated_problem
-from tests.packing.test_branching import all_covers
+from tests.packing.test_branching import all_covers, relaxed
 from tests.packing.test_passes import ghosts
 
 
@@ -32,14 +31,8 @@ def odd_packings(count, seed):
                 yield part
 
 
-def relaxed(packing):
-    program = program_of(packing.arrays)
-    allowed = all_allowed(program, packing.slack)
-    basis = new_basis(program)
-    duals = dual_bound(packing)
-    make_feasible(program, allowed, duals)
-    begin_from_duals(program, allowed, duals, basis)
-    assert solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))[0] == OPTIMAL
+def solved(packing):
+    program, _, basis = relaxed(packing)
     primal = np.zeros(packing.num_columns)
     primal_values(program, basis, primal)
     return basis, primal
@@ -61,7 +54,7 @@ def matrix_of(program):
 def test_sets_are_odd_violated_and_spare_every_solution():
     found = 0
     for packing in odd_packings(150, 1):
-        basis, primal = relaxed(packing)
+        basis, primal = solved(packing)
         sets = odd_sets(packing.cols, basis, packing.num_rows)
         solutions = all_covers(packing)
         for members in sets:

@@ -21,7 +21,7 @@ def _random_cover(packing, rng):
     return cover
 
 
-def _feasible(packing, owner):
+def feasible(packing, owner):
     columns = np.unique(owner[owner >= 0])
     rows = packing.cols[columns]
     count = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
@@ -44,7 +44,7 @@ def test_never_worse_and_feasible_on_every_kind_of_problem():
             continue
         before = cover.weight
         change = improve_dimensionwise(packing, cover.owner)
-        _feasible(packing, cover.owner)
+        feasible(packing, cover.owner)
         assert cover.weight == pytest.approx(before + change, abs=1e-9)
         assert cover.weight + prepared.offset >= brute_force(problem) - 1e-9
         improved += change < 0

@@ -15,6 +15,7 @@ from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, program_of, weight_limit
 from assoc.problem import AssignmentProblem
 from tests.oracles import axial_problem, gated_problem
+from tests.packing.test_branching import relaxed
 from tests.sizes import few_or_all
 
 
@@ -254,13 +255,7 @@ def test_an_inverse_is_computed_anew():
     """It removes accumulated rounding errors, and replaces dependent columns by anchors."""
     rng = np.random.default_rng(86)
     packing = prepare(axial_problem(rng, (9, 9, 9), 1.0, "positive")).packing
-    program = program_of(packing.arrays)
-    allowed = all_allowed(program, packing.slack)
-    basis = new_basis(program)
-    duals = dual_bound(packing)
-    make_feasible(program, allowed, duals)
-    begin_from_duals(program, allowed, duals, basis)
-    solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))
+    program, allowed, basis = relaxed(packing)
     before = basis.duals.copy()
     basis.inverse[:] += rng.normal(0.0, 1e-3, basis.inverse.shape)
     basis.values[:] += 0.1

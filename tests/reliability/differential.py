@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -187,24 +188,33 @@ def magnitude(problem: AssignmentProblem, worst: Fraction) -> Fraction:
     return sum((abs(cost) for cost in costs if cost <= most), Fraction(0))
 
 
-def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, way: Way) -> Iterator[str]:
-    """What is wrong with the answer that comes this way; ``truth``: the best costs, None where there is no solution."""
+def answered(work: Callable[[], Any], solvable: bool, found: list[Any]) -> Iterator[str]:
+    """Add what the work returns to ``found``, or say what is wrong: an error, or an answer where there is none."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", "none of the .* tuples costs less|.* too large for doubles", AssocWarning)
-            answers = way(problem)
+            result = work()
     except InfeasibleError:
-        if truth is not None:
+        if solvable:
             yield "says infeasible"
-        return
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
+    else:
+        if solvable:
+            found.append(result)
+        else:
+            yield "answers a problem that has no solution"
+
+
+def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, way: Way) -> Iterator[str]:
+    """What is wrong with the answer that comes this way; ``truth``: the best costs, None where there is no solution."""
+    found: list[Any] = []
+    yield from answered(lambda: way(problem), truth is not None, found)
+    if not found or truth is None:
         return
-    if truth is None:
-        yield "answers a problem that has no solution"
-        return
+    answers = found[0]
     # bounds of later places hold for what is not before them
     for place, (answer, own) in enumerate(zip(answers, truth, strict=False)):
         yield from (f"{text} (place {place})" for text in _faults_of(problem, own, answer))
@@ -228,22 +238,11 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
 
 def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, k: int) -> Iterator[str]:
     """What is wrong with the probabilities from k solutions; ``truth`` None: there is no solution."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "none of the .* tuples costs less|.* too large for doubles", AssocWarning)
-            found = marginals(problem, k)
-    except InfeasibleError:
-        if truth is not None:
-            yield "says infeasible"
+    results: list[Any] = []
+    yield from answered(lambda: marginals(problem, k), truth is not None, results)
+    if not results or truth is None:
         return
-    except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
-        return
-    if truth is None:
-        yield "answers a problem that has no solution"
-        return
+    found = results[0]
     for row, p, low, high in zip(
         found.tuples.tolist(), found.probability.tolist(), found.lower.tolist(), found.upper.tolist(), strict=True
     ):
