@@ -18,6 +18,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
+from assoc._system import temporary
 from assoc._system.first_import import path_without
 from assoc._system.interrupts import end_is_asked
 from assoc._system.processes import leave, send, start_python
@@ -36,9 +37,15 @@ def call_beside(function: Callable[[], object]) -> subprocess.Popen[bytes]:
     """Start a process that calls a function and ends."""
     # a session of its own: Ctrl-C goes to this program alone, and this program ends the process
     process = _start(start_new_session=True)
-    send(process, function)
-    leave(process)
+    send(process, functools.partial(_call_and_end, function.__module__, function.__qualname__))
     return process
+
+
+def _call_and_end(module: str, name: str) -> None:
+    try:
+        getattr(import_module(module), name)()
+    finally:
+        temporary.end_process(0)
 
 
 def _start(**options: Any) -> subprocess.Popen[bytes]:

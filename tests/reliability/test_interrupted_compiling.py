@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import signal
 import subprocess
@@ -57,6 +58,12 @@ def test_a_signal_is_heard_at_once_and_work_ends_between_two_steps():
     assert (done.returncode, done.stdout, told(done.stderr)) == (0, "[]\n[False, False]\n", "")
 
 
+def command_lines():
+    for path in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            yield (path / "cmdline").read_text()
+
+
 SLOW = """
 import sys, time
 from assoc._cli.signals import EarlyEnd, Interruption
@@ -89,13 +96,14 @@ class Slow:
         prepare()
 
 
-slow = Slow()
-if sys.argv[1] == "early end":
+kind = sys.argv[1] if len(sys.argv) > 1 else "helper"
+slow = Slow() if kind != "helper" else None
+if kind == "early end":
     early = EarlyEnd("slow")
     early.on_signals()
     with early.work(0.0):
         work()
-else:
+elif kind == "interruption":
     interruption = Interruption("slow")
     interruption.interrupt_on_signals()
     with interruption.reported(lambda: None):
@@ -119,3 +127,7 @@ def test_programs_do_not_wait_for_the_compiler(kind, where, tmp_path):
         finally:
             process.kill()
     assert (process.returncode, errors) == (130, "slow: interrupted\n")
+    last = time.monotonic() + 10.0
+    while any(str(tmp_path) in line for line in command_lines()):
+        assert time.monotonic() < last, "a process that compiles is left"
+        time.sleep(0.05)
