@@ -347,6 +347,10 @@ def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
+    worst = sorted(rows.inconsistent().items(), key=lambda one: -one[1])
+    if worst:
+        shown = ", ".join(f"{track} ({nis:.2g})" for track, nis in worst[:5]) + (", ..." if len(worst) > 5 else "")
+        print_lines(f"tracks that do not agree with their measurements (NIS, at most 1 expected): {shown}")
     note = height_note(tracker.sensors, len(tracker.filter.motion.position))
     if note is not None:
         print_lines(note)

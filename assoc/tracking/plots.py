@@ -11,6 +11,7 @@ from assoc._system.interrupts import end_is_asked
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
 from assoc.recordings import Recording, Window
+from assoc.tracking.quality import Qualities
 from assoc.tracking.track import Step
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
@@ -97,7 +98,9 @@ def track_plots(
     sure: list[Array] = [np.zeros(0, dtype=np.bool_)]
     altitudes: dict[int, float] = {}
     done: list[Window] = []
+    qualities = Qualities(len(tracker.sensors))
     for window in windows:
+        before = tracker.state
         try:
             (step,) = step_windows(tracker, [window])
         except KeyboardInterrupt:
@@ -113,7 +116,9 @@ def track_plots(
         altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
         ends.append(float(step.time))
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
-        table.add(listed, tracker.filter.motion.position, altitudes)
+        stamps = np.clip(window.times, -np.inf if before.time is None else before.time, step.time)
+        qualities.after(tracker, before, step, [window.measurements], [stamps])
+        table.add(listed, tracker.filter.motion.position, altitudes, qualities)
     tracks = np.concatenate(takers)
     aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
     rates = kept = None

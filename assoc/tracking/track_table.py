@@ -14,10 +14,11 @@ from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
 from assoc._types import Array
-from assoc.exports.maps import coordinates, followed_targets
+from assoc.exports.maps import FOLLOWED_WITHIN, coordinates, followed_targets
 from assoc.metrics.trajectories import last_at_each_instant
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
+from assoc.tracking.quality import Qualities
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
 
@@ -61,12 +62,15 @@ class TrackTable(Shown):
         self.origin = origin
         self.targets: dict[int, str] = {}
         self._rows: list[tuple[Any, ...]] = []
+        self._quality: list[dict[str, Any]] = []
 
     def add(
         self,
         tracks: Iterable[Track],
         positions: Sequence[int] = (0, 1, 2),
         altitudes: Mapping[int, float] | None = None,
+        qualities: Qualities | None = None,
+        truth: Array | None = None,
     ) -> None:
         """Add the tracks of one scan.
 
@@ -77,6 +81,11 @@ class TrackTable(Shown):
             Indices of x, y (and z) in the state: ``filter.motion.position``.
         altitudes : mapping of track id to metres, optional
             Altitudes by transponders; without them the altitude is z, or NaN for planar tracks.
+        qualities : Qualities, optional
+            Of the tracker: the table then has the columns nis, consistent and hits_1, hits_2, ..., by sensor.
+        truth : array (n, 3), optional
+            Positions of all targets at this time: the table then has the column nees, the normalised estimation error
+            squared of the position over its number of components, by the nearest target; NaN if none is within 1 km.
         """
         for track in tracks:
             sigma = np.zeros(3)
@@ -89,6 +98,14 @@ class TrackTable(Shown):
             where = *track.position.tolist(), *track.velocity.tolist()
             more = *sigma.tolist(), track.existence, speed, heading, altitude
             self._rows.append((track.track_id, track.time, *where, *life, *more))
+            quality: dict[str, Any] = {}
+            if qualities is not None:
+                one = qualities.of_track(track.track_id)
+                quality = {"nis": one.nis, "consistent": one.consistent}
+                quality |= {f"hits_{s}": count for s, count in enumerate(one.hits.tolist(), 1)}
+            if truth is not None:
+                quality["nees"] = _nees(track, positions, truth)
+            self._quality.append(quality)
 
     def name_targets(self, scene: Scene) -> None:
         """Find the target that each track followed most, where the truth of its scene has names."""
@@ -110,6 +127,8 @@ class TrackTable(Shown):
             # planar tracks have no z; altitudes by transponders stay
             frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
             frame = frame.assign(latitude=latitude, longitude=longitude)
+        if any(self._quality):
+            frame = frame.join(pd.DataFrame.from_records(self._quality))
         if self.targets:
             frame["target"] = [self.targets.get(number, "") for number in frame["track_id"].tolist()]
         return frame
@@ -139,6 +158,14 @@ class TrackTable(Shown):
         frame = self.to_frame()
         write_atomically(path, lambda file: frame.to_parquet(file, index=False))
 
+    def inconsistent(self) -> dict[int, float]:
+        """Tracks whose NIS was far above its mean at any time, and the largest one of each."""
+        found: dict[int, float] = {}
+        for row, quality in zip(self._rows, self._quality, strict=True):
+            if not quality.get("consistent", True):
+                found[row[0]] = max(found.get(row[0], 0.0), quality["nis"])
+        return found
+
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
         """Times (n,), track ids (n,) and positions (n, 3) of confirmed tracks or of all, for metrics.
 
@@ -150,6 +177,17 @@ class TrackTable(Shown):
         positions = np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
         kept = last_at_each_instant(times, ids)
         return times[kept], ids[kept], positions[kept]
+
+
+def _nees(track: Track, positions: Sequence[int], truth: Array) -> float:
+    """Normalised estimation error squared over its components; NaN if no target is near."""
+    axes = list(positions)
+    off = truth[:, : len(axes)] - track.mean[axes]
+    distance = np.linalg.norm(off, axis=1)
+    if not (distance < FOLLOWED_WITHIN).any():
+        return math.nan
+    nearest = off[np.argmin(distance)]
+    return float(nearest @ np.linalg.solve(track.covariance[np.ix_(axes, axes)], nearest)) / len(axes)
 
 
 @door
@@ -183,8 +221,9 @@ def track_scene(
     table = TrackTable(scene.origin)
     decisions: list[Decision] = []
     names: dict[int, Counter[str]] = {}
+    qualities = Qualities(len(tracker.sensors))
     for k in range(scene.num_scans) if scans is None else scans:
-        scan = scene.scan(k)
+        scan, before = scene.scan(k), tracker.state
         try:
             known = None if identities is None else identities[k]
             step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors, known)
@@ -197,9 +236,10 @@ def track_scene(
         for ids, codes in zip(step.assigned, known or (), strict=False):
             for number, (code, address) in zip(ids.tolist(), codes.tolist(), strict=True):
                 names.setdefault(number, Counter())[f"{address:06x}" if address else f"{code:04o}" if code else ""] += 1
-        table.add(
-            (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
-        )
+        qualities.after(tracker, before, step, scan.measurements, scan.times)
+        listed = (track for track in tracker.tracks if track.reported or not confirmed)
+        truth = None if scene.truth is None else scene.truth.positions[k]
+        table.add(listed, tracker.filter.motion.position, qualities=qualities, truth=truth)
     table.name_targets(scene)
     for number, found in names.items():
         found.pop("", None)

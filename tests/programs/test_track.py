@@ -14,6 +14,7 @@ from assoc._cli.track import options as track_options
 from assoc.recordings import Recording, write_plots
 from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
+from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, MultiSensorTracker
 from assoc.tracking.filter_choice import FILTERS, make_filter
 
@@ -315,7 +316,7 @@ def test_speed_heading_and_altitude(tmp_path, capsys):
     assert track.main([str(tmp_path / "plots.csv"), "-o", str(out), "--rotation", "10", *NOISE]) == 0
     capsys.readouterr()
     table = pd.read_csv(out)
-    assert list(table.columns[-3:]) == ["speed", "heading", "altitude"]
+    assert list(table.columns[-6:]) == ["speed", "heading", "altitude", "nis", "consistent", "hits_1"]
     last = table.iloc[-1]
     # northward at 250 m/s, at flight level 300
     assert last.speed == pytest.approx(np.hypot(last.vx, last.vy)) and last.speed == pytest.approx(250, rel=0.1)
@@ -367,3 +368,20 @@ def read_without_identities(folder):
     known = [name for name in frame.columns if name.startswith(("mode3", "aircraft"))]
     frame.drop(columns=known).to_csv(path, index=False)
     return str(path)
+
+
+def test_tracks_that_do_not_agree_with_their_measurements_are_listed(tmp_path, capsys):
+    """Radars that err thrice as much as they say."""
+    scene = simulate("three-radar", 1, scans=25)
+    noisy = [replace(one, noise=3.0 * one.noise) for one in scene.sensors]
+    truth = scene.truth
+    seen = observe(noisy, scene.times, truth.target_ids, truth.positions, np.random.default_rng(0), region=scene.region)
+    replace(seen, sensors=scene.sensors).save(tmp_path / "scene.npz")
+    report, out = tmp_path / "r.html", tmp_path / "tracks.csv"
+    assert track.main([str(tmp_path / "scene.npz"), "-o", str(out), "--report", str(report), "--no-adapt"]) == 0
+    listed = re.search(r"do not agree with their measurements .*: (.*)", capsys.readouterr().out)
+    assert listed
+    table = pd.read_csv(out)
+    worst = {int(one) for one in re.findall(r"(\d+) \(", listed[1])}
+    assert worst <= set(table["track_id"][~table["consistent"]])
+    assert "hits by sensor" in report.read_text()

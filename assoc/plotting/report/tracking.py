@@ -252,6 +252,11 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         life["heading"] = float(track["heading"].iloc[-1]) if "heading" in track else None
         known = track["altitude"].dropna().to_numpy(dtype=float) if "altitude" in track else np.zeros(0)
         life["altitude"] = float(known[-1]) if len(known) else None
+        if "nis" in track:
+            value = float(track["nis"].iloc[-1])
+            life["nis"] = value if np.isfinite(value) else None
+            life["consistent"] = "yes" if track["consistent"].all() else "no"
+            life["by_sensor"] = " + ".join(str(int(track[name].iloc[-1])) for name in track.filter(like="hits_"))
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
@@ -265,10 +270,14 @@ def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
     columns += [("detected", "last detection", "t"), ("last", "last row", "t"), ("rows", "rows", "d")]
     columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
     columns += [("heading", "last heading, deg", ".0f"), ("altitude", "last altitude, m", ".0f")]
+    columns += [("by_sensor", "hits by sensor", ""), ("nis", "NIS", ".2f"), ("consistent", "consistent", "")]
     columns += [("target", "target followed", "d"), ("share", "share of its rows", ".0%")] if known else []
-    used = [column for column in columns if any(life[column[0]] is not None for life in lives) or column[0] == "track"]
+    used = [
+        column for column in columns if any(life.get(column[0]) is not None for life in lives) or column[0] == "track"
+    ]
     rows = [
-        [("" if life[key] is None else _shown(life[key], style), life[key]) for key, _, style in used] for life in lives
+        [("" if life.get(key) is None else _shown(life[key], style), life.get(key)) for key, _, style in used]
+        for life in lives
     ]
     note = '<p class="note">No track was made.</p>' if not lives else ""
     return note + sortable_table("track-table", [header for _, header, _ in used], rows, link="track")
