@@ -123,6 +123,8 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
 
     given["filter"] = given["filter"] or "imm-cv"
     name, turns = given["tracker"] or "multi-sensor", given["turns"]
+    if turns is not None and given["interval"] is None:
+        given["interval"] = min(1.0, 0.25 * min(turns))
     # a turn of an antenna corresponds to an instant of a scene: meanwhile a target is not detected again
     pace = pace_of(scene.times) if turns is None else min(turns)
 

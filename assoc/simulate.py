@@ -57,7 +57,7 @@ def _simulate(words: list[str]) -> None:
     seed = given["seed"] or 0
     parameters = parameters_of(simulation.parameters(scenario))
     values = given.some(parameter.name for parameter in parameters)
-    given.check_outputs(value for value in values.values() if isinstance(value, str))
+    given.check_outputs([], reserved=[value for value in values.values() if isinstance(value, str)])
     with messages(given):
         if given["verbose"]:
             used = {"seed": seed} | {

@@ -10,12 +10,13 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
-from assoc._cli.options import Given, Parser
+from assoc._cli.options import Given, Parser, flag_of
 from assoc._cli.program import Program, command, prepare_streams, write_all
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
@@ -46,6 +47,11 @@ if TYPE_CHECKING:
     from assoc.tracking.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
+_USUAL = {
+    "range_noise": "30 to 150 m are usual",
+    "azimuth_noise": "0.05 to 0.2 degrees are usual",
+    "rotation": "4 to 12 seconds are usual",
+}
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
 
@@ -209,9 +215,10 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     if given["map"] and given["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
     recording = _read_plots(file, given)
-    windows = _windows(recording, given, settings.get("seed", 0))
-    print_lines(recording.summary())
-    radar = radar_of(recording, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
+    with _as_options():
+        windows = _windows(recording, given, settings.get("seed", 0))
+        print_lines(recording.summary())
+        radar = radar_of(recording, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
     tracker = make_tracker(name, [radar], given, settings, None)
     done, _ = _watched(
         given,
@@ -225,6 +232,21 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         # do not judge by plots that were left out
         done = done._replace(rates=None, kept=None)
     return _Tracked(tracker, done.table, None, done, len(done.windows), len(windows))
+
+
+@contextmanager
+def _as_options() -> Iterator[None]:
+    """Name in errors the options instead of the library's arguments, with usual values."""
+    try:
+        yield
+    except InvalidInputError as error:
+        text = str(error).replace("the rotation time", "rotation: the rotation time", 1)
+        name, _, rest = text.partition(": ")
+        flags = {**{argument: flag for flag, argument in RADAR.items()}, "rotation": "rotation"}
+        if name not in flags:
+            raise
+        usual = f" ({_USUAL[name]})" if name in _USUAL else ""
+        raise InvalidInputError(f"{flag_of(flags[name])}: {rest}{usual}") from None
 
 
 def _read_plots(file: str, given: Given) -> Recording:

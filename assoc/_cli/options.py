@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from assoc._cli.inputs import read_toml
 from assoc._cli.lines import HelpFormatter
 from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
-from assoc._files.output import check_writable, is_stream
+from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._parameters import parameters_of
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
@@ -143,7 +143,12 @@ class Given(dict[str, Any]):
         new_folder : str, optional
             A folder that the program will create.
         """
-        taken = {_real_path(path) for path in (*inputs, *reserved) if path}
+        read = [path for path in inputs if path]
+        for path in read:
+            # said first: a wrong name explains most other errors
+            if path != STDOUT and not os.path.lexists(path):
+                raise InvalidInputError(f"{path}: no such file")
+        taken = {_real_path(path) for path in (*read, *reserved) if path}
         outputs = [*self.some(self.outputs).values(), *also]
         for path in outputs:
             if not path or is_stream(path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from assoc._files.output import STDOUT, is_stream
@@ -97,13 +97,14 @@ def position_on_earth(value: str, label: str) -> tuple[float, float, float]:
 
 
 class OneOf:
-    """One of several names, which shells can complete."""
+    """One of several names, which shells can complete; ``aliases`` are further names of some."""
 
-    def __init__(self, names: Iterable[str]) -> None:
-        self.names = tuple(names)
+    def __init__(self, names: Iterable[str], aliases: Mapping[str, str] | None = None) -> None:
+        self.names, self._aliases = tuple(names), aliases or {}
 
     def __call__(self, value: str, label: str) -> str:
         """Read a name."""
+        value = self._aliases.get(value.lower(), value)
         if value not in self.names:
             raise InvalidInputError(f"{label}: unknown name {value!r}; known: {', '.join(self.names)}")
         return value

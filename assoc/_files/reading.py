@@ -125,8 +125,10 @@ def read_bytes(path: FilePath, most: int = MOST_BYTES) -> bytes:
         return file.read()
 
 
-def read_lines(path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYTES) -> Iterator[str]:
-    """Yield the lines of a text file (UTF-8) one by one.
+def read_lines(
+    path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYTES, *, fallback: str = ""
+) -> Iterator[str]:
+    """Yield the lines of a text file (UTF-8; or of the encoding ``fallback``) one by one.
 
     Raises
     ------
@@ -144,7 +146,10 @@ def read_lines(path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYT
             try:
                 yield line.decode("utf-8-sig" if number == 1 else "utf-8")
             except UnicodeDecodeError:
-                raise InvalidInputError(f"{path}: line {number} is not UTF-8 text") from None
+                if not fallback:
+                    raise InvalidInputError(f"{path}: line {number} is not UTF-8 text") from None
+                # signs that it lacks are wrong anyway
+                yield line.decode(fallback, "replace")
 
 
 def check_regular(path: FilePath) -> None:

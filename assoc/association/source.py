@@ -61,7 +61,8 @@ def _is_table(path: str) -> bool:
         line = start.partition(b"\n")[0].decode("utf-8-sig")
     except (OSError, ValueError):  # ValueError: no text, or no name of a file
         return False
-    return line.replace("\t", " ").strip().isprintable() and any(line.count(mark) >= 2 for mark in ",;\t")
+    named = path.lower().endswith((".csv", ".tsv"))
+    return line.replace("\t", " ").strip().isprintable() and (named or any(line.count(mark) >= 2 for mark in ",;\t"))
 
 
 def warnings_of(source: Source) -> tuple[str, ...]:

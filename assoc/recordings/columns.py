@@ -16,14 +16,20 @@ FLIGHT_LEVEL = 30.48
 DAY = 86_400.0
 
 COLUMNS: dict[str, tuple[str, ...]] = {
-    "time": ("time", "timestamp"),
-    "range": ("range", "rho", "distance"),
-    "bearing": ("bearing", "theta"),
-    "mode3": ("mode3", "mode_3", "mode3a", "squawk", "identity"),
-    "altitude": ("altitude", "alt", "mode_c", "flight_level"),
+    "time": ("time", "timestamp", "datetime", "utc", "tod", "time_of_day"),
+    "range": ("range", "rho", "distance", "slant_range"),
+    "bearing": ("bearing", "theta", "azimuth", "az", "brg"),
+    "mode3": ("mode3", "mode_3", "mode3a", "squawk", "mode_a", "mode_3_a", "mode_3a", "ssr", "ssr_code", "identity"),
+    "altitude": ("altitude", "alt", "mode_c", "flight_level", "fl"),
     "aircraft": ("aircraft",),
 }
-"""Usual names by meaning, with or without a unit at the end: the first that the file has is taken."""
+"""Usual names by meaning, with or without a unit at the end: the first that the file has is taken.
+
+Upper case, spaces and other signs make no difference: ``Mode 3/A``, ``Range [NM]``.
+"""
+
+OCTAL = COLUMNS["mode3"][3:-1]
+"""Names of columns whose codes are written as pilots dial them, with octal digits."""
 
 REQUIRED = ("time", "range", "bearing")
 
@@ -35,11 +41,20 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Units of each column in metres and radians; for codes the base of their digits.
 
-The first is the default, for a column squawk the second.
+The first is the default, for the columns `OCTAL` the second.
 """
 
-_ENDINGS = {meaning: (*known, "nm") if meaning == "range" else tuple(known) for meaning, known in UNITS.items()}
+_ALIASES = {"nm": "nmi", "meters": "m", "metres": "m", "degrees": "deg", "radians": "rad", "feet": "ft", "octal": "oct"}
+_ENDINGS = {
+    meaning: {f"_{name}": unit for name, unit in [*zip(known, known, strict=True), *_ALIASES.items()] if unit in known}
+    for meaning, known in UNITS.items()
+}
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:\.\d{1,9})?)\Z")
+
+
+def plain_name(name: str) -> str:
+    """The name of a column in small letters and digits, with a _ between its words."""
+    return re.sub(r"[\W_]+", "_", name.strip().lower()).strip("_")
 
 
 def choose(
@@ -69,13 +84,13 @@ def choose(
             raise InvalidInputError(f"units: unknown meaning {meaning!r}; known: {', '.join(UNITS)}")
         if unit not in UNITS[meaning]:
             raise InvalidInputError(f"units: expected {' or '.join(UNITS[meaning])} for the {meaning}, got {unit!r}")
-    names = [name.strip().lower() for name in header]
+    names = [plain_name(name) for name in header]
     found_columns: dict[str, int] = {}
     chosen: dict[str, str] = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
     for meaning, usual in COLUMNS.items():
-        endings = {f"_{unit}": unit for unit in _ENDINGS.get(meaning, ())}
+        endings = _ENDINGS.get(meaning, {})
         if meaning in columns:
-            wanted = [columns[meaning].strip().lower()]
+            wanted = [plain_name(columns[meaning])]
         else:
             wanted = [name + ending for name in usual for ending in ("", *endings)]
         found = next((name for name in wanted if name in names), None)
@@ -89,10 +104,10 @@ def choose(
             raise InvalidInputError(f"the column {found!r} is there {names.count(found)} times")
         found_columns[meaning] = names.index(found)
         unit = next((unit for ending, unit in endings.items() if found.endswith(ending)), "")
-        if found == "squawk":
+        if found in OCTAL:
             unit = "oct"
         if unit:
-            chosen[meaning] = "nmi" if unit == "nm" else unit
+            chosen[meaning] = unit
     if len(set(found_columns.values())) < len(found_columns):
         raise InvalidInputError("columns: two meanings have the same column")
     return found_columns, {**chosen, **units}

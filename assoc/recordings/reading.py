@@ -19,7 +19,7 @@ from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
-from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, code, number, seconds, whole
+from assoc.recordings.columns import COLUMNS, DAY, REQUIRED, UNITS, choose, code, number, seconds, whole
 from assoc.recordings.recording import UNDECODED, Recording
 
 MAX_DISORDER = 30.0
@@ -43,7 +43,8 @@ def read_plots(
     """Read radar plots from a CSV file with a header line, or from the same table in a Parquet file.
 
     Needed are columns for time, range and bearing; Mode 3, altitude and (from a simulation) aircraft are read
-    where they are there. Separators are commas, semicolons or tabs.
+    where they are there. Separators are commas, semicolons or tabs; with the last two a comma may stand for the decimal
+    point. Text that is not UTF-8 is taken for Windows-1252.
 
     Parameters
     ----------
@@ -63,8 +64,8 @@ def read_plots(
     Returns
     -------
     Recording
-        In the order of time. Its notes count late rows (sorted in), repeated rows and rows of zeros (left out:
-        fillers, not plots), and midnights passed.
+        In the order of time. Its notes count late rows (sorted in), rows left out (repeated ones, those of zeros, which
+        are fillers, and those without a time, range or bearing), codes that are none, and midnights passed.
 
     Raises
     ------
@@ -74,7 +75,7 @@ def read_plots(
     file = Path(path)
     if not 0 <= max_disorder < math.inf:
         raise InvalidInputError(f"max_disorder: expected seconds >= 0, got {max_disorder!r}")
-    lines = _parquet_lines(file) if file.suffix.lower() == ".parquet" else read_lines(file)
+    lines = _parquet_lines(file) if file.suffix.lower() == ".parquet" else read_lines(file, fallback="cp1252")
     return _read(file, lines, columns or {}, units or {}, max_disorder, garbled_codes)
 
 
@@ -99,7 +100,7 @@ def _read(
     max_disorder: float,
     garbled_codes: Array | None,
 ) -> Recording:
-    head = next((line for line in lines), "")
+    head = next(lines, "")
     if not head.strip():
         raise InvalidInputError(f"{file}: has no header line, expected column names such as time,range,bearing")
     separator = max(",;\t", key=head.count)
@@ -110,7 +111,7 @@ def _read(
         raise InvalidInputError(f"{file}: line 1: {error}") from None
     except InvalidInputError as error:
         raise InvalidInputError(f"{file}: {error}") from None
-    table = _Table(file, columns_of, header, UNITS["mode3"][scales["mode3"]])
+    table = _Table(file, columns_of, header, UNITS["mode3"][scales["mode3"]], decimal="." if separator == "," else ",")
     rows = csv.reader(lines, delimiter=separator)
     try:
         for cells in rows:
@@ -123,14 +124,14 @@ def _read(
 class _Table:
     """Rows of the file as they come."""
 
-    def __init__(self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float) -> None:
+    def __init__(self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, decimal: str) -> None:
         self.file = file
         self.columns_of = columns_of
-        self.base = base
+        self.base, self.decimal = base, decimal
         self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
         self.values = {meaning: array("d") for meaning in COLUMNS}
         self.lines = array("q")
-        self.fillers = self.midnights = 0
+        self.fillers = self.midnights = self.blank = self.unread = 0
         self.clock: bool | None = None
         self.day = 0.0
         self.before = 0.0
@@ -141,7 +142,10 @@ class _Table:
             return
         row = {}
         for meaning, index in self.columns_of.items():
-            text = cells[index].strip() if index < len(cells) else ""
+            text = cells[index].strip().replace(self.decimal, ".") if index < len(cells) else ""
+            if not text and meaning in REQUIRED:
+                self.blank += 1
+                return
             try:
                 row[meaning] = self._value(meaning, text)
             except (ValueError, OverflowError):
@@ -171,7 +175,11 @@ class _Table:
             self.clock = clock
             return value
         if meaning == "mode3":
-            return float(code(text, self.base))
+            try:
+                return float(code(text, self.base))
+            except (ValueError, OverflowError):
+                self.unread += 1
+                return float(UNDECODED)
         if meaning == "aircraft":
             return float(whole(text)) if text else -1.0
         if meaning == "altitude" and not text:
@@ -194,9 +202,7 @@ class _Table:
         if meaning == "time":
             kind = {None: "seconds, h:mm:ss or an ISO date", True: "h:mm:ss", False: "seconds or an ISO date"}
             return kind[self.clock]
-        if meaning == "mode3" and self.base == 8:
-            return "up to four octal digits"
-        return "a whole number" if meaning in ("mode3", "aircraft") else "a number"
+        return "a whole number" if meaning == "aircraft" else "a number"
 
     def _error(self, line: int, meaning: str, expected: str, text: str) -> InvalidInputError:
         name = self.names[meaning]
@@ -209,18 +215,19 @@ class _Table:
         if unit != "m" and metres > _REACH:
             warn(
                 f"{self.file}: column {self.names['range']!r}: {farthest:.6g} {unit} are {metres / 1000:,.0f} km: "
-                "metres? (column range_m, or units={'range': 'm'})"
+                "metres? (name the column range_m, or set the unit of range to m)"
             )
         if units["bearing"] == "deg" and len(turned) >= _ENOUGH and np.ptp(turned) > 3.0 and turned.max() <= 6.2832:
             warn(
                 f"{self.file}: column {self.names['bearing']!r}: all within {turned.max():.3g} deg: radians? "
-                "(column bearing_rad, or units={'bearing': 'rad'})"
+                "(name the column bearing_rad, or set the unit of bearing to rad)"
             )
 
     def recording(self, units: Mapping[str, str], max_disorder: float, codes: Array | None) -> Recording:
         """Sort, leave out repeated rows, and convert units."""
         if not self.lines:
-            raise InvalidInputError(f"{self.file}: holds no plots")
+            why = f": {self.blank} rows have no time, range or bearing" if self.blank else ""
+            raise InvalidInputError(f"{self.file}: holds no plots{why}")
         columns = {meaning: np.array(values) for meaning, values in self.values.items()}
         lines = np.array(self.lines)
         latest = np.maximum.accumulate(columns["time"])
@@ -229,7 +236,7 @@ class _Table:
             row = int(np.argmax(late > max_disorder))
             raise InvalidInputError(
                 f"{self.file}: line {lines[row]}: the time jumps back by {late[row]:.6g} s, expected at most "
-                f"{max_disorder:g} s; split the file there, or allow more with max_disorder"
+                f"{max_disorder:g} s; split the file there (from Python: or allow more with max_disorder)"
             )
         order = np.argsort(columns["time"], kind="stable")
         # missing values are equal to one another only
@@ -255,6 +262,8 @@ class _Table:
                 "late plots sorted in": int((late > 0).sum()),
                 "repeated rows left out": len(order) - len(keep),
                 "rows of zeros left out": self.fillers,
+                "rows without time, range or bearing left out": self.blank,
+                "codes that are none": self.unread,
                 "midnights passed": self.midnights,
             },
             name=self.file.name,

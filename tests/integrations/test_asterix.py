@@ -199,7 +199,7 @@ def test_hostile_files(file, tmp_path):
             read_asterix(tmp_path / f"{k}.ast")
         except InvalidInputError as error:
             assert "\n" not in str(error)
-    with pytest.raises(InvalidInputError, match="cannot be read"):
+    with pytest.raises(InvalidInputError, match="no such file"):
         read_asterix(tmp_path / "none.ast")
     with pytest.raises(InvalidInputError, match=r"origin: latitude must be within .* \(degrees\?\)"):
         read_asterix(file, origin=(52.0, 13.0, 40.0))

@@ -4,6 +4,7 @@ import importlib
 import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,14 +12,17 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import assoc
 from assoc import simulate, solve, sweep, track
+from assoc._cli.track.options import make_tracker, read_options, track_parser
 from assoc._cli.values import cores, processes
 from assoc.errors import MissingExtraError
 from assoc.recordings import write_plots
+from assoc.simulation import simulate as simulate_scene
 from assoc.simulation import simulate_recording
 from assoc.solvers import registry
 from tests.sizes import sample
@@ -304,3 +308,42 @@ def test_other_shells(run, tmp_path):
         assert subprocess.run([zsh, "-n", str(tmp_path / "s")]).returncode == 0
     done = run("assoc", "completion", "tcsh")
     assert done.returncode == 2 and "expected one of bash, zsh, fish, got 'tcsh'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "said"),
+    [
+        (track, ["none.csv", "-o", "no/x.csv", "--cutoff", "3"], "none.csv: no such file"),
+        (solve, ["none.npz", "--json", "no/x.json"], "none.npz: no such file"),
+        (solve, ["junk.csv"], "junk.csv: is a table, .* 'assoc track'"),
+        (sweep, ["s.npz", "--solver", "aco", "--alpha", "2", "-o", "x"], "write --grid alpha=2"),
+        (sweep, ["s.npz", "--solver", "aco", "--rho=0.1", "-o", "x"], "write --grid rho=V1,V2"),
+        (track, ["fine.csv", "-o", "x.csv"], "--range-noise: the plots do not come in steps.*30 to 150 m"),
+        (track, ["few.csv", "-o", "x.csv"], r"--rotation: the rotation time .*: give it \(4 to 12 seconds are usual\)"),
+    ],
+)  # fmt: skip
+def test_errors_in_the_words_of_the_program(here, program, words, said, capsys):
+    (here / "junk.csv").write_text("a,b\n1,2\n")
+    rng = np.random.default_rng(1)
+    rows = [f"{t * 4 + b / 90},{r},{b}" for t in range(30) for r, b in rng.uniform([1, 0], [90, 360], (3, 2)).tolist()]
+    rows.sort(key=lambda row: float(row.partition(",")[0]))
+    (here / "fine.csv").write_text("\n".join(["time,range,bearing", *rows]))
+    (here / "few.csv").write_text("\n".join(["time,range,bearing", *rows[:3]]))
+    try:
+        code = program.main(words)
+    except SystemExit as ended:
+        code = ended.code
+    err = capsys.readouterr().err
+    assert code == 2 and re.search(said, err) and err.count("\n") == 1, err
+
+
+@pytest.mark.parametrize(
+    ("called", "name", "rule"),
+    [("jpda", "JointProb", None), ("TOMHT", "TrackOriented", None), ("gnn", "NearestNeighbour", "assignment")],
+)
+def test_other_names_of_trackers(called, name, rule):
+    given, settings = read_options(["s.npz", "-o", "x.csv", "--tracker", called], track_parser())
+    given["filter"] = "ekf"
+    scene = simulate_scene("three-radar", scans=1)
+    made = make_tracker(given["tracker"], scene.sensors, given, settings, scene.region)
+    assert given["rule"] == rule and type(made).__name__.startswith(name)

@@ -38,7 +38,7 @@ def test_from_tracks(run, tmp_path):
     assert assoc.Scene.load(tmp_path / "s.npz").num_scans == 5
     done = run("assoc.simulate", "from-tracks", tmp_path / "none.csv", "-o", tmp_path / "t.npz")
     assert done.returncode == 2
-    assert done.stderr.count("\n") == 1 and "none.csv: cannot be read" in done.stderr
+    assert done.stderr.count("\n") == 1 and "none.csv: no such file" in done.stderr
 
 
 def test_rotating_radar(run, tmp_path):

@@ -182,7 +182,7 @@ BAD = [
     (["--solver", "greedy", "--tune", "3"], "nothing to tune"),
     (["--target", "gap"], "only with --tune"),
     (["--gate-probability", "2"], "--gate-probability"),
-    (["--config", "missing.toml"], "missing.toml: cannot be read"),
+    (["--config", "missing.toml"], "missing.toml: no such file"),
     (["--summary", "study"], "--summary: runs nothing"),
     (["--solver", "aco", "-o", "/proc/nowhere"], "/proc/nowhere: cannot be made"),
     (["--solver", "aco", "-o", "a-file"], "is a file"),

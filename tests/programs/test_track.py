@@ -213,7 +213,7 @@ BAD = {
     "noise": (["SCENE", "--process-noise", "-1"], "--process-noise: expected a number >= 0"),
     "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
-    "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
+    "no steps": (["PLOTS"], "--range-noise: the plots do not come in steps"),
     "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, irregular, none"),
     "rotation without turns": (
         ["PLOTS", "--window", "none", "--rotation", "9"],

@@ -9,9 +9,10 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.options import COMMON, Given, Option, Parser, read_config, verbosity
+from assoc._cli.options import COMMON, Given, Option, Parser, flag_of, read_config, verbosity
 from assoc._cli.program import command
 from assoc._cli.values import OneOf, csv_table, html_page, scan_range, whole
+from assoc._parameters import parameters_of
 from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
@@ -77,7 +78,9 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
     """
     from assoc.solvers import registry
 
-    given = parser().read(words)
+    made = parser()
+    made.elsewhere = lambda: _of_grid(words)
+    given = made.read(words)
     for name, (package, extra) in _EXTRAS.items():
         if given[name] is not None:
             check_extra(package, extra)
@@ -95,6 +98,16 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
     _check_combinations(given, tables)
     _check_outputs(given, given["output"])
     return given, tables
+
+
+def _of_grid(words: Sequence[str]) -> dict[str, str]:
+    """How to give the parameters of solvers, by their flags."""
+    from assoc.solvers import registry
+
+    following = {word: value for word, value in zip(words, words[1:], strict=False) if not value.startswith("-")}
+    names = {parameter.name for name in registry.names() for parameter in parameters_of(registry.parameters(name))}
+    flags = {flag_of(name): name for name in names}
+    return {flag: f"--grid: write --grid {name}={following.get(flag, 'V1,V2')}" for flag, name in flags.items()}
 
 
 def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:

@@ -36,6 +36,12 @@ TRACKERS = {
     "nearest-neighbour": "assigns each measurement to the nearest track",
     "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
+_GNN = "gnn"
+_ALIASES = {
+    "jpda": "joint-probabilistic", "jipda": "joint-probabilistic", "tomht": "mht", "homht": "mht-hypothesis",
+    "nn": "nearest-neighbour", _GNN: "nearest-neighbour",
+}  # fmt: skip
+"""What else trackers are called."""
 FILTERS = ("imm-cv", "ekf", "kalman", "modified-ekf", "ukf", "enkf", "imm", "fuzzy")
 
 _OF_TRACKERS = (
@@ -52,7 +58,7 @@ _OF_TRACKERS = (
 )  # fmt: skip
 _OF_ALL = ("seed", "time_limit", "gate_probability")
 TRACKING = (
-    Option("tracker", "NAME", "name of the tracker, see below", kinds.OneOf(TRACKERS)),
+    Option("tracker", "NAME", "name of the tracker, see below", kinds.OneOf(TRACKERS, _ALIASES)),
     Option("solver", "NAME", "name of the solver (default exact)"),
     Option("filter", "NAME", f"{', '.join(FILTERS)} (default: imm-cv, for recorded plots ekf)", kinds.OneOf(FILTERS)),
     Option("process_noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)",
@@ -69,7 +75,7 @@ IDENTITY = Option(
     "NAME",
     "codes and addresses: use, to associate plots; score-only, to judge the tracks by them (default); or ignore",
     kinds.OneOf(("use", "score-only", "ignore")),
-    {"input": ("plots", "radars")},
+    {"input": ("plots",)},
 )
 # parameters of the life cycle that are only for some rule
 _LIFE_CYCLE = {
@@ -109,7 +115,7 @@ OF_PLOTS = (
     Option("window", "NAME",
            "how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by "
            "random intervals; none, one by one", kinds.OneOf(("ctw", "ctw-time", "irregular", "none")), _PLOTS),
-    IDENTITY,
+    replace(IDENTITY, only={"input": ("plots", "radars")}),
     Option("rates", "FILE", "write CT, MT and IT of each window (.csv; needs identities)", kinds.csv_table,
            {**_PLOTS, "identity": ("use", "score-only")}),
     Option("rotation", "S", "rotation period of the antenna, seconds (default: estimated)", kinds.seconds,
@@ -139,7 +145,7 @@ LIVE = (
     Option("replay", "X", "take the scene's own plots, X times as quickly as they were made (0: at once)",
            kinds.not_negative),
     Option("page", "PORT", "show the tracks moving on a page on 127.0.0.1 (0: any free port)", kinds.whole(0)),
-    Option("interval", "S", "seconds of plots that are taken in together (default 1)", kinds.number),
+    Option("interval", "S", "seconds of plots taken in together (default 1 or a quarter turn)", kinds.number),
     Option("turns", "S,...", "seconds for a turn of each radar's antenna (default: all measure at the same time)",
            kinds.listed(kinds.number)),
     Option("horizon", "S", "seconds that plots may be late (default 30)", kinds.number),
@@ -222,6 +228,9 @@ def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any
     elsewhere = parser.elsewhere
     parser.elsewhere = lambda: {**flags_of_solvers(solver), **elsewhere()}
     given = parser.read(words)
+    if _GNN in (word.rpartition("=")[2].lower() for word in words) and given["tracker"] == _ALIASES[_GNN]:
+        # global nearest neighbours: all at once
+        given["rule"] = given["rule"] or "assignment"
     values = {name: given.some(option.name for option in options) for name, options in further.items()}
     life_cycle = LifeCycle(**values["life_cycle"])
     given.check_use(further["life_cycle"], confirmation=life_cycle.confirmation, deletion=life_cycle.deletion)
