@@ -40,8 +40,8 @@ def test_a_sound_tracker_has_nis_and_nees_of_1_and_no_alarm(name):
     last = frame[frame["time"] == 59.0]
     assert len(last) == 3
     assert not set(last["track_id"]) & set(table.inconsistent()) and last["consistent"].all()
-    np.testing.assert_allclose(last["hits_1"] / 60, 0.9, atol=0.15)
-    np.testing.assert_allclose(last["hits_2"] / 60, 0.6, atol=0.2)
+    np.testing.assert_allclose(last["hits_1"] / (60 - last["started"]), 0.9, atol=0.15)
+    np.testing.assert_allclose(last["hits_2"] / (60 - last["started"]), 0.6, atol=0.2)
 
 
 def test_noise_of_twice_the_declared_raises_an_alarm():
