@@ -19,9 +19,10 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct, numbered
-from assoc.ranking.columns import AllColumns
+from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
+from assoc.ranking.tuple_bounds import tuple_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
+# intervals of the recursion up to this width need no listing
+_NARROW = 2e-9
 # share of the weight that sums may always lose to rounding
 _ROUNDING = 1e-12
 # a column this far above the solutions listed weighs nothing at any of these temperatures but the last, which counts
@@ -46,12 +49,11 @@ class Marginals(Shown):
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Weight of the solutions with this tuple, as a share of the k best of its cluster.
+        Best estimate between the bounds: from the k best of its cluster, or from the recursion where that is surer.
     lower, upper : float arrays, shape (T,)
         Bounds on the probability among all solutions.
     unseen : float
-        Largest possible share of the weight of the solutions beyond the k best, over all clusters: the width of the
-        widest interval.
+        The width of the widest interval.
     listed : int
         Number of solutions listed, over all clusters.
     """
@@ -78,7 +80,7 @@ class Marginals(Shown):
 @door
 @interruptible()
 def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
-    """Return the association probability of every tuple, from the k best solutions.
+    """Return the association probability of every tuple, by a recursion over measurements and the k best solutions.
 
     Parameters
     ----------
@@ -116,6 +118,10 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
 
     a = 1 gives the plain partition function, a = 0 the number of solutions times the weight of the next one; U is
     the least bound over several a.
+
+    With dummies ``ranking/tuple_bounds.py`` bounds each tuple by another way, a recursion over the measurements near
+    it, which does not weaken as scenes grow. The narrower bound counts, and where the recursion leaves no width
+    to speak of, nothing is listed.
     """
     checked_k(k)
     run = Run(0, time_limit=checked_time_limit(time_limit))
@@ -125,11 +131,16 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     # a ranking prepares its columns before it checks the clock, which takes about as long as all this did
     begin = run.runtime() / max(problem.num_tuples, 1)
     probability, lower, upper = np.ones((3, len(tuples)))
-    unseen, listed = 0.0, 0
+    listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
+    known = _by_recursion(problem, index, len(tuples), run)
     for cluster, which in _clusters(problem):
+        if known is not None and np.ptp(known[1:, index[which]], axis=0).max() <= _NARROW:
+            waiting[which] = False
+            probability[index[which]], lower[index[which]], upper[index[which]] = known[:, index[which]]
+            continue
         if run.should_stop() or run.remaining() < begin * len(which):
-            unseen, listed = 1.0, listed + 1
+            listed += 1
             _guess(problem, index[waiting], index, probability, lower, upper, run)
             break
         waiting[which] = False
@@ -137,13 +148,36 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
         clock = run if cluster is problem else run.part(0, run.time_limit)
         shares, share, count = _of_cluster(cluster, k, clock)
         listed += count
-        unseen = max(unseen, share)
         # a tuple that is listed twice is one tuple: each solution has it once, in either row
         touched, total = _totals(index[which], shares, len(tuples))
         probability[touched] = np.minimum(total, 1.0)
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
-    return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed)
+    if known is not None:
+        narrower = known[2] - known[1] < upper - lower
+        lower, upper = np.maximum(lower, known[1]), np.minimum(upper, known[2])
+        # the two kinds of bounds may meet at a point, but for rounding
+        upper = np.maximum(upper, lower)
+        probability = np.clip(np.where(narrower, known[0], probability), lower, upper)
+    return Marginals(
+        tuples.astype(np.int32), probability, lower, upper, float((upper - lower).max(initial=0.0)), listed
+    )
+
+
+def _by_recursion(problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run) -> Floats | None:
+    """Estimate and bounds of each distinct tuple by `tuple_bounds`, (3, T); None where it does not apply."""
+    if not problem.dummy:
+        return None
+    share = run.part(0, None if run.time_limit is None else 0.4 * run.time_limit)
+    columns = price_all_columns(problem, share)
+    found = tuple_bounds(columns, share)
+    if found is None:
+        return None
+    known = np.repeat([[0.0], [0.0], [1.0]], num, axis=1)
+    known[:, index[columns.origin]] = found.estimate, found.lower, found.upper
+    middle = 0.5 * (found.free_lower + found.free_upper)
+    known[:, index[columns.single]] = middle, found.free_lower, found.free_upper
+    return known
 
 
 def _guess(
