@@ -105,17 +105,20 @@ def _graph(cols: NDArray[np.int32], weights: Floats, num_rows: int) -> _Graph:
     of = cols[column, sensor]
     order = np.argsort(of, kind="stable")
     row, row_cols = of[order], column[order]
-    free, sums, part = np.full(num_rows, 0.5), np.ones(num_rows), np.zeros(len(row))
+    free: Floats = np.full(num_rows, 0.5)
+    sums: Floats = np.ones(num_rows)
+    part: Floats = np.zeros(len(row))
     for _ in range(_SWEEPS):
         product = weights.copy()
         for s in range(cols.shape[1]):
             used = cols[:, s] >= 0
             product[used] *= free[cols[used, s]]
-        part = product[row_cols] / free[row]
-        sums = 1.0 + np.bincount(row, part, num_rows)
-        free = np.maximum(np.sqrt(free / sums), 1e-300)
+        part[:] = product[row_cols] / free[row]
+        sums[:] = 1.0 + np.bincount(row, part, num_rows)
+        np.maximum(np.sqrt(free / sums), 1e-300, out=free)
     row_ptr = np.append(0, np.cumsum(np.bincount(row, minlength=num_rows)))
-    return _Graph(cols, weights, row_ptr, row_cols, part / sums[row], np.bincount(row, weights[row_cols], num_rows))
+    total = np.bincount(row, weights[row_cols], num_rows).astype(np.float64)
+    return _Graph(cols, weights, row_ptr, row_cols, part / sums[row], total)
 
 
 @njit
