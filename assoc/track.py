@@ -187,7 +187,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     elif given["map"] and scene.origin is None:
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     name, pace = given["tracker"] or "multi-sensor", pace_of(scene.times)
-    tracker = make_tracker(name, scene.sensors, given, settings, scene.region, pace)
+    tracker = make_tracker(name, scene.sensors, given, settings, scene.region, pace, scene)
     (tracks, decisions), count = _watched(
         given,
         tracker,

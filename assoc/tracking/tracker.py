@@ -32,6 +32,7 @@ from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
+from assoc.tracking.target_kinds import target_kind
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch
 
@@ -126,13 +127,24 @@ class Tracker:
         self.state = first_state(self.settings)
 
     @classmethod
-    def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
+    def for_scene(cls, scene: Scene, *arguments: Any, targets: str | None = None, **options: Any) -> Self:
         """A tracker for the sensors and the region of a scene; further arguments as for the class.
 
         Without a `filter`, the default one's process noise suits the pace of the scans.
+
+        Parameters
+        ----------
+        scene : Scene
+        targets : str, optional
+            What is tracked, a name of `assoc.tracking.target_kinds.TARGETS`, or "auto", which tries them: the prior of
+            speeds (without an `initiation`) and the default filter's process noise suit it.
         """
+        kind = None if targets is None else target_kind(targets, scene)
+        if kind is not None and options.get("initiation") is None:
+            options["initiation"] = Initiation(speed=kind.speed)
         if not arguments and options.get("filter") is None:
-            noise = manoeuvre_noise(pace_of(scene.times))
+            pace = pace_of(scene.times)
+            noise = manoeuvre_noise(pace) if kind is None else kind.noise(pace)
             options["filter"] = two_speeds(noise, unscented=open_heights(scene.sensors))
         return cls(scene.sensors, *arguments, region=scene.region, **options)
 

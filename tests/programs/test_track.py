@@ -211,6 +211,11 @@ BAD = {
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
     "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
     "noise": (["SCENE", "--process-noise", "-1"], "--process-noise: expected a number >= 0"),
+    "targets": (["SCENE", "--targets", "boat"], "--targets: unknown name 'boat'; known: airliner, fighter, ship"),
+    "targets of plots": (
+        ["PLOTS", "--range-noise", "9", "--bearing-noise", "1", "--targets", "auto"],
+        "auto needs a scene",
+    ),
     "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "--range-noise: the plots do not come in steps"),
@@ -385,3 +390,8 @@ def test_tracks_that_do_not_agree_with_their_measurements_are_listed(tmp_path, c
     worst = {int(one) for one in re.findall(r"(\d+) \(", listed[1])}
     assert worst <= set(table["track_id"][~table["consistent"]])
     assert "hits by sensor" in report.read_text()
+
+
+def test_priors_of_what_is_tracked(scene_file, tmp_path, capsys):
+    assert track.main([str(scene_file), "--targets", "auto", "-o", str(tmp_path / "tracks.csv")]) == 0
+    assert pd.read_csv(tmp_path / "tracks.csv").track_id.nunique() == 3

@@ -25,6 +25,7 @@ from assoc._cli.options import (
 from assoc._cli.program import command
 
 if TYPE_CHECKING:
+    from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker
 
@@ -42,6 +43,7 @@ _ALIASES = {
     "nn": "nearest-neighbour", _GNN: "nearest-neighbour",
 }  # fmt: skip
 """What else trackers are called."""
+TARGETS = ("airliner", "fighter", "ship", "drone", "pedestrian")
 FILTERS = ("imm-cv", "ekf", "kalman", "modified-ekf", "ukf", "enkf", "imm", "fuzzy")
 
 _OF_TRACKERS = (
@@ -61,6 +63,9 @@ TRACKING = (
     Option("tracker", "NAME", "name of the tracker, see below", kinds.OneOf(TRACKERS, _ALIASES)),
     Option("solver", "NAME", "name of the solver (default exact)"),
     Option("filter", "NAME", f"{', '.join(FILTERS)} (default: imm-cv, for recorded plots ekf)", kinds.OneOf(FILTERS)),
+    Option("targets", "NAME",
+           f"what is tracked, for the priors of speed and noise: {', '.join(TARGETS)}, or auto (of a scene)",
+           kinds.OneOf((*TARGETS, "auto"))),
     Option("process_noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)",
            kinds.not_negative),
     Option("no_adapt", "", "keep to the noise, detection probabilities and false alarms that are declared"),
@@ -278,8 +283,9 @@ def make_tracker(
     settings: dict[str, Any],
     region: Any,
     pace: float = 1.0,
+    scene: Scene | None = None,
 ) -> Tracker:
-    """Make the tracker that the options describe.
+    """Make the tracker that the options describe; `scene` is for ``--targets auto``.
 
     Raises
     ------
@@ -288,9 +294,17 @@ def make_tracker(
     """
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
+    from assoc.tracking.target_kinds import target_kind
 
     parsed.check_use(_OF_TRACKERS, tracker=name)
-    made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace, region)
+    noise = parsed["process_noise"]
+    if parsed["targets"] is not None:
+        kind = target_kind(parsed["targets"], scene)
+        if noise is None:
+            noise = kind.acceleration if parsed["filter"] in ("imm", "fuzzy") else kind.noise(pace)
+        if parsed["speed"] is None:
+            settings = settings | {"initiation": replace(settings["initiation"], speed=kind.speed)}
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace, region)
     of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
     adapt = not parsed["no_adapt"]
     return KINDS[name](sensors, made, region=region, adapt=adapt, **settings, **of_tracker)

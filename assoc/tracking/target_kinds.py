@@ -1,0 +1,66 @@
+"""Kinds of targets by name: how fast they are and how they manoeuvre, for the priors of trackers."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from assoc.errors import InvalidInputError
+from assoc.scene.scene import Scene
+
+# the first scans, by which "auto" decides
+_SCANS = 50
+
+
+class TargetKind(NamedTuple):
+    """Priors that suit a kind of target."""
+
+    speed: float
+    """Standard deviation of the velocity along an axis, m/s; see `assoc.tracking.Initiation`."""
+    acceleration: float
+    """In a manoeuvre, m/s^2."""
+    duration: float
+    """Seconds for which a manoeuvre lasts."""
+
+    def noise(self, pace: float) -> float:
+        """Process noise for scans `pace` seconds apart, m/s^1.5: a manoeuvre's change of velocity from scan to scan."""
+        return self.acceleration * self.duration / math.sqrt(max(pace, self.duration))
+
+
+TARGETS = {
+    "airliner": TargetKind(150.0, 4.0, 10.0),
+    "fighter": TargetKind(300.0, 50.0, 1.0),
+    "ship": TargetKind(5.0, 0.2, 5.0),
+    "drone": TargetKind(12.0, 5.0, 2.0),
+    "pedestrian": TargetKind(1.5, 1.0, 1.0),
+}
+"""Kinds by name: turns of 25 degrees of bank, of 5 g, of a rudder, of 0.5 g, and steps aside."""
+
+
+def target_kind(name: str, scene: Scene | None = None) -> TargetKind:
+    """The kind of this name; "auto" is the one that makes the best tracks of a scene's first scans.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no such kind, or no scene for "auto".
+    """
+    if name != "auto":
+        if name not in TARGETS:
+            raise InvalidInputError(f"targets: unknown name {name!r}; known: {', '.join(TARGETS)}, auto")
+        return TARGETS[name]
+    if scene is None:
+        raise InvalidInputError(f"targets: auto needs a scene; name one of {', '.join(TARGETS)}")
+    evidence = {kind: _evidence(scene, kind) for kind in TARGETS}
+    return TARGETS[max(evidence, key=lambda kind: evidence[kind])]
+
+
+def _evidence(scene: Scene, name: str) -> float:
+    """Sum of the scores of the confirmed tracks: how much likelier the measurements are with these targets."""
+    from assoc.tracking.associate.nearest_neighbour import NearestNeighbourTracker
+
+    tracker = NearestNeighbourTracker.for_scene(scene, targets=name)
+    for k in range(min(scene.num_scans, _SCANS)):
+        scan = scene.scan(k)
+        tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    return sum(track.score for track in tracker.tracks if track.confirmed)
