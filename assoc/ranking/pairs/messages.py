@@ -31,15 +31,31 @@ from assoc.ranking.pairs.graph import PairGraph
 
 _ROUNDS, _SETTLED = 200, 1e-10
 """Belief propagation ends after this many rounds, or when messages change by less than this."""
+_FAINT = 1e-290
+"""Sums relative to their largest term below this have lost digits."""
 
 
 @njit
 def next_round(graph: PairGraph, log_weight: Floats, incoming: Floats, outgoing: Floats) -> None:
-    """Compute all outgoing messages from the incoming ones."""
+    """Compute all outgoing messages from the incoming ones: sums of all terms but one, from both ends of the list."""
     ptr, edge, mate = graph.ptr, graph.edge, graph.mate
     for v in range(ptr.size - 1):
+        top = 0.0
         for x in range(ptr[v], ptr[v + 1]):
-            outgoing[x] = -_log_one_and(ptr[v], ptr[v + 1], x, edge, mate, log_weight, incoming)
+            top = max(top, log_weight[edge[x]] + incoming[mate[x]])
+        total = math.exp(-top)
+        for x in range(ptr[v], ptr[v + 1]):
+            outgoing[x] = total
+            total += math.exp(log_weight[edge[x]] + incoming[mate[x]] - top)
+        total = 0.0
+        for x in range(ptr[v + 1] - 1, ptr[v] - 1, -1):
+            others = outgoing[x] + total
+            total += math.exp(log_weight[edge[x]] + incoming[mate[x]] - top)
+            if others > _FAINT:
+                outgoing[x] = -(top + math.log(others))
+            else:
+                # beside the largest term the others are lost
+                outgoing[x] = -_log_one_and(ptr[v], ptr[v + 1], x, edge, mate, log_weight, incoming)
 
 
 @njit
