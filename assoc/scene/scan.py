@@ -33,6 +33,9 @@ class Scan:
         Mode 3/A code and ICAO address of each measurement, 0 where it has none.
     paths : tuple over sensors of Platform or None
         Where sensors were that moved while they measured; see `aligned`.
+    clutter : tuple over sensors of arrays (n_s,), or None
+        Logarithm of the density of false alarms at each measurement, relative to that of its sensor; None: the same
+        everywhere. Trackers that adapt find it.
     """
 
     index: int
@@ -45,6 +48,7 @@ class Scan:
     sectors: Array | None = None
     identities: tuple[Array, ...] | None = None
     paths: tuple[Platform | None, ...] = ()
+    clutter: tuple[Array, ...] | None = None
 
     @property
     def sizes(self) -> Array:
@@ -78,6 +82,17 @@ class Scan:
             for sensor, late in zip(sensors, moved, strict=True)
         )
         return replace(self, measurements=found, paths=paths)
+
+    def crowding(self, rows: Array) -> Array:
+        """Sum of the measurements' `clutter` for tuples (K, S) of 1-based measurements, 0 for none; (K,)."""
+        total = np.zeros(len(rows))
+        for s, clutter in enumerate(self.clutter or ()):
+            total += np.append(0.0, clutter)[rows[:, s]]
+        return total
+
+    def crowd(self, s: int, numbers: Array) -> Array:
+        """The `clutter` of measurements of sensor s (numbers from 0), (K,)."""
+        return np.zeros(len(numbers)) if self.clutter is None else self.clutter[s][numbers]
 
     def true_tuples(self) -> NDArray[np.int32] | None:
         """The tuples of the targets that at least two sensors detected.

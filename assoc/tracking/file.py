@@ -18,6 +18,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
+from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
@@ -105,6 +106,8 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= state.identities.arrays()
     if state.estimates is not None:
         found |= {f"estimates.{name}": np.array(value) for name, value in state.estimates._asdict().items()}
+    if state.clutter is not None:
+        found |= {f"clutter.{name}": value for name, value in state.clutter.arrays().items()}
     if settings.nursery is not None and state.nursery is not None:
         inner, unseen = state.nursery
         found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, inner).items()}
@@ -134,6 +137,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         registration=None if model.registration is None else model.registration.restored(saved),
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
+        clutter=None if model.clutter is None else _clutter(model.clutter, saved.part("clutter.")),
     )  # fmt: skip
     state = state._replace(own=settings.method.restored(settings, saved, state))
     if settings.nursery is None or model.nursery is None:
@@ -162,6 +166,21 @@ def _estimates(model: Estimates, saved: Saved) -> Estimates:
     saved.require((np.linalg.eigvalsh(saved["weights"]) > 0).all(), "weights", "a positive definite matrix")
     arrays: dict[str, Any] = {**saved, "manoeuvres": float(saved["manoeuvres"])}
     return Estimates(**arrays)
+
+
+def _clutter(model: ClutterMap, saved: Saved) -> ClutterMap:
+    """The clutter map in these arrays, checked."""
+    for name, value in saved.items():
+        saved.require(np.isfinite(value).all(), name, "finite numbers")
+    good = saved["clock"].shape == model.clock.shape
+    saved.require(good, "clock", f"turns of {len(model.clock)} sensors")
+    for s, places in enumerate(model.places):
+        count, width = len(saved[f"places.{s}"]), places.shape[1]
+        saved.require(saved[f"places.{s}"].shape[1] == width, f"places.{s}", f"rows of {width} components")
+        clocks = saved[f"clocks.{s}"]
+        good = clocks.shape == (count,) and (np.diff(clocks) >= 0).all() and (clocks <= saved["clock"][s]).all()
+        saved.require(good, f"clocks.{s}", f"{count} turns that do not descend")
+    return model.restored(saved)
 
 
 def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
+from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import Estimates
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.identity_evidence import Identities
@@ -40,6 +41,8 @@ class TrackerState(NamedTuple):
     identities: Identities | None = None
     estimates: Estimates | None = None
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
+    clutter: ClutterMap | None = None
+    """Where false alarms come from; None where the tracker does not adapt."""
     nursery: Nursery | None = None
     rng: Any = None
     """State of the filter's random generator, if it has one."""
@@ -68,6 +71,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         registration=settings.registration,
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,
+        clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
         nursery=nursery,
         rng=rng_of(settings),
     )

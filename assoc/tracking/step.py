@@ -177,7 +177,7 @@ def _timed(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TimedS
     return TimedScan(
         settings.filter, state.tracks.states, before, scan.measurements, scan.own_times(), settings.sensors,
         settings.births.places(scan), start, scan.sectors, settings.gate_probability, scan.time,
-        _evidence(state, scan), scan.paths,
+        _evidence(state, scan), scan.paths, scan.clutter,
     )  # fmt: skip
 
 

@@ -33,7 +33,8 @@ def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
     scene = simulation.simulate("rotating-radars", seed, aircraft=aircraft, turns=turns, duration=duration)
 
     def make() -> MultiSensorTracker:
-        return MultiSensorTracker(scene.sensors, two_speeds(manoeuvre_noise(min(TURNS))), region=scene.region)
+        filter = two_speeds(manoeuvre_noise(min(TURNS)))
+        return MultiSensorTracker(scene.sensors, filter, region=scene.region, adapt=True)
 
     tracker = LiveTracker(scene, make, interval=INTERVAL, turns=TURNS, tell=lambda line: None)
     tracker.warm_up()

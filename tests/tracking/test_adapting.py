@@ -10,9 +10,13 @@ from assoc._files.npz import save_npz
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
+from assoc.scene.own_times import looked_at
+from assoc.scene.scan import Scan
+from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS
+from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
@@ -162,6 +166,74 @@ def test_a_file_of_a_tracker_that_does_not_adapt_is_refused(tmp_path):
     TRACKERS["mht"].for_scene(scene).save(tmp_path / "state.npz")
     with pytest.raises(InvalidInputError, match="adapt was 'None', is 'True'"):
         TRACKERS["mht"].for_scene(scene, adapt=True).restore(tmp_path / "state.npz")
+
+
+def with_returns(scene, count, seed):
+    """The scene with plots of each radar from one patch of 3 x 3 km in every scan."""
+    rng, low = np.random.default_rng(seed), np.array([14e3, -17e3, 0.0])
+    more = [
+        [sensor.measure(rng.uniform(low, low + [3e3, 3e3, 200.0], (count, 3))) for sensor in scene.sensors]
+        for _ in scene.times
+    ]
+    both = [
+        [np.concatenate(pair) for pair in zip(scan, added, strict=True)]
+        for scan, added in zip(scene.measurements, more, strict=True)
+    ]
+    return Scene(scene.sensors, scene.times, both, scene.region)
+
+
+def in_patch(tracker):
+    """Reported tracks in the patch."""
+    where = np.array([track.position for track in tracker.tracks if track.reported])[:, :2]
+    return int((np.abs(where - [15.5e3, -15.5e3]) < 2e3).all(axis=1).sum())
+
+
+@sample("name", sorted(TRACKERS), every=3)
+def test_no_track_stays_where_clutter_is_dense(name):
+    scene = with_returns(scene_of(radars(), 7, scans=15), 10, 1)
+    told = TRACKERS[name].for_scene(scene)
+    for k in range(scene.num_scans):
+        told.step(scene.times[k], scene.measurements[k])
+    assert in_patch(told) > 4
+    tracker = tracked(scene, radars(), name)
+    assert in_patch(tracker) == 0
+    assert sum(track.reported for track in tracker.tracks) == TARGETS
+    assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
+
+
+def test_the_clutter_of_turning_radars_has_places():
+    whole = simulation.simulate("rotating-radars", 2, duration=60.0)
+    rng, low = np.random.default_rng(3), np.array([14e3, -17e3, 0.0])
+    told, tracker = (TRACKERS["nearest-neighbour"].for_scene(whole, adapt=adapt) for adapt in (False, True))
+    for k in range(whole.num_scans):
+        scan, measurements, times = whole.scan(k), [], []
+        for s, sensor in enumerate(whole.sensors):
+            z = sensor.measure(rng.uniform(low, low + [3e3, 3e3, 200.0], (10, 3)))
+            z = z[looked_at(scan.sectors[s], z[:, 1])]
+            measurements.append(np.concatenate([scan.measurements[s], z]))
+            times.append(np.append(scan.times[s], np.full(len(z), scan.time)))
+        for one in (told, tracker):
+            one.step(scan.time, measurements, times, scan.sectors)
+    # one aircraft flies there
+    assert in_patch(told) > 10 and in_patch(tracker) <= 2
+
+
+def test_density_of_clutter_by_place():
+    """Several plots a turn from a patch are as dense as they are; one a turn may be a target."""
+    rng, sensor = np.random.default_rng(5), PositionSensor(
+        position=np.zeros(3), noise=[1.0, 1.0], false_alarm_rate=1.0, field_of_view=[[0.0, 1e3], [0.0, 1e3]]
+    )  # fmt: skip
+    empty, turns = ClutterMap.empty([sensor]), np.ones(1)
+    patch, alone = empty, empty
+    for k in range(30):
+        plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, 1e3, (1, 2))])
+        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns)
+        alone = alone.after([sensor], Scan(k, float(k), (rng.normal(25.0, 1.0, (1, 2)),)), turns)
+    there = Scan(30, 30.0, (np.array([[25.0, 25.0], [700.0, 700.0]]),))
+    inside, outside = patch.densities([sensor], there)[0]
+    # five in 50 x 50 m against one in 1000 x 1000 m
+    assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
+    assert not alone.densities([sensor], there)[0].any()
 
 
 def test_a_tracker_that_does_not_adapt_has_no_health():

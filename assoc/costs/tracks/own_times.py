@@ -59,7 +59,7 @@ class Followed(NamedTuple):
     lead: Array
     """Sensor whose measurement started the track, (M,); -1 for an existing track."""
     log_likelihood: Array
-    """Of all measurements but the lead's, (M,)."""
+    """Of all measurements but the lead's, less their `clutter`, (M,)."""
     inside: Array
     """Whether each measurement passed its gate, bool (M,)."""
 
@@ -112,6 +112,8 @@ class TimedScan:
         together.
     paths : sequence over sensors of Platform or None, optional
         Of sensors that moved since the last scan; they are given as they stand at its end.
+    clutter : sequence over sensors of arrays (n_s,), optional
+        See `assoc.scene.Scan`.
     """
 
     def __init__(
@@ -129,9 +131,10 @@ class TimedScan:
         end: float,
         evidence: PairEvidence | None = None,
         paths: Sequence[Platform | None] = (),
+        clutter: Sequence[Array] | None = None,
     ) -> None:
         self.paths = paths or (None,) * len(sensors)
-        self.evidence = evidence
+        self.evidence, self.clutter = evidence, clutter
         self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
         self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
         self.measurements, self.times, self.start, self.sectors = measurements, times, start, sectors
@@ -183,6 +186,8 @@ class TimedScan:
                 done = self.filter.update(moved, z, sensor)
                 states, when[here] = _put(states, here, done.state), now
                 log_likelihood[here] += done.log_likelihood
+                if self.clutter is not None:
+                    log_likelihood[here] -= self.clutter[s][rows[here, s] - 1]
                 inside[here] &= done.nis <= self.gates[s]
                 if self.evidence is not None:
                     known = here[track[here] >= 0]

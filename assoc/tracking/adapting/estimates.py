@@ -87,7 +87,9 @@ class Estimates(NamedTuple):
         P, rate = declared_values(sensors).T[1:]
         dwells, alarms = self.dwells + _DWELLS, self.alarms + _SCANS * rate
         seen = (self.hits + _DWELLS * P) / dwells
-        values = [self.factors[:-1], seen, alarms / (self.turns + _SCANS)]
+        # beside a filter's cautious predictions alone, noise looks smaller than it is
+        factors = self.factors[:-1] if len(sensors) > 1 else np.maximum(self.factors[:-1], 1.0)
+        values = [factors, seen, alarms / (self.turns + _SCANS)]
         spreads = [self.spreads[:-1], 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
         return np.stack(values, axis=1), np.stack(spreads, axis=1)
 
@@ -140,6 +142,8 @@ class Estimates(NamedTuple):
     def settled(self, sensors: Sequence[Sensor]) -> Estimates:
         """The estimates with what is to be used from now on."""
         found, spreads = self.found(sensors)
+        # less noise than declared does no harm
+        found[:, NOISE] = np.maximum(found[:, NOISE], 1.0)
         S, noise = len(sensors), self.used[:, NOISE]
         declared = declared_values(sensors)
         choice = _choice(_scales(self.used), _scales(declared), _scales(found), spreads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from assoc.costs.tracks.tuples import gate_of
 from assoc.filters.base import Expected, predict_each
 from assoc.filters.imm import Mixture
 from assoc.scene.own_times import FULL_TURN
+from assoc.tracking.adapting.estimates import ALARMS, declared_values
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.looks import dwells
@@ -23,9 +25,15 @@ _WIDER, _FALSE = 4.0, 0.05
 
 
 def use_estimates(progress: Progress) -> Progress:
-    """Stage: go on with the settings that the estimates suggest."""
-    assert progress.state.estimates is not None
-    return progress._replace(settings=in_use(progress.settings, progress.state.estimates))
+    """Stage: go on with the settings that the estimates suggest, and with the density of false alarms by place."""
+    estimates, clutter = progress.state.estimates, progress.state.clutter
+    assert estimates is not None and clutter is not None
+    settings = in_use(progress.settings, estimates)
+    # units of noise as declared: places are kept in them
+    densities = clutter.densities(progress.settings.sensors, progress.scan)
+    shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
+    densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
+    return progress._replace(settings=settings, scan=replace(progress.scan, clutter=densities))
 
 
 def remember_tracks(progress: Progress) -> Progress:
@@ -46,24 +54,33 @@ def learn(progress: Progress) -> Progress:
     rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
     if len(tracks):
         _seek(progress, late, rows, looks)
-    hits = rows > 0
-    sectors = progress.scan.sectors
-    turns = np.ones(len(settings.sensors)) if sectors is None else (sectors[:, 1] - sectors[:, 0]) / FULL_TURN
-    sure = dict(zip(state.tracks.track_id.tolist(), _certainty(state.tracks).tolist(), strict=True))
-    alarms = np.array([sum(1.0 - sure.get(i, 0.0) for i in ids.tolist()) for ids in step.assigned])
+    # tracks in dense clutter tell little of sensors
+    plain = progress.scan.crowding(rows) == 0.0
+    hits = (rows > 0) & plain[:, None]
+    looks = hits | (looks & plain[:, None])
+    turns, crowds = _turns(progress), progress.scan.clutter or ()
+    # where false alarms are dense they are no part of the usual ones
+    usual = zip(step.confirmed, crowds, strict=True)
+    alarms = np.array([np.count_nonzero(~taken & (crowd == 0.0)) for taken, crowd in usual])
     # before tracks are confirmed, targets look like false alarms
     if state.scan >= 3:
         estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
-    estimates = estimates.counted(tracks.track_id, looks | hits, hits)
+    estimates = estimates.counted(tracks.track_id, looks, hits)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
     if len(fresh):
         estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
     declared = progress.work.settings.sensors
-    return progress.with_state(estimates=estimates.forgotten(turns).settled(declared))
+    assert state.clutter is not None
+    clutter = state.clutter.after(declared, progress.scan, turns)
+    return progress.with_state(estimates=estimates.forgotten(turns).settled(declared), clutter=clutter)
 
 
-def _certainty(tracks: TrackBatch) -> Array:
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(tracks.score, -30.0, 30.0))))
+def _turns(progress: Progress) -> Array:
+    """Turns of each sensor in the scan, (S,)."""
+    sectors = progress.scan.sectors
+    if sectors is None:
+        return np.ones(len(progress.settings.sensors))
+    return np.asarray((sectors[:, 1] - sectors[:, 0]) / FULL_TURN)
 
 
 def _rows(progress: Progress, ids: Array) -> Array:

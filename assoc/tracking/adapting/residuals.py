@@ -1,8 +1,8 @@
 """Residuals of measurements of confirmed tracks, and whose variances they show.
 
 A sensor's measurement is compared with the position that the other sensors of the scan give; so the target's motion
-does not matter. Where there is no other, it is compared with the prediction of each of the filter's models, by their
-probabilities. The variance of a residual is a sum of parts, each proportional to the variance of one sensor's noise or
+does not matter. Where there is no other, it is compared with the prediction of the filter's quietest model, by its
+probability. The variance of a residual is a sum of parts, each proportional to the variance of one sensor's noise or
 of the process noise of the model that manoeuvres.
 """
 
@@ -60,7 +60,7 @@ def variances(
     noise : array (S,)
         Factors of the noise's variances in use.
     """
-    T, M, n = predicted.offsets.shape
+    T, _, n = predicted.offsets.shape
     S = len(sensors)
     matrix, right = np.zeros((S + 1, S + 1)), np.zeros(S + 1)
     prior = np.linalg.inv(predicted.covariance)
@@ -93,6 +93,8 @@ def variances(
     fit += np.log(np.einsum("tmii->tmi", factor)).sum(axis=2)
     weights = np.exp(fit - fit.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
+    size = np.einsum("tmii->m", predicted.covariances)
+    quiet, m = int(np.argmin(size)), int(np.argmax(size))
     for s, (track, H, y) in enumerate(rows):
         alone = count[track] == 1
         beside = np.flatnonzero(~alone)
@@ -108,14 +110,13 @@ def variances(
             known = _diagonal(gain, _BESIDE**2 * prior[t])
             rest = y[beside] - _times(gain, vectors[:, t].sum(axis=0) - vectors[s, t])
             _add(matrix, right, shares, known, rest**2, np.ones(len(t)), _MOST)
-        for m in range(M if alone.any() else 0):
+        if alone.any():
             t, h = track[alone], H[alone]
             shares = np.zeros((*y[alone].shape, S + 1))
             shares[..., s] = noise[s]
-            rest = y[alone] - _times(h, predicted.offsets[t, m])
-            _add(matrix, right, shares, _diagonal(h, predicted.covariances[t, m]), rest**2, weights[t, m], _MOST)
-    # the model that manoeuvres most
-    m = int(np.argmax(np.einsum("tmii->m", predicted.covariances)))
+            rest = y[alone] - _times(h, predicted.offsets[t, quiet])
+            known = _diagonal(h, predicted.covariances[t, quiet])
+            _add(matrix, right, shares, known, rest**2, weights[t, quiet], _MOST)
     shares = np.zeros((T, n, S + 1))
     shares[..., S] = _diagonal(factor[:, m], predicted.covariances[:, m])
     _add(matrix, right, shares, 1.0 - shares[..., S], white_off[:, m] ** 2, weights[:, m], _HARDEST)

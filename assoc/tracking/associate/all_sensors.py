@@ -70,7 +70,7 @@ def _begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
     states = settings.initiation.start(settings.filter, positions, covariances)
     costs = tuple_costs(settings.place, scan, rows, speed=settings.initiation.speed)
     costs -= settings.births.overlooked(rows, positions, covariances)
-    score = settings.births.scores(rows, costs, positions, covariances)
+    score = settings.births.scores(rows, costs, positions, covariances) - scan.crowding(rows)
     return TrackBatch.new(states, progress.work.new_ids(len(order)), score, scan.time), rows
 
 

@@ -208,7 +208,10 @@ def _by_value(scan: Scan, orders: list[Array]) -> Scan:
 
     measurements = sort(scan.measurements)
     assert measurements is not None
-    return replace(scan, measurements=measurements, times=sort(scan.times), identities=sort(scan.identities))
+    return replace(
+        scan, measurements=measurements, times=sort(scan.times), identities=sort(scan.identities),
+        clutter=sort(scan.clutter),
+    )  # fmt: skip
 
 
 def _batch(before: TrackBatch, growth: Growth, grown: Grown, ids: Array, gained: Array) -> TrackBatch:

@@ -31,7 +31,7 @@ class MultiSensor(Method):
             missed,
             gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
         )  # fmt: skip
-        gain = -tuples.costs
+        gain = -tuples.costs - scan.crowding(tuples.rows)
         value = doubted_gain(tracks.score[tuples.track], gain)
         rows, costs = _new_targets(progress)
         known = np.column_stack([tuples.track + 1, tuples.rows])

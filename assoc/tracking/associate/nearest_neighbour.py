@@ -45,7 +45,7 @@ class NearestNeighbour(Method):
         for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
             gate = gate_of(sensor, settings.gate_probability)
             pairs = track_pairs(settings.filter, tracks.states, z, sensor, gate)
-            gain = settings.terms.detection[s] + pairs.log_likelihood
+            gain = settings.terms.detection[s] + pairs.log_likelihood - progress.scan.crowd(s, pairs.measurement)
             missed = misses_of(progress, tracks.states, s)
             chosen = self._choose(progress, pairs.track, pairs.measurement, gain, missed, tracks.score, len(z))
             hit = np.zeros(len(tracks), dtype=np.bool_)
@@ -56,7 +56,7 @@ class NearestNeighbour(Method):
             states = _corrected(tracks, pairs, chosen, hit)
             tracks = tracks.scored(states, missed, np.where(hit, time, np.nan))
             free = np.flatnonzero(ids == 0)
-            states, fit, positions, score = settings.births.singles(s, z[free])
+            states, fit, positions, score = settings.births.singles(s, progress.scan, free)
             free = free[fit]
             order = np.lexsort(positions.T)
             ids[free[order]] = new = progress.work.new_ids(len(free))

@@ -96,6 +96,7 @@ def _pairs(progress: Progress, fused: Array, missed: Array) -> tuple[Array, Arra
     track, which = track[order], which[order]
     require_states(states, len(track))
     corrected, costs = states[track], np.full(len(track), 0.0)
+    costs += progress.scan.crowding(fused[which])
     nis, freedom = np.zeros(len(track)), np.zeros(len(track), dtype=np.int64)
     for s, (z, sensor) in seen_by:
         seen = np.flatnonzero(fused[which, s] > 0)

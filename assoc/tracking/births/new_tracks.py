@@ -90,12 +90,16 @@ class NewTracks:
     def problem(self, scan: Scan) -> AssignmentProblem:
         """Candidate tuples of a scan, regardless of tracks.
 
-        Costs are those of `build_problem`, but that a sensor misses only what it can see.
+        Costs are those of `build_problem`, but that a sensor misses only what it can see, and that false alarms are
+        as dense at each measurement as they are there.
         """
         problem = build_problem(self._place, scan, speed=self._initiation.speed, blind=self._blind, **self._limits)
-        if not self._blind.any() or not scan.at_once:
+        views = self._blind.any() and scan.at_once
+        if not views and scan.clutter is None:
             return problem
-        costs = problem.costs - self.overlooked(problem.tuples, *self.fused(scan, problem.tuples)[:2])
+        costs = problem.costs + scan.crowding(problem.tuples)
+        if views:
+            costs -= self.overlooked(problem.tuples, *self.fused(scan, problem.tuples)[:2])
         return AssignmentProblem(problem.tuples[costs < 0], costs[costs < 0], problem.sizes)
 
     def overlooked(self, rows: Array, positions: Array, covariances: Array) -> Array:
@@ -114,14 +118,15 @@ class NewTracks:
         alone = seen @ self._terms.birth + ~seen @ self._terms.miss + self.overlooked(rows, positions, covariances)
         return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
 
-    def singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
-        """New tracks of single measurements (n, d) of sensor s: states, mask of those used, positions, scores."""
-        positions, covariances = single_positions(self._place, s, measured)
+    def singles(self, s: int, scan: Scan, numbers: Array) -> tuple[Any, Array, Array, Array]:
+        """New tracks of single measurements (numbers from 0) of sensor s: states, which are used, positions, scores."""
+        positions, covariances = single_positions(self._place, s, scan.measurements[s][numbers])
         fit = self.narrow(covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
         later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
         scores = self._appears[s] + self.overlooked(later, positions, covariances) + self._log_birth(covariances)
+        scores = scores - scan.crowd(s, numbers[fit])
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
     def places(self, scan: Scan) -> Places:
@@ -132,7 +137,8 @@ class NewTracks:
             positions.append(where)
             covariances.append(np.asarray(spread))
             fit.append(self.narrow(covariances[s]))
-            births.append(self._terms.birth[s] + self._log_birth(covariances[s]))
+            crowd = scan.crowd(s, np.arange(len(where)))
+            births.append(self._terms.birth[s] + self._log_birth(covariances[s]) - crowd)
         return Places(positions, covariances, fit, births)
 
     def crossings(self, scan: Scan, free: Sequence[Array]) -> Crossings | None:
@@ -162,4 +168,5 @@ class NewTracks:
         number_of = [np.concatenate([[0], rows + 1]) for rows in numbers]
         rows = np.stack([number[tuples[:, s]] for s, number in enumerate(number_of)], axis=1).astype(np.int32)
         rows, costs, positions, covariances = rows[fit], costs[fit], positions[fit], covariances[fit]
-        return Crossings(rows, costs, self.scores(rows, costs, positions, covariances), positions, covariances)
+        scores = self.scores(rows, costs, positions, covariances) - scan.crowding(rows)
+        return Crossings(rows, costs, scores, positions, covariances)

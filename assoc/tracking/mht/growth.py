@@ -137,11 +137,12 @@ class AtOnce(Growth):
         z, sensor, terms = self._progress.scan.measurements[s], settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
         pairs = track_pairs(settings.filter, self._states, z, sensor, gate)
-        begun, fit, positions, score = settings.births.singles(s, z)
+        begun, fit, positions, score = settings.births.singles(s, self._progress.scan, np.arange(len(z)))
         self._offered = [self._states, pairs.states, begun]
         numbers = np.flatnonzero(fit)
         births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
         missed, gain = misses_of(self._progress, self._states, s), pairs.log_likelihood + terms.detection[s]
+        gain = gain - self._progress.scan.crowd(s, pairs.measurement)
         return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
