@@ -48,7 +48,7 @@ class LifeCycle:
     deletion_drop : float
     lifetime : float
         Mean time for which a target exists, seconds. It determines how fast `Track.existence` falls without
-        detections. A track is deleted later, and is reported again if it is detected before.
+        detections. A track that is lost is deleted later, and is reported again if it is detected before.
     """
 
     confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from assoc._text.shown import Shown
 from assoc._text.times import moment
 from assoc._types import Array
+
+Status = Literal["tentative", "confirmed", "coasting", "lost"]
+
+# one scan without a detection by several sensors may be a shadow or P_d declared too high
+_LOST_AFTER = 3
+# for a ghost of bearings a scan without them is the end
+_KNOWN_AFTER = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,6 +43,10 @@ class Track(Shown):
         Seconds.
     existence : float
         Probability that the target is still there.
+    missed : int
+        Scans in a row in which sensors looked and none detected it.
+    hidden : float
+        Seconds since the last detection for which no sensor could see it.
     """
 
     track_id: int
@@ -49,11 +61,26 @@ class Track(Shown):
     started: float
     last_detection: float
     existence: float
+    missed: int = 0
+    hidden: float = 0.0
+
+    @property
+    def status(self) -> Status:
+        """Where it is in its life.
+
+        "tentative"; "confirmed"; "coasting": confirmed, and now missed or out of view; "lost": probably gone (existence
+        below 0.5), after five scans with a detection not before three missed in a row.
+        """
+        if not self.confirmed:
+            return "tentative"
+        if self.existence < 0.5 and (self.missed >= _LOST_AFTER or self.hits < _KNOWN_AFTER):
+            return "lost"
+        return "coasting" if self.missed or self.hidden else "confirmed"
 
     @property
     def reported(self) -> bool:
-        """Whether it is confirmed and its existence is at least 0.5."""
-        return self.confirmed and self.existence >= 0.5
+        """Whether it is confirmed and not lost."""
+        return self.status in ("confirmed", "coasting")
 
     def named(self, track_id: int) -> Track:
         """The same track under another id."""
@@ -64,8 +91,7 @@ class Track(Shown):
 
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)
-        kind = "confirmed" if self.confirmed else "tentative"
-        return f"Track({self.track_id}, {kind}, ({place}) m at {moment(self.time)}, score {self.score:.4g})"
+        return f"Track({self.track_id}, {self.status}, ({place}) m at {moment(self.time)}, score {self.score:.4g})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -27,7 +27,7 @@ ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
 _NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST, "existence": EXISTS,
             "hidden": HIDDEN}  # fmt: skip
 _COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
-_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence")
+_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence", "missed", "hidden")
 
 
 def _column(table: str, number: int, what: str) -> Any:

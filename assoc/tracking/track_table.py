@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude",
+    "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude", "status",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
 
@@ -96,7 +96,7 @@ class TrackTable(Shown):
             speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
             altitude = altitude if altitudes is None else altitudes.get(track.track_id, math.nan)
             where = *track.position.tolist(), *track.velocity.tolist()
-            more = *sigma.tolist(), track.existence, speed, heading, altitude
+            more = *sigma.tolist(), track.existence, speed, heading, altitude, track.status
             self._rows.append((track.track_id, track.time, *where, *life, *more))
             quality: dict[str, Any] = {}
             if qualities is not None:
@@ -120,7 +120,12 @@ class TrackTable(Shown):
         import pandas as pd
 
         frame = pd.DataFrame.from_records(self._rows, columns=list(COLUMNS))
-        kinds = dict.fromkeys(COLUMNS, "float64") | {"track_id": "int64", "confirmed": "bool", "hits": "int64"}
+        kinds = dict.fromkeys(COLUMNS, "float64") | {
+            "track_id": "int64",
+            "confirmed": "bool",
+            "hits": "int64",
+            "status": "str",
+        }
         frame = frame.astype(kinds)
         if self.origin is not None:
             latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
@@ -206,7 +211,7 @@ def track_scene(
     tracker : Tracker
     scene : Scene
     confirmed : bool
-        Whether only tracks that are confirmed and probably exist are listed (`Track.reported`).
+        Whether only tracks that are confirmed and not lost are listed (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
     identities : sequence over scans of sequences over sensors of arrays (n, 2), optional

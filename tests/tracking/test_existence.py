@@ -40,8 +40,20 @@ def test_misses_and_time_take_from_existence_what_bayes_says(kind):
         assert track.existence == pytest.approx(p, rel=1e-6)
         assert track.confirmed
         reported.append(track.reported)
-        assert track.reported == (p >= 0.5)
+        assert track.status == ("coasting" if p >= 0.5 else "lost")
     assert reported[0] and not reported[-1]
+
+
+@pytest.mark.parametrize("kind", TRACKERS.values())
+def test_a_known_track_does_not_blink(kind):
+    """One scan that all sensors missed may be a shadow, three are not."""
+    tracker, place = tracker_of(kind, np.array([500.0, 500.0, 250.0, 0.0, 0.0, 0.0])), np.array([[500.0, 500.0, 250.0]])
+    seen = []
+    for k, detected in enumerate([True] * 6 + [False] * 4 + [True], start=1):
+        tracker.step(2.0 * k, [place] * 2 if detected else NOTHING)
+        (track,) = [track for track in tracker.tracks if track.track_id == 1]
+        seen.append(track.status)
+    assert seen == ["confirmed"] * 6 + ["coasting"] * 2 + ["lost"] * 2 + ["confirmed"]
 
 
 @pytest.mark.parametrize("kind", TRACKERS.values())
