@@ -16,6 +16,7 @@ from assoc._cli.solver_log import SolverLog
 from assoc.association.plan import Plan
 from assoc.packing.run import Run
 from assoc.simulation import simulate
+from tests.told import told
 
 ASLEEP = """
 import time
@@ -52,7 +53,7 @@ def interrupted(words, cwd, at, number=signal.SIGINT):
         time.sleep(0.3)
         process.send_signal(number)
         out, errors = process.communicate(timeout=120)
-    return process.returncode, out, errors
+    return process.returncode, out, told(errors)
 
 
 @pytest.fixture
