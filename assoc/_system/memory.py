@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from assoc.errors import LimitExceededError
@@ -93,12 +93,12 @@ def _of_machine() -> float:
 
 
 def _of_group() -> float:
-    return min(_left_in_groups(), default=math.inf)
+    return min(_left_in_groups(_groups()), default=math.inf)
 
 
-def _left_in_groups() -> Iterator[float]:
+def _left_in_groups(groups: Iterable[tuple[str, str, str, str, bytes]]) -> Iterator[float]:
     """Bytes left in the control group of this process and in the groups that contain it."""
-    for root, path, limit, usage, cache in _groups():
+    for root, path, limit, usage, cache in groups:
         folder = root + path
         while True:
             most = _number(f"{folder}/{limit}")

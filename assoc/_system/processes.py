@@ -29,7 +29,8 @@ _DIED = "a worker process died: it was killed or ran out of memory; fewer proces
 
 def start_python(path: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
     """Start a process that serves (`serve`), and imports from the folders of ``path`` alone."""
-    code = f"import sys; sys.path[:] = {path!r}; from {__name__} import serve; serve()"
+    folders = [folder for folder in path if isinstance(folder, str)]  # Python itself ignores others
+    code = f"import sys; sys.path[:] = {folders!r}; from {__name__} import serve; serve()"
     return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, **options)
 
 

@@ -193,7 +193,9 @@ def test_functions_of_a_script_and_what_they_print(tmp_path):
     """A script needs no guard, and its functions no module; stdout is the script's own."""
     script = tmp_path / "script.py"
     script.write_text(
+        "import pathlib, sys\n"
         "from assoc._system.processes import parallel_map\n"
+        "sys.path.append(pathlib.Path())\n"
         "print([*parallel_map(lambda item: print('said') or 2 * item, range(5), 2)])\n"
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
