@@ -136,7 +136,7 @@ def test_bad_files(tmp_path, content, message):
 
 
 def test_missing_file_folder_and_too_many_scans(tmp_path, tracks):
-    with pytest.raises(InvalidInputError, match="cannot be read"):
+    with pytest.raises(InvalidInputError, match="no such file"):
         simulate("from-tracks", file=str(tmp_path / "none.csv"))
     with pytest.raises(InvalidInputError, match="cannot be read"):
         simulate("from-tracks", file=str(tmp_path))
