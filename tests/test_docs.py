@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
+import tomllib
 from dataclasses import fields
 from importlib import import_module
 from importlib.util import find_spec
@@ -18,10 +19,11 @@ from assoc.__main__ import main
 from assoc._version import __version__ as version
 from assoc.solvers import registry
 from experiments.benchmarks import readme, rows
+from tests.release.requirements import read as requirements
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "paper.md")),
     *sorted(path for path in (ROOT / "docs").rglob("*.md") if "_build" not in path.parts),
 ]
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
@@ -177,8 +179,9 @@ def test_the_example_of_an_own_solver_runs(capsys):
     assert "noisy" in capsys.readouterr().out
 
 
-def test_figures_of_the_readme_are_those_of_the_benchmark():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", ["README.md", "paper.md"])
+def test_tables_are_those_of_the_benchmark(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
     measured = rows.load(ROOT / "docs" / "benchmarks.csv")
     assert readme.insert(text, measured) == text, "run python -m experiments.benchmarks --report-only"
 
@@ -188,8 +191,47 @@ def test_the_readme_must_have_its_marks():
         readme.insert(f"{readme.END} {readme.BEGIN}", [])
 
 
-def test_the_version_is_cited():
-    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+def test_the_paper_has_figures_of_our_tables_and_cites_what_it_lists():
+    paper, works = ((ROOT / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
+    tables = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "_tables").glob("*.md"))
+    found = re.findall(r"(?<![\w.])\d+\.\d+\b", paper.split(readme.END)[1])
+    assert (
+        len(found) > 5 and [one for one in found if not re.search(rf"(?<![\d.]){re.escape(one)}(?!\d)", tables)] == []
+    )
+    assert set(re.findall(r"@(\w+\d{4}|ortools)", paper)) == set(re.findall(r"^@\w+\{(\w+),", works, re.MULTILINE))
+
+
+def test_the_version_stands_in_one_place():
+    assert f'"{version}"' not in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert "version: 0" not in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / ".github").rglob("*.yml")), ids=lambda path: path.name)
+def test_workflows_call_the_makefile(path):
+    yaml = pytest.importorskip("yaml")
+    text, makefile = (one.read_text(encoding="utf-8") for one in (path, ROOT / "Makefile"))
+    content = yaml.safe_load(text)
+    called = set(re.findall(r"make ([\w-]+)", text))
+    assert called <= set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE))
+    assert called if "jobs" in content else content["body"]
+
+
+def test_the_conda_recipe_has_our_version_and_requirements():
+    yaml, jinja2 = pytest.importorskip("yaml"), pytest.importorskip("jinja2")
+    here = ROOT / "conda"
+
+    def data(path, from_recipe_dir):
+        return tomllib.loads((here / path).read_text(encoding="utf-8"))
+
+    def regex(path, pattern, from_recipe_dir):
+        return re.search(pattern, (here / path).read_text(encoding="utf-8"))
+
+    recipe = jinja2.Template((here / "meta.yaml").read_text(encoding="utf-8"), undefined=jinja2.StrictUndefined)
+    found = yaml.safe_load(recipe.render(load_file_data=data, load_file_regex=regex, PYTHON="python"))
+    assert found["package"]["version"] == version
+    needed = [one.split()[0] for one in found["requirements"]["run"]]
+    ours = [one.name for one in requirements() if one.group == "base"]
+    assert needed == ["python", *("ortools-python" if name == "ortools" else name for name in ours)]
 
 
 def test_the_page_of_stability_names_what_is_public():

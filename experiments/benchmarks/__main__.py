@@ -1,4 +1,4 @@
-"""Our solvers and other people's on families of problems: docs/benchmarks.csv and .md, the tables of README.md."""
+"""Our solvers and other people's on families of problems: docs/benchmarks.csv and .md, tables of README.md and paper.md."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-TABLE, README = Path("docs/benchmarks.csv"), Path("README.md")
+TABLE, PAGES = Path("docs/benchmarks.csv"), (Path("README.md"), Path("paper.md"))
 # what a brief run gives other solvers, in seconds
 _BRIEF_LIMIT = 5.0
 FAMILIES = ("paper", "gated", "ghost", "wide gap", "known optimum", "random axial", "planted", "scale", "kbest")
@@ -31,7 +31,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m experiments.benchmarks",
         description="Run our solvers and other people's on the benchmark families; write the rows, the report "
-        f"and, for {TABLE}, the tables of README.md.",
+        f"and, for {TABLE}, the tables of README.md and paper.md.",
     )
     parser.add_argument("--families", nargs="+", metavar="NAME", help=f"only these: {', '.join(FAMILIES)}")
     parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
@@ -101,8 +101,8 @@ def main(argv: list[str] | None = None) -> int:
         # of the figures as they are saved, in so many digits: whoever reads the table comes to the same ones
         saved = storage.load(table)
         write_text(report, reporting.render(saved, minutes, command, options.remark))
-        if table == TABLE and README.exists():
-            write_text(README, readme.insert(README.read_text(encoding="utf-8"), saved))
+        for page in PAGES if table == TABLE else ():
+            write_text(page, readme.insert(page.read_text(encoding="utf-8"), saved))
 
     rows: list[Row] = []
     if options.report_only:

@@ -1,4 +1,4 @@
-"""The tables of README.md, written from the same rows as docs/benchmarks.md."""
+"""The tables of README.md and paper.md, written from the same rows as docs/benchmarks.md."""
 
 import math
 from collections.abc import Sequence
@@ -32,14 +32,14 @@ _SHORT = 5.0
 _FAR = 1.0
 
 
-def insert(readme: str, rows: Sequence[Row]) -> str:
-    """Return README's text with the part between the marks written anew.
+def insert(page: str, rows: Sequence[Row]) -> str:
+    """Return a page's text with the part between the marks written anew.
 
     Raises ValueError: The marks are not there, each once and in order.
     """
-    if readme.count(BEGIN) != 1 or readme.count(END) != 1 or readme.index(BEGIN) > readme.index(END):
-        raise ValueError(f"README.md: expected the marks {BEGIN} and {END}, each once")
-    before, rest = readme.split(BEGIN)
+    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
+        raise ValueError(f"expected the marks {BEGIN} and {END}, each once")
+    before, rest = page.split(BEGIN)
     after = rest.split(END)[1]
     return f"{before}{BEGIN}\n\n{render(rows)}\n\n{END}{after}"
 
