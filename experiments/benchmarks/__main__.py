@@ -1,4 +1,4 @@
-"""Our solvers and other people's on families of problems: docs/benchmarks.csv and .md, tables of README.md and paper.md."""
+"""Our solvers and others' on families of problems: docs/benchmarks.csv and .md, tables of README.md and paper.md."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def main(argv: list[str] | None = None) -> int:
         # of the figures as they are saved, in so many digits: whoever reads the table comes to the same ones
         saved = storage.load(table)
         write_text(report, reporting.render(saved, minutes, command, options.remark))
-        for page in PAGES if table == TABLE else ():
+        for page in filter(Path.exists, PAGES if table == TABLE else ()):
             write_text(page, readme.insert(page.read_text(encoding="utf-8"), saved))
 
     rows: list[Row] = []

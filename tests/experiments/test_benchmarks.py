@@ -281,10 +281,13 @@ def test_program_refuses_and_reports(
     assert "## gated" in (tmp_path / "b.md").read_text()
 
 
-def test_the_readme_is_written_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["README.md", "paper.md"])
+def test_tables_of_a_page_are_written_with_the_report(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").mkdir()
-    page = tmp_path / "README.md"
+    page = tmp_path / name
     page.write_text(f"before\n{readme.BEGIN}\nold\n{readme.END}\nafter\n")
     sequential = replace(ROW, solver="sequential", peer=True, cost=-98.0, status="feasible")
     rows.save(tmp_path / "docs" / "benchmarks.csv", [ROW, PEER, sequential])
