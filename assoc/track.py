@@ -202,7 +202,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
 
 
 def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
-    from assoc.recordings import radar_of
+    from assoc.recordings import radar_of, with_heights
     from assoc.tracking.plots import track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
@@ -219,7 +219,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         windows = _windows(recording, given, settings.get("seed", 0))
         print_lines(recording.summary())
         radar = radar_of(recording, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
-    tracker = make_tracker(name, [radar], given, settings, None)
+    tracker = make_tracker(name, with_heights(radar, recording), given, settings, None)
     done, _ = _watched(
         given,
         tracker,

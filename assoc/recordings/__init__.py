@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.groupings import fixed_groups, groups_of_sizes, irregular_groups
-from assoc.recordings.radar import radar_of
+from assoc.recordings.radar import radar_of, with_heights
 from assoc.recordings.reading import read_plots
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.recordings.rotation import estimate_rotation
@@ -26,6 +26,7 @@ __all__ = [
     "radar_of",
     "read_plots",
     "scene_of_radars",
+    "with_heights",
     "write_plots",
     "write_tracks",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,13 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.sensors.radar import Radar2D
+
+HEIGHT_NOISE = 50.0
+"""Standard deviation of heights by Mode C, metres: steps of 100 ft, and climbs between reply and plot."""
+HEIGHTS = (-1_000.0, 20_000.0)
+"""Heights at which aircraft are sought, metres."""
+_LEAST_SHARE, _FALSE_SHARE = 0.02, 0.1
+"""Least share of plots with an altitude, or without one, that counts; the share of false plots with an altitude."""
 
 
 @door
@@ -59,6 +67,25 @@ def radar_of(
         field_of_view=np.array([[0.0, reach], [-math.pi, math.pi]]),
         name=name,
     )
+
+
+@door
+def with_heights(radar: Radar2D, recording: Recording) -> list[Radar2D]:
+    """The radar of a recording as two sensors at one place: its plots with an altitude that is not garbled, and others.
+
+    The first measures heights, too (`Window.heights`). Only the radar itself where hardly any plot has an altitude.
+    """
+    share = float(np.isfinite(recording.trusted_altitudes).mean()) if len(recording) else 0.0
+    if share < _LEAST_SHARE:
+        return [radar]
+    share = min(share, 1.0 - _LEAST_SHARE)
+    noise = np.append(np.sqrt(np.diagonal(radar.covariance)), HEIGHT_NOISE)
+    high = replace(
+        radar, noise=noise, field_of_view=np.array([*radar.field_of_view, HEIGHTS]), name=f"{radar.name}, Mode C",
+        detection_probability=share * radar.detection_probability,
+        false_alarm_rate=_FALSE_SHARE * radar.false_alarm_rate,
+    )  # fmt: skip
+    return [high, replace(radar, detection_probability=(1.0 - share) * radar.detection_probability)]
 
 
 def _noise(name: str, given: float | None, values: Array) -> float:

@@ -21,6 +21,9 @@ LONG_GAP = 20.0
 
 MOST_TURNS = 1e12
 
+EARTH_RADIUS = 6.371e6
+"""Metres."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Window:
@@ -65,6 +68,11 @@ class Window:
             rows=rows,
             addresses=recording.addresses[rows],
         )
+
+    @property
+    def heights(self) -> Array:
+        """Altitudes as heights above the plane that touches the earth at the radar, metres (n,)."""
+        return self.altitudes - self.measurements[:, 0] ** 2 / (2.0 * EARTH_RADIUS)
 
     def __len__(self) -> int:
         return len(self.times)

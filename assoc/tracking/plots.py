@@ -23,7 +23,8 @@ def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = 
     Parameters
     ----------
     tracker : Tracker
-        With a single sensor; must support measurements with times of their own.
+        With one sensor, or with two by `assoc.recordings.with_heights`; must support measurements with times of their
+        own.
     windows : iterable of Window
         They may overlap a little in time; a plot older than the last window's end gets that time.
     stamps : bool
@@ -40,8 +41,23 @@ def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = 
         if early is not None:
             times = np.maximum(times, early)
         end = float(times[-1]) if len(times) else float(early or 0.0)
-        known = [np.stack([window.identities, window.addresses], axis=1)]
-        yield tracker.step(end, [window.measurements], [times] if stamps else None, identities=known)
+        known, rows = np.stack([window.identities, window.addresses], axis=1), rows_of(tracker, window)
+        own = [times[row] for row in rows] if stamps else None
+        yield tracker.step(end, measured(tracker, window), own, identities=[known[row] for row in rows])
+
+
+def rows_of(tracker: Tracker, window: Window) -> list[Array]:
+    """The plots of a window that belong to each of the tracker's sensors."""
+    if len(tracker.sensors) == 1:
+        return [np.arange(len(window))]
+    high = np.isfinite(window.altitudes)
+    return [np.flatnonzero(high), np.flatnonzero(~high)]
+
+
+def measured(tracker: Tracker, window: Window) -> list[Array]:
+    """Their measurements."""
+    parts = np.column_stack([window.measurements, window.heights])
+    return [parts[row, : sensor.dim] for row, sensor in zip(rows_of(tracker, window), tracker.sensors, strict=True)]
 
 
 class PlotTracks(NamedTuple):
@@ -85,7 +101,7 @@ def track_plots(
     Parameters
     ----------
     tracker : Tracker
-        With a single sensor; must support measurements with times of their own.
+        As for `step_windows`.
     recording : Recording
     windows : iterable of Window
         Of this recording.
@@ -109,15 +125,18 @@ def track_plots(
                 break
             raise
         done.append(window)
-        ids = step.assigned[0]
+        own = rows_of(tracker, window)
+        # back in the order of the window
+        order = np.argsort(np.concatenate(own))
+        ids = np.concatenate(step.assigned)[order]
         takers.append(np.where(ids > 0, ids, -1))
-        sure.append(np.asarray(step.confirmed[0], dtype=np.bool_))
+        sure.append(np.concatenate(step.confirmed)[order])
         known = (ids > 0) & np.isfinite(window.altitudes)
         altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
         ends.append(float(step.time))
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
         stamps = np.clip(window.times, -np.inf if before.time is None else before.time, step.time)
-        qualities.after(tracker, before, step, [window.measurements], [stamps])
+        qualities.after(tracker, before, step, measured(tracker, window), [stamps[row] for row in own])
         table.add(listed, tracker.filter.motion.position, altitudes, qualities)
     tracks = np.concatenate(takers)
     aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)

@@ -1,15 +1,18 @@
 """Radars that do not measure heights: what states they get, and what their tracks know of heights."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from assoc.filters import Gaussian
+from assoc.recordings import Recording, clustering_time_window, radar_of, with_heights
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, LifeCycle
 from assoc.tracking.filter_choice import height_note, make_filter
+from assoc.tracking.plots import track_plots
 
 CIRCLE = [-math.pi, math.pi]
 REGION = np.array([[-20e3, 20e3], [-20e3, 20e3], [0.0, 12e3]])
@@ -110,3 +113,36 @@ def test_unknown_heights_stay_within_those_of_the_region():
     # the noise of one step may come on top
     assert math.sqrt(track.covariance[2, 2]) < 1.1 * 6e3
     assert 0.0 < track.position[2] < 12e3
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3])
+def test_heights_of_plots_tell_aircraft_apart(missing):
+    """Two aircraft one above the other; a share of the plots has no altitude."""
+    rng, turns = np.random.default_rng(0), np.arange(40)
+    times = np.repeat(10.0 * turns, 2) + np.tile([0.0, 0.01], len(turns))
+    source, x = np.tile([0, 1], len(turns)), 60e3 - 200.0 * times
+    altitudes = np.where(rng.random(len(times)) < missing, np.nan, np.where(source == 0, 9e3, 9.6e3))
+    ground, noise = np.hypot(x, 20e3), rng.normal(0.0, [[150.0], [2e-3]], (2, len(times)))
+    slant = np.hypot(ground, np.where(source == 0, 9e3, 9.6e3) - ground**2 / (2 * 6.371e6))
+    plots = Recording(
+        times,
+        slant + noise[0],
+        np.arctan2(20e3, x) + noise[1],
+        np.ones(len(times), dtype=int),
+        altitudes,
+        sources=source,
+    )
+    radar = radar_of(plots, range_noise=150.0, azimuth_noise=2e-3)
+    together, right, places = clustering_time_window(plots, 10.0), {}, {}
+    for kind, sensors in (("flat", [radar]), ("high", with_heights(radar, plots))):
+        tracker = TRACKERS["mht"](sensors, make_filter("ekf", sensors))
+        done = track_plots(tracker, plots, together)
+        taken = [done.tracks[source == one] for one in (0, 1)]
+        right[kind] = np.mean([(ids == np.bincount(ids[ids > 0]).argmax()).mean() for ids in taken])
+        places[kind] = np.array([track.position for track in tracker.tracks if track.reported])
+    assert len(places["high"]) == 2
+    assert missing or right["high"] > 0.9 > right["flat"]
+    assert np.ptp(places["high"][:, 2]) == pytest.approx(600.0, abs=120.0)
+    # the ground range is that below the aircraft
+    np.testing.assert_allclose(np.hypot(*places["high"][:, :2].T), np.hypot(x[-1], 20e3), rtol=0.01)
+    assert len(with_heights(radar, replace(plots, altitudes=np.full(len(times), np.nan)))) == 1
