@@ -134,7 +134,7 @@ def send(process: subprocess.Popen[bytes], content: object) -> None:
 
 
 def leave(process: subprocess.Popen[bytes]) -> None:
-    """Let a process that serves end after what it was sent."""
+    """Let a process that serves end after the item that it is at."""
     _write(process.stdin, b"")
 
 
@@ -166,6 +166,7 @@ def serve() -> None:
     os.dup2(2 if sys.stderr else nowhere, 1)
     sys.stdout = sys.stderr
     received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    leaving = threading.Event()
 
     def listen() -> None:
         try:
@@ -174,12 +175,13 @@ def serve() -> None:
         except (OSError, EOFError, pickle.UnpicklingError):
             # the parent ended this process, or is gone itself
             temporary.end_process(1)
+        leaving.set()
         received.put(b"")
 
     threading.Thread(target=listen, name="parent", daemon=True).start()
     task = _loaded(received.get())
     with announcement.silenced(), suppress(OSError):
-        while item := received.get():
+        while (item := received.get()) and not leaving.is_set():
             _write(answers, _answer(task, item))
     temporary.end_process(0)
 

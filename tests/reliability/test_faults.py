@@ -20,7 +20,7 @@ import pytest
 from assoc._files import npz
 from assoc._files.npz import save_npz
 from assoc._files.output import write_atomically
-from assoc._system.processes import parallel_map
+from assoc._system.processes import leave, parallel_map, send, start_python
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
@@ -207,6 +207,19 @@ def test_what_other_processes_cannot_import_is_said(monkeypatch):
     exec("def task(item): pass", vars(sys.modules["only_here"]))
     with pytest.raises(InvalidInputError, match="jobs: .* cannot be imported by other processes .*only_here"):
         list(parallel_map(sys.modules["only_here"].task, [1, 2], 2))
+
+
+def test_a_process_that_is_to_leave_finishes_what_it_is_at(tmp_path):
+    """And nothing behind it: kernels that compile for minutes would outlive their program."""
+    process = start_python(sys.path, stdout=subprocess.PIPE)
+    send(process, operator.call)
+    for name in ("first", "second"):
+        send(process, partial(os.system, f"touch {tmp_path}/{name}-begun; sleep 1; touch {tmp_path}/{name}"))
+    while not (tmp_path / "first-begun").exists():
+        time.sleep(0.01)
+    leave(process)
+    process.communicate(timeout=30)
+    assert sorted(os.listdir(tmp_path)) == ["first", "first-begun"] and process.returncode == 0
 
 
 def test_an_error_comes_back_with_where_it_came_from():
