@@ -1,11 +1,15 @@
 """When `exact` lets metaheuristics help its branching."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from assoc import assign
 from assoc.costs import build_problem
-from assoc.packing.branching import search
+from assoc.packing.branching.counts import Splitting
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.components import closing
 from assoc.packing.components.turns import Turns
 from assoc.packing.run import Run
 from assoc.solvers.exact import search as exact
@@ -24,7 +28,7 @@ def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
 
     monkeypatch.setattr(exact, "_ALONE", alone)
     # not split on counts: then it is over at once
-    monkeypatch.setattr(search, "_HARD", 10**9)
+    monkeypatch.setattr(closing, "BranchAndBound", partial(BranchAndBound, splitting=Splitting(10**9)))
     monkeypatch.setattr(exact._Task, "_search_better", noted)
     solution = assign(build_problem(ghost(20, 2018), 0), "exact")
     assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
