@@ -361,7 +361,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     parser = make_parser(NAME, __doc__)
     parser.add_argument("--seeds", type=whole(1), default=20, metavar="N", help="scenes of each row (default 20)")
     parser.add_argument("--rows", default=",".join(ROWS), metavar="NAME,...", help="rows of the table (default: all)")
-    default = "oracle,multi-sensor,mht"
+    default = "oracle,multi-sensor,multi-sensor, adapting,mht"
     parser.add_argument("--trackers", default=default, metavar="NAME,...", help=f"default: {default}")
     chosen = parser.parse_args(arguments)
     rows, names = (_chosen(parser, what, text, known) for what, text, known in (
