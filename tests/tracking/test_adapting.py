@@ -236,6 +236,18 @@ def test_density_of_clutter_by_place():
     assert not alone.densities([sensor], there)[0].any()
 
 
+def test_traffic_is_no_clutter():
+    rng, sensors, turns = np.random.default_rng(6), radars(), np.ones(3)
+    clutter = ClutterMap.empty(sensors)
+    start, velocity = rng.uniform(-20e3, 20e3, (30, 3)), rng.uniform(-200.0, 200.0, (30, 3))
+    start[:, 2], velocity[:, 2] = rng.uniform(3e3, 9e3, 30), 0.0
+    for k in range(15):
+        where = start + 4.0 * k * velocity
+        scan = Scan(k, 4.0 * k, tuple(sensor.measure(where) for sensor in sensors))
+        assert not np.concatenate(clutter.densities(sensors, scan)).any()
+        clutter = clutter.after(sensors, scan, turns)
+
+
 def test_a_tracker_that_does_not_adapt_has_no_health():
     assert TRACKERS["mht"](radars(), region=REGION).health is None
 

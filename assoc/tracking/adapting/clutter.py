@@ -23,8 +23,9 @@ _TURNS, _PLOTS = 10.0, 2000
 """Plots are kept for so many turns, and at most so many of a sensor."""
 # of so many neighbours, and this many of a turn may be of targets; the density follows from so many others
 _LOOKED_AT, _TARGETS, _OTHERS = 64, 3, 6
-# less than so many times the density of false alarms is not clutter of a place: traffic is as dense
-_LEAST = 300.0
+# it is clutter of a place at so many times the density of false alarms, and so many plots a turn within this distance:
+# traffic is less dense
+_LEAST, _IN_GATE, _GATE = 30.0, 0.002, 4.0
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 
@@ -104,7 +105,8 @@ def _densities(sensor: Sensor, here: Array, places: Array, clocks: Array, now: f
     ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
     span = max(now - float(clocks[0]) if len(clocks) else 0.0, 0.0) + 1.0
     usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * span * ball
-    dense = np.flatnonzero(distance[:, _OTHERS] < (_OTHERS / (_LEAST * usual)) ** (1.0 / d))
+    least = max(_LEAST, _IN_GATE * span / (_GATE**d * usual))
+    dense = np.flatnonzero(distance[:, _OTHERS] < (_OTHERS / (least * usual)) ** (1.0 / d))
     if not len(dense):
         return result
     turn = np.floor(np.append(clocks, np.full(n, now)))[near[dense]]
@@ -113,5 +115,5 @@ def _densities(sensor: Sensor, here: Array, places: Array, clocks: Array, now: f
     last = np.argmax(others == _OTHERS, axis=1)
     radius = np.maximum(distance[dense, last], _NEAREST)
     ratio = (last + 1) / (radius**d * usual)
-    result[dense] = np.where((others[:, -1] >= _OTHERS) & (ratio > _LEAST), np.log(np.maximum(ratio, 1.0)), 0.0)
+    result[dense] = np.where((others[:, -1] >= _OTHERS) & (ratio > least), np.log(np.maximum(ratio, 1.0)), 0.0)
     return result
