@@ -15,7 +15,7 @@ from assoc.scene.scan import Scan
 from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.tracking import TRACKERS
+from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
@@ -234,6 +234,24 @@ def test_density_of_clutter_by_place():
     # five in 50 x 50 m against one in 1000 x 1000 m
     assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
     assert not alone.densities([sensor], there)[0].any()
+
+
+def test_no_track_starts_in_a_closed_area():
+    scene = with_returns(scene_of(radars(), 7, scans=10), 10, 1)
+    patch = [[13e3, -18e3], [18e3, -18e3], [18e3, -13e3], [13e3, -13e3]]
+    tracker = TRACKERS["nearest-neighbour"].for_scene(scene, initiation=Initiation(closed=[patch]))
+    for k in range(scene.num_scans):
+        tracker.step(scene.times[k], scene.measurements[k])
+    assert in_patch(tracker) == 0
+    assert sum(track.reported for track in tracker.tracks) == TARGETS
+
+
+def test_corners_of_closed_areas():
+    bent = Initiation(closed=[[[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]]])
+    points = np.array([[2.0, 0.5, 9.0], [2.0, 2.0, 0.0], [0.5, 2.0, 0.0], [5.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    assert bent.opens(points).tolist() == [False, True, False, True, True]
+    with pytest.raises(InvalidInputError, match="at least 3 corners"):
+        Initiation(closed=[[[0, 0], [1, 1]]])
 
 
 def test_traffic_is_no_clutter():

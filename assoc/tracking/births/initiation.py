@@ -14,6 +14,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import gaussian
+from assoc.sensors.base import numbers
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,23 @@ class Initiation:
     widest : float
         A single measurement starts a track only if the standard deviation of its position is at most this share
         of the region's diagonal; a bearing alone starts none.
+    closed : sequence of array_like (n, 2)
+        Areas in which no track starts, as a wind farm or a road: polygons, x and y of their corners, metres. Tracks
+        that began elsewhere go on there.
     """
 
     speed: float | tuple[float, ...] = field(default=300.0, metadata={"help": "usual speed along an axis, m/s"})
     rest: float = field(default=0.1, metadata={"help": "usual size of further components of the state"})
     birth_rate: float = field(default=0.1, metadata={"help": "mean number of new targets in a scan"})
     widest: float = field(default=0.1, metadata={"help": "widest start of a track, as a share of the region"})
+    closed: tuple[tuple[tuple[float, float], ...], ...] = ()
 
     def __post_init__(self) -> None:
+        corners = [numbers(area, "closed: an area") for area in self.closed]
+        for area in corners:
+            if area.ndim != 2 or area.shape[1:] != (2,) or len(area) < 3 or not np.isfinite(area).all():
+                raise InvalidInputError(f"closed: an area must be at least 3 corners x, y, got shape {area.shape}")
+        object.__setattr__(self, "closed", tuple(tuple(map(tuple, area.tolist())) for area in corners))
         for name in ("rest", "birth_rate", "widest"):
             positive(getattr(self, name), name)
         speeds = self.speed if isinstance(self.speed, (tuple, list)) else (self.speed,)
@@ -50,6 +60,19 @@ class Initiation:
             positive(speed, "speed")
         if not isinstance(self.speed, (int, float, tuple, list)):
             object.__setattr__(self, "speed", float(self.speed))  # a number of numpy's
+
+    def opens(self, positions: Array) -> Array:
+        """Which positions (K, 3) are outside of the closed areas, bool (K,)."""
+        found = np.ones(len(positions), dtype=np.bool_)
+        x, y = positions[:, 0, None], positions[:, 1, None]
+        for area in self.closed:
+            (x1, y1), (x2, y2) = np.array(area).T, np.roll(area, -1, axis=0).T
+            # edges that a line from the position towards +x crosses
+            across = (y1 > y) != (y2 > y)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossed = across & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
+            found &= crossed.sum(axis=1) % 2 == 0
+        return found
 
     def prior(self, motion: Motion) -> tuple[Array, Array]:
         """Indices of the position in a state, and the prior covariance of a new track, position not set.

@@ -73,7 +73,11 @@ class NewTracks:
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
         """Positions, covariances, and which are precise enough to start a track."""
         positions, covariances = positions_and_covariances(self._place, scan, tuples)
-        return positions, covariances, self.narrow(covariances)
+        return positions, covariances, self._fit(positions, covariances)
+
+    def _fit(self, positions: Array, covariances: Array) -> Array:
+        """Which positions may start a track, bool (K,)."""
+        return np.asarray(self.narrow(covariances) & self._initiation.opens(positions))
 
     def narrow(self, covariances: Array) -> Array:
         """Which positions are precise enough to start a track, by their covariances (K, 3, 3); bool (K,)."""
@@ -121,7 +125,7 @@ class NewTracks:
     def singles(self, s: int, scan: Scan, numbers: Array) -> tuple[Any, Array, Array, Array]:
         """New tracks of single measurements (numbers from 0) of sensor s: states, which are used, positions, scores."""
         positions, covariances = single_positions(self._place, s, scan.measurements[s][numbers])
-        fit = self.narrow(covariances)
+        fit = self._fit(positions, covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
         later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
@@ -136,7 +140,7 @@ class NewTracks:
             where, spread = positions_of_scan(self._place, scan, s)
             positions.append(where)
             covariances.append(np.asarray(spread))
-            fit.append(self.narrow(covariances[s]))
+            fit.append(self._fit(where, covariances[s]))
             crowd = scan.crowd(s, np.arange(len(where)))
             births.append(self._terms.birth[s] + self._log_birth(covariances[s]) - crowd)
         return Places(positions, covariances, fit, births)
