@@ -136,6 +136,7 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
         if sensors.code[s] == BEARING:
             azimuth = math.pi - np.mod(math.pi - measured[:, 0], 2 * math.pi)
             order = np.argsort(azimuth, kind="stable")
+            z[rows, : sensors.dim[s]] = measured[order]
             z[rows, 0] = azimuth[order]
         else:
             z[rows, : sensors.dim[s]] = measured[:, : sensors.dim[s]]

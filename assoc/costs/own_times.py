@@ -24,6 +24,7 @@ from assoc.filters.state import gaussian
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors import BearingSensor
 
 UNREST = 5.0
 """Root of the spectral density of a target's acceleration, m/s^1.5, between the measurements of a scan."""
@@ -107,7 +108,7 @@ def _places(scene: Scene, scan: Scan) -> Places:
         peak = -0.5 * float(np.linalg.slogdet(2.0 * math.pi * located.covariance)[1])
         positions.append(where)
         covariances.append(spread)
-        able.append(np.full(len(z), sensor.kind != "bearing"))
+        able.append(np.full(len(z), not isinstance(sensor, BearingSensor)))
         births.append(math.log(sensor.detection_probability / density) + peak + 0.5 * np.linalg.slogdet(spread)[1])
     return Places(positions, covariances, able, births)
 

@@ -86,7 +86,7 @@ def _linearise_tuple(
             nu[s, i] = z[s, i] - h[i]
         wrap(code, nu[s])
         measured += d
-        tall += 0 if code == BEARING or (code == POSITION and d == 2) else 1
+        tall += 0 if (code == BEARING and d == 1) or (code == POSITION and d == 2) else 1
         for i in range(d):
             for j in range(d):
                 squares += nu[s, i] * W[i, j] * nu[s, j]

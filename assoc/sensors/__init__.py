@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from assoc.sensors.base import Sensor
-from assoc.sensors.bearing import BearingSensor
+from assoc.sensors.bearing import BearingSensor, DirectionSensor
 from assoc.sensors.platform import Platform
 from assoc.sensors.position import PositionSensor
 from assoc.sensors.radar import Radar2D, Radar3D
 
-KINDS: dict[str, type[Sensor]] = {cls.kind: cls for cls in (Radar3D, Radar2D, BearingSensor, PositionSensor)}
+KINDS: dict[str, type[Sensor]] = {
+    cls.kind: cls for cls in (Radar3D, Radar2D, BearingSensor, DirectionSensor, PositionSensor)
+}
 """Registry of measurement models: the name in a scene file -> the class."""
 
-__all__ = ["KINDS", "BearingSensor", "Platform", "PositionSensor", "Radar2D", "Radar3D", "Sensor"]
+__all__ = ["KINDS", "BearingSensor", "DirectionSensor", "Platform", "PositionSensor", "Radar2D", "Radar3D", "Sensor"]

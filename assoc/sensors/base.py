@@ -263,14 +263,14 @@ class Sensor(ABC):
         view[[axis for axis in range(self.dim) if self.components[axis] == "azimuth"]] += heading
         return replace(self, platform=None, position=position, field_of_view=view)
 
-    def aligned(self, measurements: Array, times: Array) -> Array:
-        """Measurements (n, d) made at times (n,) as the sensors `at` these times would make them."""
+    def aligned(self, measurements: Array, times: Array, *, back: bool = False) -> Array:
+        """Measurements (n, d) made at times (n,) as the sensors `at` these times make them; `back`: the other way."""
         if self.platform is None or not len(measurements):
             return measurements
         result, headings = np.array(measurements), self.platform.poses(times)[1]
         for axis in range(self.dim):
             if self.components[axis] == "azimuth" and self.platform.headings is not None:
-                result[:, axis] = wrap_angle(result[:, axis] + headings)
+                result[:, axis] = wrap_angle(result[:, axis] + (-headings if back else headings))
         return result
 
     @abstractmethod

@@ -51,9 +51,9 @@ class PositionSensor(Sensor):
             false_alarm_rate=rate,
         )  # fmt: skip
 
-    def aligned(self, measurements: Array, times: Array) -> Array:
+    def aligned(self, measurements: Array, times: Array, *, back: bool = False) -> Array:
         """Positions (n, d) in the scene's frame; see `Sensor.aligned`."""
         if self.platform is None or not len(measurements):
             return measurements
-        place = self.platform.places(times, self.position)
-        return turned(measurements, self.platform.poses(times)[1]) + place[:, : self.dim]
+        place, headings = self.platform.places(times, self.position)[:, : self.dim], self.platform.poses(times)[1]
+        return turned(measurements - place, -headings) if back else turned(measurements, headings) + place

@@ -76,14 +76,15 @@ class Radar3D(Sensor):
             result[:, 3, 3:] = u
         return result
 
-    def aligned(self, measurements: Array, times: Array) -> Array:
+    def aligned(self, measurements: Array, times: Array, *, back: bool = False) -> Array:
         """As `Sensor.aligned`, with range rates relative to the scene's frame."""
-        result = super().aligned(measurements, times)
+        result = super().aligned(measurements, times, back=back)
         if self.platform is None or not self.measures_velocity or not len(result):
             return result
-        away = np.stack([np.cos(result[:, 1]), np.sin(result[:, 1]), np.tan(result[:, 2])], axis=1)
-        away *= np.cos(result[:, 2])[:, None]
-        result[:, 3] += (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
+        azimuth, elevation = (measurements if back else result)[:, 1:3].T
+        away = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=1) * np.cos(elevation)[:, None]
+        own = (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
+        result[:, 3] += -own if back else own
         return result
 
     def _velocities(self, velocities: Array | None) -> Array:

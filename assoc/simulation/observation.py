@@ -36,6 +36,7 @@ def observe(
     Parameters
     ----------
     sensors : sequence of Sensor
+        Also on platforms.
     times : array (K,)
         Time stamps, seconds.
     target_ids : sequence over scans of int arrays (T_k,)
@@ -72,8 +73,9 @@ def observe(
     if velocities is None and any(sensor.measures_velocity for sensor in sensors):
         velocities = velocities_from(times, target_ids, positions)
     moving = velocities if velocities is not None else [np.zeros((len(ids), 3)) for ids in target_ids]
-    for ids, points, speeds in zip(target_ids, positions, moving, strict=True):
-        scan = [_report(sensor, np.asarray(ids), np.asarray(points), np.asarray(speeds), rng) for sensor in sensors]
+    for time, ids, points, speeds in zip(np.asarray(times).tolist(), target_ids, positions, moving, strict=True):
+        seen = np.asarray(ids), np.asarray(points), np.asarray(speeds)
+        scan = [_on_board(sensor, time, *_report(sensor.at(time), *seen, rng)) for sensor in sensors]
         measurements.append([values for values, _ in scan])
         sources.append([source for _, source in scan])
     truth = Truth(target_ids, positions, sources)
@@ -125,6 +127,16 @@ def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequen
     velocity = np.zeros_like(point)
     velocity[order] = np.where(apart[:, None] > 0, rate, 0.0)
     return np.split(velocity, np.cumsum([len(ids) for ids in target_ids])[:-1])
+
+
+def _on_board(sensor: Sensor, time: float, values: Array, source: Array) -> tuple[Array, Array]:
+    """Measurements of a sensor as it stands, and their sources, as its platform sees them."""
+    if sensor.platform is None:
+        return values, source
+    values = sensor.aligned(values, np.full(len(values), time), back=True)
+    # the box around a turned field of view is wider
+    kept = sensor.in_view(values) | (source >= 0)
+    return values[kept], source[kept]
 
 
 def _report(

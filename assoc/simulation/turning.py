@@ -98,6 +98,8 @@ def observe_in_turns(
     InvalidInputError
         Scans are longer than a turn.
     """
+    if any(sensor.platform is not None for sensor in sensors):
+        raise InvalidInputError("sensors: turning antennas on platforms are not simulated")
     edges = np.append(start, times)
     if np.diff(edges).max() > min(turns) * (1 + 1e-9):
         raise InvalidInputError(

@@ -15,7 +15,7 @@ from assoc.filters.base import Filter
 from assoc.filters.measurement import LinearMeasurement
 from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
-from assoc.sensors import Sensor
+from assoc.sensors import BearingSensor, Sensor
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.new_tracks import NewTracks
@@ -106,7 +106,7 @@ class TrackerSettings:
     @cached_property
     def angles_alone(self) -> bool:
         """Whether no sensor measures distances, so that none starts a track alone."""
-        return all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
+        return all(isinstance(sensor, BearingSensor) or all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
 
     @cached_property
     def height(self) -> LinearMeasurement | None:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from assoc.filters import ConstantVelocity, Gaussian
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
+from assoc.sensors import BearingSensor, DirectionSensor, PositionSensor, Radar2D, Radar3D
 
 CIRCLE = [-math.pi, math.pi]
 RADAR = Radar3D(
@@ -15,11 +15,12 @@ RADAR = Radar3D(
 )
 FLAT = Radar2D(position=[100.0, -200.0, 10.0], noise=[30.0, 2e-3], field_of_view=[[0.0, 1e6], CIRCLE])
 BEARING = BearingSensor(position=[100.0, -200.0, 10.0], noise=[2e-3])
+DIRECTION = DirectionSensor(position=[100.0, -200.0, 10.0], noise=[2e-3, 3e-3])
 PLACE = PositionSensor(position=np.zeros(3), noise=[50.0, 40.0, 30.0], field_of_view=[[-1e6, 1e6]] * 3)
 MODE_C = Radar2D(
     position=[100.0, -200.0, 10.0], noise=[30.0, 2e-3, 40.0], field_of_view=[[0.0, 1e6], CIRCLE, [0.0, 1e5]]
 )
-SENSORS = [RADAR, FLAT, MODE_C, BEARING, PLACE]
+SENSORS = [RADAR, FLAT, MODE_C, BEARING, DIRECTION, PLACE]
 
 MOTION = ConstantVelocity(2.0)
 

@@ -10,6 +10,7 @@ from assoc import AssocWarning, InvalidInputError, Scene, associate, build_probl
 from assoc.costs import positions_and_covariances
 from assoc.plotting import plot_scene
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
+from assoc.simulation import observe
 from assoc.tracking import TRACKERS, smoothed
 from assoc.tracking.filter_choice import two_speeds
 
@@ -69,6 +70,19 @@ def test_measurements_are_relative_to_the_carrier(name):
         assert standing.in_view(found).all()
         density = sensor.false_alarm_rate / sensor.volume
         assert standing.false_alarm_rate / standing.volume == pytest.approx(density)
+
+
+def test_simulated_sensors_on_a_platform_see_what_those_standing_there_see():
+    on_board = [replace(sensor, platform=SHIP, detection_probability=0.999) for sensor in KINDS.values()]
+    times, still = np.arange(5.0, 45.0, 10.0), np.array([[300.0, 200, 50], [-700.0, 300, 10]])
+    scene = observe(on_board, times, [np.arange(2)] * 4, [still] * 4, np.random.default_rng(3))
+    for k, time in enumerate(times):
+        for sensor, z, source in zip(on_board, scene.measurements[k], scene.truth.sources[k], strict=True):
+            assert set(source.tolist()) >= {0, 1} and sensor.in_view(z).all()
+            for target in range(2):
+                exact = relative(sensor, SHIP, time, still[target], np.zeros(3))
+                off = sensor.residual(z[source == target], exact[None]) / np.sqrt(np.diagonal(sensor.covariance))
+                assert np.abs(off).max() < 4.5
 
 
 def boats(time):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from assoc.errors import InvalidInputError
-from assoc.sensors import KINDS, BearingSensor, PositionSensor, Radar2D, Radar3D
+from assoc.sensors import KINDS, BearingSensor, DirectionSensor, PositionSensor, Radar2D, Radar3D
 from assoc.sensors.base import wrap_angle
 
 CIRCLE = [-math.pi, math.pi]
@@ -21,6 +21,7 @@ SENSORS = {
     "radar2d": Radar2D(position=[100, -200, 30], noise=[50, 1e-3], field_of_view=[[0, 1e5], CIRCLE]),
     "height": Radar2D(position=[100, -200, 30], noise=[50, 1e-3, 40], field_of_view=[[0, 1e5], CIRCLE, [0, 1e4]]),
     "bearing": BearingSensor(position=[100, -200, 30], noise=[5e-3]),
+    "direction": DirectionSensor(position=[100, -200, 30], noise=[[3e-5, 1e-5], [1e-5, 4e-5]]),
     "position": PositionSensor(position=[0, 0, 0], noise=[1, 2, 3], field_of_view=[[-1, 1], [-2, 2], [0, 4]]),
     "plane": PositionSensor(position=[0, 0, 0], noise=[[2, 1], [1, 3]], field_of_view=[[-1, 1], [-2, 2]]),
 }
@@ -52,6 +53,8 @@ def test_azimuth_turns_from_x_to_y_and_elevation_up():
     np.testing.assert_allclose(radar.measure(places), expected, atol=1e-12)
     flat = Radar2D(position=[1, 2, 3], noise=[1, 0.1], field_of_view=[[0, 9], CIRCLE])
     np.testing.assert_allclose(flat.measure(places), np.array(expected)[:, :2], atol=1e-12)
+    both = DirectionSensor(position=[1, 2, 3], noise=[0.1, 0.1])
+    np.testing.assert_allclose(both.measure(places), np.array(expected)[:, 1:], atol=1e-12)
     only = BearingSensor(position=[1, 2, 3], noise=[0.1])
     np.testing.assert_allclose(only.measure(places), np.array(expected)[:, 1:2], atol=1e-12)
 
@@ -95,7 +98,7 @@ def test_volume_and_view_of_a_radar():
 def test_noise_is_standard_deviations_or_a_covariance():
     np.testing.assert_allclose(SENSORS["radar3d"].covariance, np.diag([2500, 1e-6, 4e-6]))
     np.testing.assert_allclose(SENSORS["plane"].covariance, [[2, 1], [1, 3]])
-    assert [s.dim for s in SENSORS.values()] == [3, 2, 3, 1, 3, 2]
+    assert [s.dim for s in SENSORS.values()] == [3, 2, 3, 1, 2, 3, 2]
     # a circle that was turned: rounding leaves other numbers than 0 on both sides of the diagonal
     turned = np.array([[25.0, -3.1e-16], [-7.5e-16, 25.0]])
     assert np.array_equal(dataclasses.replace(SENSORS["plane"], noise=turned).covariance, turned)

@@ -72,7 +72,7 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
     place = StateVector(sensor.position)
     if isinstance(sensor, PositionSensor):
         return LinearGaussian(mapping=tuple(mapping[: sensor.dim]), **common)
-    if isinstance(sensor, BearingSensor):
+    if type(sensor) is BearingSensor:
         return Cartesian2DToBearing(mapping=tuple(mapping[:2]), translation_offset=place[:2], **common)
     common.update(mapping=tuple(mapping), translation_offset=place, noise_covar=sensor.covariance[::-1, ::-1])
     if isinstance(sensor, Radar3D):

@@ -37,7 +37,7 @@ def linearise(code: int, dim: int, position: Array, x: float, y: float, z: float
         return
     dx, dy, dz = x - position[0], y - position[1], z - position[2]
     if code == BEARING:
-        linearise_bearing(dx, dy, h, H)
+        linearise_bearing(dim, dx, dy, dz, h, H)
     elif code == RADAR3D:
         linearise_radar3d(dx, dy, dz, h, H)
     else:
@@ -54,7 +54,7 @@ def measure(code: int, dim: int, position: Array, x: float, y: float, z: float, 
         return
     dx, dy, dz = x - position[0], y - position[1], z - position[2]
     if code == BEARING:
-        measure_bearing(dx, dy, h)
+        measure_bearing(dim, dx, dy, dz, h)
         return
     flat = measure_range_azimuth(dx, dy, dz, h)
     if code == RADAR3D:
@@ -126,7 +126,7 @@ def add_information(
     if code == POSITION:
         return add_position(dim, W, measured, at, sums)
     if code == BEARING:
-        return add_bearing(W, position, measured, at, sums)
+        return add_bearing(dim, W, position, measured, at, sums)
     if code == RADAR2D:
         return add_radar2d(W, position, measured, at, sums)
     return add_radar3d(W, position, measured, at, sums)
