@@ -48,7 +48,7 @@ _OPEN_HEIGHT, _OPEN_VELOCITY = 5e3, 200.0
 """Standard deviations of a height and of velocities that a system does not tell, metres and m/s."""
 _LEAST_BOX = 1e4
 """Least side of the box of all tracks from which a density of targets is estimated, metres."""
-_ROUNDS = 20
+_ROUNDS = 15
 """Steps of the search for the weights of an intersection."""
 _CSV = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz")
 
@@ -344,11 +344,16 @@ class _Grown(NamedTuple):
         limit = 2.0 * gammaincinv(3.0, gate)
         spread = np.linalg.inv(self.Y)
         middle = np.einsum("nij,nj->ni", spread, self.y)
-        near = np.ones((len(middle), len(number)), dtype=np.bool_)
+        reach = np.sqrt(limit * (spread[:, 0, 0].max() + tracks.covariance[:, 0, 0]))
+        order = np.argsort(middle[:, 0])
+        first = np.searchsorted(middle[order, 0], tracks.mean[:, 0] - reach)
+        count = np.searchsorted(middle[order, 0], tracks.mean[:, 0] + reach, side="right") - first
+        b = np.repeat(np.arange(len(number)), count)
+        a = order[np.arange(len(b)) - np.repeat(np.cumsum(count) - count - first, count)]
         for axis in range(6):
-            wide = spread[:, axis, axis][:, None] + tracks.covariance[:, axis, axis]
-            near &= (middle[:, axis][:, None] - tracks.mean[:, axis]) ** 2 <= limit * wide
-        a, b = np.nonzero(near)
+            wide = spread[a, axis, axis] + tracks.covariance[b, axis, axis]
+            near = (middle[a, axis] - tracks.mean[b, axis]) ** 2 <= limit * wide
+            a, b = a[near], b[near]
         away = middle[a] - tracks.mean[b]
         square = (away * np.linalg.solve(spread[a] + tracks.covariance[b], away[:, :, None])[:, :, 0]).sum(axis=1)
         inside = square <= limit
