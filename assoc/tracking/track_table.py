@@ -15,9 +15,10 @@ from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.exports.maps import FOLLOWED_WITHIN, coordinates, followed_targets
-from assoc.metrics.trajectories import last_at_each_instant
+from assoc.metrics.trajectories import Trajectories, last_at_each_instant
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
+from assoc.tracking.filter_choice import open_heights
 from assoc.tracking.quality import Qualities
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
@@ -182,6 +183,15 @@ class TrackTable(Shown):
         positions = np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
         kept = last_at_each_instant(times, ids)
         return times[kept], ids[kept], positions[kept]
+
+
+def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Trajectories]:
+    """The truth of a scene and tracks as metrics compare them: horizontally where heights are open (`open_heights`)."""
+    both = Trajectories.from_scene(scene), tracks
+    if not open_heights(scene.sensors):
+        return both
+    truth, found = (Trajectories(one.times, one.ids, one.positions[:, :2]) for one in both)
+    return truth, found
 
 
 def _nees(track: Track, positions: Sequence[int], truth: Array) -> float:

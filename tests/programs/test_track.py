@@ -1,6 +1,7 @@
 """`python -m assoc.track` as a program."""
 
 import inspect
+import json
 import os
 import re
 from dataclasses import replace
@@ -13,6 +14,7 @@ from assoc import track
 from assoc._cli.track import options as track_options
 from assoc.recordings import Recording, write_plots
 from assoc.scene import Scene, Truth
+from assoc.sensors import Radar2D
 from assoc.simulation import simulate
 from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, MultiSensorTracker
@@ -395,3 +397,24 @@ def test_tracks_that_do_not_agree_with_their_measurements_are_listed(tmp_path, c
 def test_priors_of_what_is_tracked(scene_file, tmp_path, capsys):
     assert track.main([str(scene_file), "--targets", "auto", "-o", str(tmp_path / "tracks.csv")]) == 0
     assert pd.read_csv(tmp_path / "tracks.csv").track_id.nunique() == 3
+
+
+def test_tracks_without_measured_heights_are_compared_horizontally(tmp_path, capsys):
+    """Three radars without elevations, on the same targets: the program tracks in three dimensions, and says so."""
+    scene = simulate("three-radar", 1, scans=25)
+    flat = [
+        Radar2D(position=one.position, noise=one.noise[:2], field_of_view=one.field_of_view[:2])
+        for one in scene.sensors
+    ]
+    truth = scene.truth
+    seen = observe(flat, scene.times, truth.target_ids, truth.positions, np.random.default_rng(0), region=scene.region)
+    seen.save(tmp_path / "scene.npz")
+    report, out = tmp_path / "r.html", tmp_path / "tracks.csv"
+    assert track.main([str(tmp_path / "scene.npz"), "-o", str(out), "--report", str(report)]) == 0
+    printed = capsys.readouterr().out
+    assert "heights are not measured: z comes from slant ranges" in printed
+    gospa = float(re.search(r"1000 m, horizontally\): root mean square GOSPA ([\d.]+)", printed)[1])
+    values = np.array(json.loads(re.search(r'"gospa":\s*(\{.*?\})', report.read_text())[1])["distance"])
+    assert gospa == pytest.approx(np.sqrt((values**2).mean()), rel=1e-3)
+    assert gospa < 700.0
+    assert (pd.read_csv(out)["sigma_z"] > 0.0).all()

@@ -25,6 +25,7 @@ from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 from assoc.tracking.plots import PlotTracks
+from assoc.tracking.track_table import against_truth
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,7 +146,7 @@ def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, lis
     times, ids = (frame[name].to_numpy(dtype=float) for name in ("time", "track_id"))
     frame = frame.iloc[last_at_each_instant(times, ids)]
     found = Trajectories(*(frame[name].to_numpy() for name in ("time", "track_id", ["x", "y", "z"])))
-    return gospa_over_time(Trajectories.from_scene(scene), found, cutoff)
+    return gospa_over_time(*against_truth(scene, found), cutoff)
 
 
 def _data(
