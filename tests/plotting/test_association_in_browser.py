@@ -19,6 +19,10 @@ LINK = '<a href="javascript:alert(2)">b</a>'
 MOVE = (
     "const s = document.getElementById(arguments[0]); s.value = arguments[1];s.dispatchEvent(new Event(arguments[2]))"
 )
+INSIDE = """
+const plot = document.getElementById('ants-plot'), drawn = plot.querySelector('.main-svg');
+return drawn.getBoundingClientRect().bottom <= plot.getBoundingClientRect().bottom + 1;
+"""
 READY = "return document.documentElement.dataset.ready"
 
 
@@ -155,6 +159,8 @@ def test_the_ants_over_their_cycles(browser, tmp_path, pictures, mode):
     for size in (DESKTOP, PHONE):
         show(browser, path, size)
         assert in_time(lambda: browser.execute_script("return Boolean(document.getElementById('ants-plot').data)"))
+        # the bars stay in their card
+        assert in_time(lambda: browser.execute_script(INSIDE))
         for name, factor in (("pheromone", 1.0), ("probability", 100.0), ("visibility", 1.0)):
             browser.execute_script(MOVE, "ants-measure", name, "change")
             for cycle in (0, len(history.cycles) - 1):

@@ -157,3 +157,41 @@ def test_a_crowd_fills_the_view(browser, tmp_path):
     assert in_time(lambda: browser.execute_script(last) is not None)
     assert browser.execute_script(last) is False
     assert complaints(browser) == []
+
+
+def test_tracks_are_called_by_their_names(tmp_path, scene):
+    frame = tracks_of(scene)
+    names = {10: "SWR12", 11: "4521"}
+    frame["target"] = [names.get(number, "") for number in frame.track_id]
+    write_tracking_report(tmp_path / "named.html", frame, scene)
+    assert [one.get("target") for one in data_of(tmp_path / "named.html")["tracks"]] == ["SWR12", "4521", None, None]
+    text = " ".join(parsed(tmp_path / "named.html").text)
+    assert "SWR12" in text and "name" in text
+    write_tracking_report(tmp_path / "nameless.html", tracks_of(scene), scene)
+    assert " name " not in " ".join(parsed(tmp_path / "nameless.html").text).partition("Life of the tracks")[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dark", [False, True])
+def test_on_paper_nothing_is_cut(browser, pictures, page, dark):
+    """A4 without its margins is 703 units wide."""
+    feature = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    try:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": feature})
+        show(browser, page)
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": feature})
+        metrics = {"width": 703, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+        wide = (
+            "return [...document.querySelectorAll('.main-svg, table, pre')].map((one) => one.getBoundingClientRect())"
+        )
+        assert in_time(lambda: all(0 <= one["left"] and one["right"] <= 703 for one in browser.execute_script(wide)))
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= 703
+        screenshot(browser, pictures / f"tracking-paper-{'dark' if dark else 'light'}.png")
+        white = "return document.getElementById('scene-plot')._fullLayout.paper_bgcolor"
+        assert browser.execute_script(white) == "#fff"
+        browser.execute_script("window.dispatchEvent(new Event('afterprint'))")
+        assert in_time(lambda: (browser.execute_script(white) == "#fff") is not dark)
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})

@@ -212,7 +212,11 @@ def _truth(scene: Scene | None, truth: Mapping[int, Array], decimals: int) -> li
         for target in ids:
             seen.setdefault(int(target), []).append(float(time))
     step = max(1, sum(map(len, seen.values())) // _MOST_POINTS)
-    return [{"id": target, **_path(seen[target][::step], path[::step], decimals)} for target, path in truth.items()]
+    names = scene.truth.names
+    return [
+        {"id": target, "name": names.get(target, ""), **_path(seen[target][::step], path[::step], decimals)}
+        for target, path in truth.items()
+    ]
 
 
 def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
@@ -258,6 +262,7 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
             life["nis"] = value if np.isfinite(value) else None
             life["consistent"] = "yes" if track["consistent"].all() else "no"
             life["by_sensor"] = " + ".join(str(int(track[name].iloc[-1])) for name in track.filter(like="hits_"))
+        life["name"] = (str(track["target"].iloc[0]) or None) if "target" in track else None
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
@@ -267,7 +272,7 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
 
 
 def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
-    columns = [("track", "track", "d"), ("started", "started", "t"), ("first", "first row", "t")]
+    columns = [("track", "track", "d"), ("name", "name", "s"), ("started", "started", "t"), ("first", "first row", "t")]
     columns += [("detected", "last detection", "t"), ("last", "last row", "t"), ("rows", "rows", "d")]
     columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
     columns += [("heading", "last heading, deg", ".0f"), ("altitude", "last altitude, m", ".0f")]

@@ -4,9 +4,8 @@ const byId = (id) => document.getElementById(id);
 
 // Colours of the light or dark page, as the reader prefers; a change takes effect after a reload.
 const DARK = window.matchMedia('(prefers-color-scheme: dark)').matches;
-const THEME = DARK
-  ? { ink: '#e6edf3', soft: '#a3adb8', line: '#8b949e', grid: '#30363d', faint: '#3d444d', paper: '#161b22' }
-  : { ink: '#000', soft: '#57606a', line: '#8c959f', grid: '#e5e8eb', faint: '#d3d7db', paper: '#fff' };
+const LIGHT = { ink: '#000', soft: '#57606a', line: '#8c959f', grid: '#e5e8eb', faint: '#d3d7db', paper: '#fff' };
+const THEME = DARK ? { ink: '#e6edf3', soft: '#a3adb8', line: '#8b949e', grid: '#30363d', faint: '#3d444d', paper: '#161b22' } : LIGHT;
 const PHONE = window.innerWidth < 820;
 
 const COLOURS = [DARK ? '#3d9be0' : '#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', THEME.ink];
@@ -183,5 +182,12 @@ const fail = (error) => {
   box.textContent = `This report could not be drawn: ${error.message}. Its tables are below.`;
   console.error(error);
 };
+
+// Charts have the width of the window: on paper that of the page, in ink.
+const PAPER = 690;
+const toPlots = (change) => document.querySelectorAll('.js-plotly-plot').forEach((plot) => Plotly.relayout(plot, change(plot)));
+const coloured = ({ paper, ink, grid }) => ({ paper_bgcolor: paper, plot_bgcolor: paper, 'font.color': ink, 'xaxis.gridcolor': grid, 'yaxis.gridcolor': grid });
+window.addEventListener('beforeprint', () => toPlots(() => ({ autosize: false, width: PAPER, ...coloured(LIGHT) })));
+window.addEventListener('afterprint', () => toPlots(() => ({ autosize: true, width: null, ...coloured(THEME) })));
 
 document.querySelectorAll('table.sortable').forEach(makeSortable);

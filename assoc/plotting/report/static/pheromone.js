@@ -11,6 +11,7 @@ const drawAnts = () => {
   const shown = ants.shown;
   if (!shown || !shown.cycles.length) {
     Plotly.purge(plot);
+    plot.style.height = 'auto';
     plot.replaceChildren(element('p', 'No ant walked in this scan: the bound proved the first cover to be optimal.', { class: 'note' }));
     return;
   }
@@ -34,6 +35,8 @@ const drawAnts = () => {
   layout.xaxis.type = scale;
   layout.xaxis.range = scale === 'log' ? [Math.max(Math.log10(Math.min(...all)), Math.log10(high) - 12) - 0.2, Math.log10(high) + 0.1] : [0, 1.05 * high];
   if (scale === 'log') { layout.xaxis.exponentformat = 'power'; layout.xaxis.nticks = 6; }
+  // the card grows with the bars
+  plot.style.height = `${layout.height}px`;
   Plotly.react(plot, [bars(true), bars(false)], layout, CONFIG);
 };
 

@@ -53,10 +53,12 @@ const present = (path, time) => {
   return count > 0 && (path.t[count - 1] > time - 0.75 * step || (count < path.t.length && path.t[count] - path.t[count - 1] > step)) ? count - 1 : -1;
 };
 
-const trackHover = (track, i) => [`<b>track ${track.id}</b>, t ${moment(track.t[i])}`,
+// What a track is called: by its call sign, address or code, where that is known.
+const nameOf = (track) => plain(track.target || track.id);
+const trackHover = (track, i) => [`<b>${nameOf(track)}</b>${track.target ? ` (track ${track.id})` : ''}, t ${moment(track.t[i])}`,
   ...['x', 'y', 'z'].map((axis) => `${axis} ${short(track[axis][i] * unit.factor, 5)} ${unit.name}`),
   ...(track.lat ? [`${track.lat[i].toFixed(5)}\u00b0, ${track.lon[i].toFixed(5)}\u00b0`] : []),
-  ...(track.target ? [`follows ${plain(track.target)}`] : [])].join('<br>');
+  ].join('<br>');
 
 const drawTracks = () => {
   const time = data.instants[now.index];
@@ -78,17 +80,17 @@ const drawTracks = () => {
   });
   if (now.track !== null) {
     const one = data.tracks[now.track];
-    traces.push({ ...linesOf([stretch(one, 0, one.t.length)]), name: `track ${one.id}`, line: { color: '#D55E00', width: 3 } });
+    traces.push({ ...linesOf([stretch(one, 0, one.t.length)]), name: `track ${nameOf(one)}`, line: { color: '#D55E00', width: 3 } });
   }
   const here = data.truth.map((one) => [one, present(one, time)]).filter(([, i]) => i >= 0);
   if (data.truth.length) {
-    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target id ${one.id}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: sign(14), line: { width: sign(2), color: THEME.ink } } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target ${plain(one.name || one.id)}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: sign(14), line: { width: sign(2), color: THEME.ink } } });
   }
   const live = data.tracks.map((one, number) => [one, present(one, time), number]).filter(([, i]) => i >= 0);
   const named = live.length <= 40;
   traces.push({
     type: 'scatter', mode: named ? 'markers+text' : 'markers', name: 'tracks', x: live.map(([one, i]) => one.x[i] * unit.factor), y: live.map(([one, i]) => one.y[i] * unit.factor),
-    text: live.map(([one]) => String(one.id)), textposition: 'top right', textfont: { size: 11 }, customdata: live.map(([, , number]) => number),
+    text: live.map(([one]) => nameOf(one)), textposition: 'top right', textfont: { size: 11 }, customdata: live.map(([, , number]) => number),
     hovertext: live.map(([one, i]) => trackHover(one, i)), hoverinfo: 'text', marker: { symbol: 'circle', size: sign(8), color: live.map(([, , number]) => colourOf(number)), line: { width: 1, color: THEME.paper } },
   });
   if (data.sensors.length) {
@@ -106,7 +108,7 @@ const drawTracks = () => {
     plot.dataset.listens = 'yes';
     plot.on('plotly_click', (event) => { if (typeof event.points[0].customdata === 'number') chooseTrack(event.points[0].customdata); });
   }
-  byId('detail').textContent = `${live.length} tracks${data.truth.length ? `, ${here.length} targets` : ''} at this time${now.track === null ? '' : `; chosen: track ${data.tracks[now.track].id}`}`;
+  byId('detail').textContent = `${live.length} tracks${data.truth.length ? `, ${here.length} targets` : ''} at this time${now.track === null ? '' : `; chosen: track ${data.tracks[now.track].target || data.tracks[now.track].id}`}`;
 };
 
 const marker = (at = onAxis(data.instants)[now.index]) => ({ type: 'line', x0: at, x1: at, yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } });
@@ -145,7 +147,7 @@ const drawHistories = () => {
     // only the longest tracks: more lines cannot be distinguished
     const told = data.tracks.filter((one) => one.h && one.h.some((h) => h !== null));
     const longest = [...told].sort((a, b) => b.t.length - a.t.length).slice(0, 30);
-    overTime('altitude-plot', longest.map((one) => [`track ${one.id}`, one.t, one.h]), 'altitude (m)');
+    overTime('altitude-plot', longest.map((one) => [`track ${nameOf(one)}`, one.t, one.h]), 'altitude (m)');
   }
   overTime('counts-plot', counts, 'tracks (number)');
 };
