@@ -64,7 +64,7 @@ def _live(words: list[str]) -> None:
     def show(pictures: Iterable[Picture]) -> None:
         nonlocal losing
         for picture in pictures:
-            outputs.show(picture)
+            outputs.show(picture, 0 if lines is None else lines.lost)
             if lines is not None and lines.lost and not losing:
                 losing = True
                 _print("datagrams are lost: they come quicker than tracks can be made")
@@ -175,7 +175,7 @@ class _Outputs:
     def __init__(self, path: str | None, page: LivePage | None, tracker: LiveTracker, going_on: bool) -> None:
         from assoc._cli.track.plot_lines import TrackWriter
 
-        self._page = page
+        self._page, self._tracker = page, tracker
         self._name = "stdout" if path in (None, STDOUT) else path
         self._stream: IO[str] = sys.stdout
         if path not in (None, STDOUT):
@@ -185,12 +185,13 @@ class _Outputs:
         with self._writing():
             self._writer = TrackWriter(self._stream, tracker.positions, origin, known, begun=begun)
 
-    def show(self, picture: Picture) -> None:
-        """Write the changes."""
+    def show(self, picture: Picture, lost: int) -> None:
+        """Write the changes; `lost` datagrams were lost so far."""
         with self._writing():
             self._writer.write(picture)
         if self._page is not None:
-            self._page.show(picture)
+            odd = {kind: count for kind, count in self._tracker.counts.items() if kind != "plots"}
+            self._page.show(picture, self._tracker.heard, odd | ({"lost": lost} if lost else {}))
 
     def close(self) -> None:
         """Close the outputs."""

@@ -3,6 +3,7 @@
 import errno
 import http.client
 import io
+import itertools
 import socket
 import threading
 import time
@@ -16,6 +17,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage, server
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
+from assoc.tracking.live.pictures import Heard
 from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
@@ -31,8 +33,41 @@ def film(scene):
     return [picture for plot in replayed(scene, 0.0) for picture in tracker.take(*plot)]
 
 
+HEARD = [
+    Heard("radar 1", 29.5, 120, 0, False),
+    Heard("radar 2", 14.0, 60, 3, True),
+    Heard("radar 3", -np.inf, 0, 0, False),
+]
+
+
 def wait_for(browser, script):
     assert in_time(lambda: browser.execute_script(script)), browser.execute_script("return state.textContent")
+
+
+# boxes of the labels that were written: the texts beside a point, not that of the ruler
+LABELS = """
+const boxes = [], write = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  if (x !== 18) boxes.push([x, y - 11, x + this.measureText(text).width, y + 2]);
+  return write.call(this, text, x, y);
+};
+draw();
+CanvasRenderingContext2D.prototype.fillText = write;
+return boxes;
+"""
+POINTER = """
+const [a, b] = place(arguments[0], arguments[1]), box = map.getBoundingClientRect();
+for (const name of ["pointerdown", "pointerup"]) {
+  map.dispatchEvent(new PointerEvent(name, {pointerId: 1, clientX: box.x + a + 3, clientY: box.y + b - 2}));
+}
+"""
+PINCH = """
+const box = map.getBoundingClientRect();
+const point = (name, id, x) => map.dispatchEvent(
+  new PointerEvent(name, {pointerId: id, clientX: box.x + x, clientY: box.y + 100}));
+point("pointerdown", 1, 100); point("pointerdown", 2, 150); point("pointermove", 2, 200);
+point("pointerup", 1, 100); point("pointerup", 2, 200);
+"""
 
 
 @pytest.mark.slow
@@ -51,7 +86,7 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         shots = []
         for part in (film[:12], film[12:]):
             for one in part:
-                page.show(one)
+                page.show(one, HEARD, {"late": 2, "lost": 7, "repeated": 0})
             wait_for(browser, f"return time === {part[-1].time} && !pending")
             name = f"live-{'dark' if dark else 'light'}-{size[0]}-{len(shots)}.png"
             shots.append(screenshot(browser, pictures / name))
@@ -60,14 +95,47 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         first, second = (np.asarray(Image.open(io.BytesIO(one)).convert("RGB")).astype(int) for one in shots)
         assert first.shape == second.shape and (np.abs(first - second).sum(axis=2) > 60).sum() > 200
         assert f"{len(film[-1].tracks)} tracks" in browser.execute_script("return state.textContent")
+        said = browser.execute_script("return state.textContent")
+        assert said.endswith(", 2 late, 7 lost")
+        chips = browser.execute_script(
+            "return [...document.querySelectorAll('#sensors li')].map((one) => one.textContent)"
+        )
+        assert chips[1:] == ["radar 2: silent since 14 s, 60 plots, 3 refused", "radar 3: not heard yet, 0 plots"]
+        assert chips[0].startswith("radar 1: ") and chips[0].endswith(" s ago, 120 plots")
         # a title is text, whatever it says
         assert browser.execute_script("return document.querySelector('h1').textContent") == "<b>Radars</b>"
         assert browser.execute_script("return document.querySelector('h1 b')") is None
+        browser.execute_script("view = null; draw()")
         scale = browser.execute_script("return view.scale")
         browser.execute_script("map.dispatchEvent(new WheelEvent('wheel', {deltaY: -500, cancelable: true}))")
         assert browser.execute_script("return view.scale") > scale
         browser.execute_script("document.getElementById('fit').click()")
         wait_for(browser, f"return !pending && view && Math.abs(view.scale - {scale}) < 1e-9")
+        for id, change in (("nearer", 1.5), ("farther", 1.0)):
+            browser.execute_script(f"document.getElementById('{id}').click()")
+            assert browser.execute_script("return view.scale") == pytest.approx(change * scale)
+        boxes = browser.execute_script(LABELS)
+        apart = [
+            a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1] for a, b in itertools.combinations(boxes, 2)
+        ]
+        assert len(boxes) >= 5 and all(apart)
+        # a click shows a track, n the next, Escape none
+        id, x, y, *_ = browser.execute_script("return tracks[0]")
+        browser.execute_script(POINTER, x, y)
+        assert browser.execute_script("return chosen") == id
+        screenshot(browser, pictures / f"live-{'dark' if dark else 'light'}-{size[0]}-track.png")
+        text = browser.execute_script("return detail.textContent")
+        assert text.startswith(f"Track{id}") and "m/s" in text and "Since" in text
+        for key, expected in (("n", "tracks[1][0]"), ("p", "tracks[0][0]"), ("Escape", "null")):
+            browser.execute_script(f"map.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}))")
+            assert browser.execute_script(f"return chosen === {expected}")
+        # two fingers twice as far apart, and the arrows
+        for script, change in ((PINCH, 2.0), ("map.dispatchEvent(new KeyboardEvent('keydown', {key: '0'}))", 1.0)):
+            browser.execute_script(script)
+            wait_for(browser, f"return !pending && Math.abs(view.scale / {scale} - {change}) < 0.01")
+        before = browser.execute_script("return view.x")
+        browser.execute_script("map.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}))")
+        assert browser.execute_script("return view.x") > before
         for name in ("labels", "plots"):
             browser.execute_script(f"document.getElementById('{name}').click()")
             assert browser.execute_script(f"return show.{name}") is False

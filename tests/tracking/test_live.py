@@ -278,6 +278,26 @@ def test_a_plot_without_values_is_left_out(scene):
     )
 
 
+def test_what_is_heard_of_each_sensor(scene):
+    tracker, _ = live(scene)
+    plots = [*replayed(scene, 0.0)]
+    first = next(plot for plot in plots if plot.sensor == "1")
+    tracker.take("1", first.time, first.values[:1])
+    tracker.take(*first[:3])
+    tracker.take(*first[:3])
+    one, two, _ = tracker.heard
+    assert one == (scene.sensors[0].name, first.time, 1, 2, False)
+    assert two == (scene.sensors[1].name, -math.inf, 0, 0, False)
+    tracker.take("2", first.time, first.values)
+    for plot in plots:
+        if plot.sensor != "2":
+            tracker.take(*plot)
+    for plot in plots:
+        if plot.sensor == "1":
+            tracker.take("1", plot.time + 35.0, plot.values)
+    assert [one.silent for one in tracker.heard] == [False, True, True]
+
+
 def pictured(pictures):
     """Pictures as plain values."""
     return [

@@ -1,9 +1,10 @@
 "use strict";
 // Draws what the server pushes: sensors, plots that fade, tracks with their trails, speeds and ids.
-const canvas = document.getElementById("map"), state = document.getElementById("state");
+const byId = (id) => document.getElementById(id);
+const canvas = byId("map"), state = byId("state"), detail = byId("detail");
 const show = { labels: true, plots: true };
-const TRAIL = 40, FADE = 4, LEADER = 30;
-let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], view = null, ended = false, pending = false;
+const TRAIL = 40, FADE = 4, LEADER = 30, NEAR = 18, STEP = 1.5;
+let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], counts = {}, view = null, ended = false, pending = false, chosen = null;
 
 function style(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
@@ -15,6 +16,21 @@ function fit() {
 
 function place(x, y) {
   return [canvas.clientWidth / 2 + (x - view.x) * view.scale, canvas.clientHeight / 2 - (y - view.y) * view.scale];
+}
+
+// Zoom by a factor; what is at the point (a, b) of the canvas stays there.
+function zoom(factor, a = canvas.clientWidth / 2, b = canvas.clientHeight / 2) {
+  if (!view) return;
+  const away = [a - canvas.clientWidth / 2, canvas.clientHeight / 2 - b];
+  const now = view.scale * factor;
+  view = { x: view.x + away[0] / view.scale - away[0] / now, y: view.y + away[1] / view.scale - away[1] / now, scale: now };
+  redraw();
+}
+
+function move(right, down) {
+  if (!view) return;
+  view.x += right / view.scale; view.y -= down / view.scale;
+  redraw();
 }
 
 function redraw() { if (!pending) { pending = true; requestAnimationFrame(draw); } }
@@ -32,11 +48,12 @@ function draw() {
   g.clearRect(0, 0, w, h);
   g.font = "12px system-ui, sans-serif";
   ruler(g, h);
+  const taken = [];
   g.fillStyle = style("--sensor");
   for (const [name, x, y] of scene.sensors) {
     const [a, b] = place(x, y);
     g.beginPath(); g.moveTo(a, b - 6); g.lineTo(a + 6, b + 5); g.lineTo(a - 6, b + 5); g.fill();
-    g.fillText(name, a + 9, b + 4);
+    label(g, taken, name, a, b);
   }
   if (show.plots) {
     g.fillStyle = style("--plot");
@@ -46,16 +63,30 @@ function draw() {
     });
     g.globalAlpha = 1;
   }
-  const ink = style("--ink"), colour = style("--track");
-  for (const [id, x, y, z, vx, vy] of tracks) {
-    g.strokeStyle = colour; g.fillStyle = colour; g.lineWidth = 1.5;
+  const ink = style("--ink"), colour = style("--track"), marked = style("--chosen");
+  // the chosen one first, so that it has its label
+  for (const [id, x, y, height, vx, vy] of [...tracks].sort((one, other) => (other[0] === chosen) - (one[0] === chosen))) {
+    g.strokeStyle = g.fillStyle = id === chosen ? marked : colour; g.lineWidth = id === chosen ? 2.5 : 1.5;
     g.globalAlpha = 0.5; g.beginPath();
     (trails.get(id) || []).forEach(([u, v], i) => { const [a, b] = place(u, v); if (i) g.lineTo(a, b); else g.moveTo(a, b); });
     g.stroke(); g.globalAlpha = 1;
     const [a, b] = place(x, y), [c, d] = place(x + LEADER * vx, y + LEADER * vy);
     g.beginPath(); g.moveTo(a, b); g.lineTo(c, d); g.stroke();
     g.beginPath(); g.arc(a, b, 4, 0, 2 * Math.PI); g.fill();
-    if (show.labels) { g.fillStyle = ink; g.fillText(z === null ? String(id) : id + "  " + Math.round(z) + " m", a + 7, b - 7); }
+    if (show.labels || id === chosen) { g.fillStyle = ink; label(g, taken, height === null ? String(id) : id + "  " + Math.round(height) + " m", a, b); }
+  }
+}
+
+// Write a text beside a point where none is yet, or not at all.
+function label(g, taken, text, a, b) {
+  const w = g.measureText(text).width, h = 13;
+  for (const [x, y] of [[a + 8, b - 7], [a + 8, b + 15], [a - 8 - w, b - 7], [a - 8 - w, b + 15]]) {
+    const box = [x - 2, y - h, x + w + 2, y + 3];
+    if (box[0] < 0 || box[2] > canvas.clientWidth) continue;
+    if (taken.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
+    taken.push(box);
+    g.fillText(text, x, y);
+    return;
   }
 }
 
@@ -70,12 +101,23 @@ function ruler(g, h) {
 }
 
 function take(picture) {
-  time = picture.time; tracks = picture.tracks;
+  time = picture.time; tracks = picture.tracks; counts = picture.counts;
   plots = [picture.plots, ...plots].slice(0, FADE);
   const alive = new Map();
   for (const [id, x, y] of tracks) alive.set(id, [...(trails.get(id) || []), [x, y]].slice(-TRAIL));
   trails = alive;
-  say(); redraw();
+  chips(picture.heard); describe(); say(); redraw();
+}
+
+// A chip for each sensor: when it was heard last, and how many plots were taken and refused.
+function chips(heard) {
+  byId("sensors").replaceChildren(...heard.map(([name, last, count, refused, silent]) => {
+    const chip = document.createElement("li");
+    const ago = last === null ? "not heard yet" : silent ? "silent since " + moment(last) : Math.max(0, time - last).toFixed(1) + " s ago";
+    chip.textContent = name + ": " + ago + ", " + count + " plots" + (refused ? ", " + refused + " refused" : "");
+    chip.classList.toggle("silent", silent || last === null);
+    return chip;
+  }));
 }
 
 // Unix times as UTC.
@@ -85,13 +127,35 @@ function moment(time) {
 
 function say(word) {
   const count = plots.length ? plots[0].length : 0;
-  state.textContent = (word ? word + ": " : "") + moment(time) + ", " + tracks.length + " tracks, " + count + " plots";
+  const odd = Object.entries(counts).filter(([, number]) => number).map(([kind, number]) => ", " + number + " " + kind).join("");
+  state.textContent = (word ? word + ": " : "") + moment(time) + ", " + tracks.length + " tracks, " + count + " plots" + odd;
+}
+
+function choose(id) { chosen = id; describe(); redraw(); }
+
+function describe() {
+  const track = tracks.find((one) => one[0] === chosen);
+  detail.hidden = chosen === null;
+  if (chosen === null) return;
+  if (!track) { detail.textContent = "Track " + chosen + " has ended"; return; }
+  const [id, x, y, height, vx, vy, hits, started, latitude, longitude] = track;
+  const heading = (Math.atan2(vx, vy) * 180 / Math.PI + 360) % 360;
+  const rows = [["Track", id], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
+  if (latitude !== undefined) rows.push(["Place", latitude.toFixed(5) + "\u00b0, " + longitude.toFixed(5) + "\u00b0"]);
+  rows.push(["Height", height === null ? "unknown" : Math.round(height) + " m"], ["Speed", Math.hypot(vx, vy).toFixed(1) + " m/s"]);
+  rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Scans with a detection", hits], ["Since", moment(started)]);
+  const list = document.createElement("dl");
+  for (const [name, value] of rows) {
+    for (const [tag, text] of [["dt", name], ["dd", value]]) list.appendChild(document.createElement(tag)).textContent = text;
+  }
+  detail.replaceChildren(list);
 }
 
 const events = new EventSource("/events");
 events.addEventListener("scene", (event) => {
   scene = JSON.parse(event.data);
   if (scene.title) { document.title = scene.title; document.querySelector("h1").textContent = scene.title; }
+  chips(scene.sensors.map(([name]) => [name, null, 0, 0, false]));
   redraw();
 });
 events.addEventListener("picture", (event) => take(JSON.parse(event.data)));
@@ -99,23 +163,66 @@ events.addEventListener("end", () => { ended = true; events.close(); say("ended"
 events.onerror = () => { if (!ended) say("connection lost"); };
 
 for (const name of ["labels", "plots"]) {
-  const button = document.getElementById(name);
+  const button = byId(name);
   button.addEventListener("click", () => {
     show[name] = !show[name]; button.setAttribute("aria-pressed", String(show[name])); redraw();
   });
 }
-document.getElementById("fit").addEventListener("click", () => { view = null; redraw(); });
+byId("fit").addEventListener("click", () => { view = null; redraw(); });
+byId("nearer").addEventListener("click", () => zoom(STEP));
+byId("farther").addEventListener("click", () => zoom(1 / STEP));
 window.addEventListener("resize", redraw);
 
-let drag = null;
-canvas.addEventListener("pointerdown", (event) => { drag = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
-canvas.addEventListener("pointerup", () => { drag = null; });
-canvas.addEventListener("pointermove", (event) => {
-  if (!drag || !view) return;
-  view.x -= (event.clientX - drag[0]) / view.scale; view.y += (event.clientY - drag[1]) / view.scale;
-  drag = [event.clientX, event.clientY]; redraw();
+// Pointers on the map: one drags or clicks, two pinch.
+const pointers = new Map();
+let moved = false;
+const spread = () => { const [one, other] = [...pointers.values()]; return Math.hypot(one[0] - other[0], one[1] - other[1]); };
+canvas.addEventListener("pointerdown", (event) => {
+  pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+  moved = pointers.size > 1;
+  try { canvas.setPointerCapture(event.pointerId); } catch { /* a pointer that is gone already */ }
 });
+canvas.addEventListener("pointermove", (event) => {
+  const before = pointers.get(event.pointerId);
+  if (!before || !view) return;
+  const here = [event.offsetX, event.offsetY];
+  if (pointers.size === 2) {
+    const apart = spread();
+    pointers.set(event.pointerId, here);
+    const [one, other] = [...pointers.values()];
+    if (apart > 0) zoom(spread() / apart, (one[0] + other[0]) / 2, (one[1] + other[1]) / 2);
+    return;
+  }
+  if (!moved && Math.hypot(here[0] - before[0], here[1] - before[1]) < 4) return;
+  moved = true;
+  pointers.set(event.pointerId, here);
+  move(before[0] - here[0], before[1] - here[1]);
+});
+for (const name of ["pointerup", "pointercancel"]) {
+  canvas.addEventListener(name, (event) => {
+    pointers.delete(event.pointerId);
+    if (moved || !view || name === "pointercancel") return;
+    const far = tracks.map(([id, x, y]) => { const [a, b] = place(x, y); return [Math.hypot(a - event.offsetX, b - event.offsetY), id]; });
+    const [distance, id] = far.sort((one, other) => one[0] - other[0])[0] || [Infinity, null];
+    choose(distance < NEAR ? id : null);
+  });
+}
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
-  if (view) { view.scale *= Math.exp(-0.0015 * event.deltaY); redraw(); }
+  zoom(Math.exp(-0.0015 * event.deltaY), event.offsetX, event.offsetY);
 }, { passive: false });
+
+const KEYS = {
+  ArrowLeft: () => move(-60, 0), ArrowRight: () => move(60, 0), ArrowUp: () => move(0, -60), ArrowDown: () => move(0, 60),
+  "+": () => zoom(STEP), "=": () => zoom(STEP), "-": () => zoom(1 / STEP), 0: () => { view = null; redraw(); },
+  n: () => next(1), p: () => next(-1), Escape: () => choose(null),
+};
+function next(step) {
+  const ids = tracks.map(([id]) => id), at = ids.indexOf(chosen);
+  if (ids.length) choose(ids[at < 0 ? 0 : (at + step + ids.length) % ids.length]);
+}
+canvas.addEventListener("keydown", (event) => {
+  if (!KEYS[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  KEYS[event.key]();
+});

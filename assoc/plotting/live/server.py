@@ -7,9 +7,11 @@ nothing from elsewhere.
 from __future__ import annotations
 
 import json
+import math
 import queue
 import threading
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -23,6 +25,7 @@ from assoc.scene.scene import Scene
 
 if TYPE_CHECKING:
     from assoc.tracking import Picture, Track
+    from assoc.tracking.live.pictures import Heard
 
 _FOLDER = Path(__file__).parent
 _FILES = {
@@ -91,22 +94,39 @@ class LivePage:
         """URL of the page."""
         return f"http://127.0.0.1:{self._server.server_address[1]}/"
 
-    def show(self, picture: Picture) -> None:
-        """Push a picture to all connected browsers."""
+    def show(self, picture: Picture, heard: Sequence[Heard] = (), counts: Mapping[str, int] | None = None) -> None:
+        """Push a picture to all connected browsers.
+
+        Parameters
+        ----------
+        picture : Picture
+        heard : sequence of Heard
+            What is known of each sensor, `LiveTracker.heard`.
+        counts : mapping of str to int, optional
+            Plots that were late, refused or lost, by reason.
+        """
         tracks = [self._row(track) for track in picture.tracks]
         plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
-        content = {"time": picture.time, "tracks": tracks, "plots": plots, "sensors": picture.sensors.tolist()}
+        content = {
+            "time": picture.time,
+            "tracks": tracks,
+            "plots": plots,
+            "sensors": picture.sensors.tolist(),
+            "heard": [[one.name, one.last if math.isfinite(one.last) else None, *one[2:]] for one in heard],
+            "counts": dict(counts or {}),
+        }
         self._push(_event("picture", content | {"ended": picture.ended}))
 
     def _row(self, track: Track) -> list[Any]:
-        """Id, x, y, height, vx, vy; with an origin latitude and longitude, too."""
+        """Id, x, y, height, vx, vy, hits, start; with an origin latitude and longitude, too."""
         x, y, height = track.position.tolist()
         earth = [] if self._origin is None else coordinates(track.position, self._origin)[0].tolist()
         if earth:
             height = earth.pop()
         known = round(height, _DIGITS) if self._heights else None
         plane = np.round([x, y, *track.velocity[:2]], _DIGITS).tolist()
-        return [track.track_id, *plane[:2], known, *plane[2:], *(round(angle, 6) for angle in earth)]
+        life = track.hits, round(track.started, 3)
+        return [track.track_id, *plane[:2], known, *plane[2:], *life, *(round(angle, 6) for angle in earth)]
 
     def _push(self, event: str) -> None:
         with self._lock:

@@ -24,7 +24,7 @@ from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
-from assoc.tracking.live.pictures import Antenna, Picture, PlotKey, SoundPlot
+from assoc.tracking.live.pictures import Antenna, Heard, Picture, PlotKey, SoundPlot
 from assoc.tracking.tracker import Tracker
 
 JUMP = 60.0
@@ -133,6 +133,7 @@ class LiveTracker:
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
+        self._refused = [0] * len(scene.sensors)
         self.counts: Counter[str] = Counter()
         """Plots used, late plots, and those that could not be used, by reason."""
         self.seconds: deque[float] = deque(maxlen=_MOST_TIMED)
@@ -174,9 +175,20 @@ class LiveTracker:
         """
         state_file.restore(path, self)
 
-    def leave_out(self, kind: str, line: str) -> None:
-        """Count a plot that cannot be used; report the first of its kind."""
+    @property
+    def heard(self) -> list[Heard]:
+        """What is known of each sensor."""
+        rows = zip(self.state.antennas, self._refused, strict=True)
+        return [
+            Heard(str(self.settings.name_of(s)), antenna.last, antenna.plots, refused, antenna.silent)
+            for s, (antenna, refused) in enumerate(rows)
+        ]
+
+    def leave_out(self, kind: str, line: str, sensor: int | None = None) -> None:
+        """Count a plot (of a sensor, by its index) that cannot be used; report the first of its kind."""
         self.counts[kind] += 1
+        if sensor is not None:
+            self._refused[sensor] += 1
         if self.counts[kind] == 1:
             self.settings.tell(f"{line}; further ones are only counted")
 
@@ -230,15 +242,15 @@ class LiveTracker:
             z = checked(np.array([values], dtype=np.float64), s, sensor)[0]
             known = checked_identities([np.array([identity])], [1])[0][0]
         except (AssocError, TypeError, ValueError) as error:
-            self.leave_out("unusable", f"plot of {where} left out: {error}")
+            self.leave_out("unusable", f"plot of {where} left out: {error}", s)
             return []
         if not abs(time) <= LARGEST:
-            self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds")
+            self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds", s)
             return []
         plot, state = SoundPlot(s, time, z, known), self.state
         # a repetition of a doubted plot does not confirm its time
         if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
-            self.leave_out("repeated", f"{where} repeats a plot of {moment(time)}: left out")
+            self.leave_out("repeated", f"{where} repeats a plot of {moment(time)}: left out", s)
             return []
         return self._timed(plot)
 
@@ -253,7 +265,9 @@ class LiveTracker:
             state.ahead.append(plot)
             return self._jump() if len(state.ahead) >= _AGREE else []
         if time < state.end - settings.interval - settings.horizon:
-            self.leave_out("too old", f"plot of {moment(time)} is more than {settings.horizon:g} s late: left out")
+            self.leave_out(
+                "too old", f"plot of {moment(time)} is more than {settings.horizon:g} s late: left out", plot.sensor
+            )
             state.behind.add(plot.key)
             if len(state.behind) < _AGREE:
                 return []
@@ -295,7 +309,7 @@ class LiveTracker:
     def _drop_ahead(self) -> None:
         for plot in self.state.ahead:
             where, ahead = self.settings.name_of(plot.sensor), plot.time - self.state.newest
-            self.leave_out("ahead", f"plot of {where} is {ahead:g} s ahead of all others: left out")
+            self.leave_out("ahead", f"plot of {where} is {ahead:g} s ahead of all others: left out", plot.sensor)
         self.state.ahead = []
 
     def _jump(self) -> list[Picture]:

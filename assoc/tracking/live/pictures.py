@@ -50,6 +50,20 @@ class Picture(NamedTuple):
     """Sensor of each plot, (n,)."""
 
 
+class Heard(NamedTuple):
+    """What is known of a sensor."""
+
+    name: str
+    last: float
+    """Time of its newest plot, seconds; -inf before the first."""
+    plots: int
+    """Plots used since the tracks began."""
+    refused: int
+    """Plots that could not be used."""
+    silent: bool
+    """Whether it is treated as switched off."""
+
+
 class Antenna(NamedTuple):
     """An antenna, as estimated from its plots so far."""
 
