@@ -245,7 +245,7 @@ def test_commands_of_the_first_hour_run(tmp_path, monkeypatch, capsys):
     """Those that begin with assoc, in their order; blocks of TOML are files first."""
     pytest.importorskip("plotly")
     monkeypatch.chdir(tmp_path)
-    for page in ("from_files",):
+    for page in ("from_files", "live"):
         text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
         for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL):
             (tmp_path / "radars.toml").write_text(block, encoding="utf-8")
@@ -253,3 +253,16 @@ def test_commands_of_the_first_hour_run(tmp_path, monkeypatch, capsys):
         assert commands
         for words in map(shlex.split, commands):
             assert main(words) == 0, (page, words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(("page", "section"), [("ant_colony", "## Equations 7 to 11"), ("live", "# Live operation")])
+def test_python_of_the_pages_runs(page, section, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    blocks = re.findall(r"```python\n(.*?)```", text[text.index(section) :], re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(block, names)
+    if page == "live":
+        assert (tmp_path / "radars.npz").exists()
