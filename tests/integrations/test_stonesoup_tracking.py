@@ -2,8 +2,10 @@
 
 import itertools
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -16,8 +18,12 @@ from assoc.simulation import simulate
 
 pytest.importorskip("stonesoup")
 
+from stonesoup.dataassociator.mfa import MFADataAssociator
 from stonesoup.dataassociator.neighbour import GNNWith2DAssignment
+from stonesoup.dataassociator.probability import JPDA
+from stonesoup.deleter.time import UpdateTimeStepsDeleter
 from stonesoup.hypothesiser.distance import DistanceHypothesiser
+from stonesoup.hypothesiser.mfa import MFAHypothesiser
 from stonesoup.hypothesiser.probability import PDAHypothesiser
 from stonesoup.measures import Mahalanobis
 from stonesoup.models.measurement.linear import LinearGaussian
@@ -27,12 +33,20 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.state import GaussianState
 from stonesoup.types.track import Track
+from stonesoup.types.update import Update
 from stonesoup.updater.kalman import ExtendedKalmanUpdater
 
-from assoc.integrations.stonesoup import AssignmentAssociator, FusionFeeder, SceneDetectionReader, adapt
+from assoc.integrations.stonesoup import (
+    AssignmentAssociator,
+    AssignmentInitiator,
+    FusionFeeder,
+    SceneDetectionReader,
+    adapt,
+)
 from assoc.integrations.stonesoup.ordering import sorted_detections
 from tests.integrations.test_stonesoup_scenes import adapted, planar_model
 
+ROOT = Path(__file__).parents[2]
 ZERO = datetime(2026, 1, 1)
 PREDICTOR = KalmanPredictor(CombinedLinearGaussianTransitionModel([ConstantVelocity(1.0)] * 2))
 UPDATER = ExtendedKalmanUpdater()
@@ -173,6 +187,51 @@ def test_false_alarms_are_dropped_and_empty_scans_pass():
     later = ZERO + timedelta(seconds=1)
     feeder = FusionFeeder([(ZERO, {lone}), (later, set())], [adapt(m, max_range=2e4) for m in models])
     assert [(time, len(found)) for time, found in feeder] == [(ZERO, 0), (later, 0)]
+
+
+PAIRS = {
+    "single": lambda pda: GNNWith2DAssignment(by_distance()),
+    "mixture": JPDA,
+    "frames": lambda pda: MFADataAssociator(MFAHypothesiser(pda), slide_window=3),
+    "ours": lambda pda: AssignmentAssociator(pda, solver="greedy"),
+}
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_an_initiator_for_every_hypothesiser_and_associator(kind):
+    pda = PDAHypothesiser(PREDICTOR, UPDATER, clutter_spatial_density=1e-4, prob_detect=0.9, prob_gate=0.999)
+    prior = GaussianState(StateVector(np.zeros(4)), np.diag([0.0, 25.0, 0.0, 25.0]), timestamp=ZERO)
+    associator = PAIRS[kind](pda)
+    initiator = AssignmentInitiator(prior, UpdateTimeStepsDeleter(3), associator, UPDATER, min_points=3)
+    assert (initiator.data_associator is associator) == (kind == "ours")
+    for k in range(4):
+        time = ZERO + timedelta(seconds=k)
+        seen = {Detection(StateVector([x + 5 * k, 0.0]), timestamp=time, measurement_model=SENSOR) for x in (0, 500)}
+        tracks = initiator.initiate(seen, time)
+        assert len(tracks) == (2 if k == 2 else 0)
+        assert all(isinstance(state, Update) for track in tracks for state in track)
+
+
+def test_stone_soup_finds_the_plugin(tmp_path):
+    """By the entry point of pyproject.toml, whether or not this tree's installation is as new as it."""
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        points = tomllib.load(file)["project"]["entry-points"]["stonesoup.plugins"]
+    about = tmp_path / "plugin-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(f"[stonesoup.plugins]\nassoc = {points['assoc']}\n")
+    script = "from stonesoup.plugins.assoc import AssignmentAssociator, AssignmentInitiator"
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    subprocess.run([sys.executable, "-W", "error", "-c", script], check=True, env={**os.environ, "PYTHONPATH": path})
+
+
+@pytest.mark.slow
+def test_the_page_runs_as_printed(capsys):
+    page = (ROOT / "docs" / "stonesoup.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```(python|text)\n(.*?)```", page, re.DOTALL)
+    script = "\n".join(text for kind, text in blocks if kind == "python")
+    exec(compile(script, "stonesoup.md", "exec", dont_inherit=True), {"__name__": "page"})
+    assert capsys.readouterr().out == "".join(text for kind, text in blocks if kind == "text")
 
 
 @pytest.mark.slow

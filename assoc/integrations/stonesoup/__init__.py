@@ -1,7 +1,7 @@
 """Adapter to Stone Soup 1.9: its trackers with our solvers, and scenes in both directions.
 
-``pip install 'assoc[stonesoup]'``. Sets are sorted by content before use, so that results do not depend
-on their iteration order, which changes from run to run.
+``pip install 'assoc[stonesoup]'``. Stone Soup knows it as the plugin ``stonesoup.plugins.assoc``, too. Sets are sorted
+by content before use, so that results do not depend on their iteration order, which changes from run to run.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ except ImportError as error:
 from assoc.integrations.stonesoup.adapted import AdaptedSensor, adapt
 from assoc.integrations.stonesoup.associator import AssignmentAssociator
 from assoc.integrations.stonesoup.fusion import FusionFeeder
+from assoc.integrations.stonesoup.initiator import AssignmentInitiator
 from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing, measurement_model
 from assoc.integrations.stonesoup.readers import SceneDetectionReader, SceneGroundTruthReader
 from assoc.integrations.stonesoup.scenes import scene_from_detections
@@ -21,6 +22,7 @@ from assoc.integrations.stonesoup.scenes import scene_from_detections
 __all__ = [
     "AdaptedSensor",
     "AssignmentAssociator",
+    "AssignmentInitiator",
     "CartesianToSlantRangeBearing",
     "FusionFeeder",
     "SceneDetectionReader",
