@@ -7,6 +7,7 @@ from assoc import InvalidInputError, Scene, simulation
 from assoc._cli.track import options
 from assoc.sensors import Radar2D
 from assoc.tracking import Initiation, MultiSensorTracker
+from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise
 from assoc.tracking.target_kinds import TARGETS, target_kind
 
@@ -54,7 +55,7 @@ def test_priors_of_a_kind():
     ship = MultiSensorTracker.for_scene(scene, targets="ship").settings
     assert np.max(ship.initiation.speed) == 5.0
     given = MultiSensorTracker.for_scene(scene, targets="ship", initiation=Initiation(speed=9.0)).settings
-    assert np.max(given.initiation.speed) == 9.0 and repr(given.filter) == repr(ship.filter)
+    assert np.max(given.initiation.speed) == 9.0 and described(given.filter) == described(ship.filter)
     assert tuple(TARGETS) == options.TARGETS
 
 
