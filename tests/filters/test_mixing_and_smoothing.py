@@ -297,7 +297,7 @@ def test_discrete_noise_is_the_papers():
     assert F[0, 2] == dt and F[0, 4] == dt**2 / 2 and F[2, 4] == dt
 
 
-def test_the_aircraft_is_the_papers():
+def test_the_aircraft_is_the_papers_in_body_axes():
     motion = UnmannedAircraft(3000.0, 0.03, np.eye(4))
     state = np.array([[0.1, 272.0, 5.0, 150.0]])
     g, v, _, h = state[0]
@@ -306,9 +306,11 @@ def test_the_aircraft_is_the_papers():
     D = 0.5 * (-1.9431 * a**2 - 0.1499 * a + 0.2359) * rho * v**2 * 0.3376
     L = 0.5 * rho * v**2 * 0.3376 * 21.9 * a
     dt = 0.0167
+    # body axes, turned by the angle of attack against the path
+    force = complex(3000 - D, L) * np.exp(1j * a) - 1005 * 9.81 * complex(np.sin(g), np.cos(g))
     expected = [
-        g + dt * (((3000 - D) * np.sin(a) + L * np.cos(a)) / (1005 * v) - 9.81 * np.cos(g) / v),
-        v + dt * (((3000 - D) * np.cos(a) - L * np.sin(a)) / 1005 - 9.81 * np.sin(g)),
+        g + dt * force.imag / (1005 * v),
+        v + dt * force.real / 1005,
         5.0 + dt * v * np.cos(g),
         h + dt * v * np.sin(g),
     ]

@@ -19,9 +19,9 @@ FIRST, LAST = Pose(-500.0, 100.0, math.pi / 3), Pose(0.0, 200.0, 0.0)
 poses = st.builds(Pose, st.floats(-3, 3), st.floats(-3, 3), st.floats(-7, 7))
 
 
-def test_path_1_to_the_printed_digits():
+def test_lengths_between_the_ends_of_path_1():
     lengths = {one.word: round(one.length, 3) for one in paths(FIRST, LAST, 100.0)}
-    # the paper's RSR 521.130, LSR 1129.632, RSL 1149.393, LSL 1757.394; too far apart for three turns
+    # the paper prints no length: these are ours, of its ends and radius; too far apart for three turns
     assert lengths == {"RSR": 521.13, "LSR": 1129.632, "RSL": 1149.393, "LSL": 1757.394}
 
 

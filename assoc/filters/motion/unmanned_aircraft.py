@@ -60,8 +60,9 @@ class UnmannedAircraft(ForwardDifference):
 
     References
     ----------
-    The paper on Dubins paths and the ensemble Kalman filter, equations 1, 2 and 19; in 19 and 21 the row of
-    the speed adds gamma_k where v_k is meant.
+    The paper on Dubins paths and the ensemble Kalman filter, equations 1, 2 and 19, with thrust less drag and lift both
+    in body axes. In print drag acts along the path and lift across the body (T sin a in the climb, T cos a - D in the
+    speed), and in 19 and 21 the row of the speed adds gamma_k where v_k is meant.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class UnmannedAircraft(ForwardDifference):
         self.aerodynamics = aerodynamics if aerodynamics is not None else Aerodynamics()
 
     def rates(self, states: Array) -> Array:
-        """Time derivatives of states (m, 4), equations 1 and 2."""
+        """Time derivatives of states (m, 4), equations 1 and 2 in body axes."""
         k, a = self.aerodynamics, self.attack
         climb, v, _, h = states.T
         pressure = 0.5 * np.polyval(k.density, h) * v**2 * k.area
