@@ -1,4 +1,4 @@
-"""Write the tables that the pages of docs include (docs/_tables) from the published results.
+"""Write the tables of the pages (docs/_tables), and the pages of experiments/pages/prose, from the published results.
 
     python -m experiments.pages [--check]
 
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from assoc._files.output import write_text
 from experiments.pages import benchmark_set, benchmarks, coverage, measured, metaheuristics, trackers
+from experiments.pages.prose import PAGES
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "_tables"
 MODULES = (benchmark_set, benchmarks, coverage, measured, metaheuristics, trackers)
@@ -27,13 +28,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a table is out of date")
     chosen = parser.parse_args(arguments)
     stale = 0
-    for name, make in TABLES.items():
-        path, fresh = FOLDER / f"{name}.md", f"{make()}\n"
+    files = {FOLDER / f"{name}.md": make for name, make in TABLES.items()}
+    files |= {FOLDER.parent / f"{name}.md": make for name, make in PAGES.items()}
+    for path, make in files.items():
+        fresh = f"{make()}\n"
         if not path.exists() or path.read_text(encoding="utf-8") != fresh:
             stale += 1
             if not chosen.check:
                 write_text(path, fresh)
-            print(f"docs/_tables/{path.name}: {'out of date' if chosen.check else 'written'}")
+            print(f"{path.relative_to(FOLDER.parent.parent)}: {'out of date' if chosen.check else 'written'}")
     return int(chosen.check and stale > 0)
 
 

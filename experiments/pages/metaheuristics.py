@@ -72,7 +72,8 @@ def settings() -> str:
         rows.append([
             f"{case.problems}, mode {case.how}", words, _plain(best),
             _plain(r[f"{case.name}: table 1's advice"]),
-            _cell(r[f"{case.name}: table 1's advice less the best setting"]),
+            # a setting less itself says nothing
+            "it is the best" if rank.ours == 1.0 else _cell(r[f"{case.name}: table 1's advice less the best setting"]),
             f"{number(rank.ours, 2)} of {of}", _plain(r[f"{case.name}: worst setting"]),
             _plain(r[f"{case.problems}, greedy: excess"]),
         ])  # fmt: skip

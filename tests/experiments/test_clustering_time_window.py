@@ -10,7 +10,7 @@ from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
 from experiments.common.claims import load_json
 from experiments.papers.clustering_time_window import __main__ as experiment
-from experiments.papers.clustering_time_window import false_start, pairs, published, tables, traffic
+from experiments.papers.clustering_time_window import false_start, own_tracker, pairs, published, tables, traffic
 from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
@@ -96,7 +96,9 @@ def test_a_pair_keeps_its_tracks(kind):
     swapped = decided.tracks.copy()
     for one, other in (names, names[::-1]):
         swapped[late & (decided.tracks == one)] = other
-    assert pairs.switches(recording, Taken(decided.windows, decided.rows, swapped, decided.confirmed)) == 2
+    for tracks, switches, swaps in (swapped, 2, 2), (np.where(late, decided.tracks + 1000, decided.tracks), 2, 0):
+        changed = Taken(decided.windows, decided.rows, tracks, decided.confirmed)
+        assert (pairs.switches(recording, changed), pairs.swaps(recording, changed)) == (switches, swaps)
 
 
 def test_a_false_start_is_where_it_should_be():
@@ -163,6 +165,28 @@ def test_the_program(tmp_path, monkeypatch, capsys):
     # in so short a recording tracks are confirmed late; what compares still holds
     assert claims["CT gained by the window with constant step, MHT"].ours > 0
     assert claims["CT, groups 1 to 10, Reid's MHT, CTW"].paper == 70.3
+
+
+def test_plots_of_tracks_that_are_never_confirmed():
+    recording = straight(8)
+    # two false plots, each in a track of its own, and one in the aircraft's
+    sources = np.array([0, 0, -1, 0, -1, 0, -1, 0])
+    judged = Recording(recording.times, recording.ranges, recording.azimuths, sources=sources)
+    rows, tracks = np.arange(8), np.array([0, 0, 1, 0, 2, 0, 0, 0])
+    taken = Taken(np.zeros(8, int), rows, tracks, np.isin(tracks, [0]))
+    assert own_tracker.wrong(judged, taken) == pytest.approx((100 * 3 / 8, 100 / 6, 1, 3))
+
+
+@pytest.mark.slow
+def test_the_thesiss_own_tracker(tmp_path):
+    assert own_tracker.program(["--quick", "--json", str(tmp_path / "a.json")]) == 0
+    ours = {c.quantity: c.ours for c in load_json(tmp_path / "a.json")}
+    assert ours["2.5 false plots a turn: false plots in tracks ever confirmed, Reid's MHT, CTW"] == 0
+    one, other = (
+        f"100 false plots a turn: false plots in tracks ever confirmed, {name}" for name in own_tracker.TRACKERS
+    )
+    assert ours[one] > 5 * ours[other]
+    assert ours["head-on: pairs without a switch, Reid's MHT, time stamps"] == 100
 
 
 def test_rates_need_sources():

@@ -2,15 +2,18 @@
 
 import json
 import re
+import runpy
+import warnings
 from pathlib import Path
 
 import pytest
 
 from experiments.__main__ import programs
 from experiments.common.results import RESULTS, Results, number
+from experiments.pages import prose
 from experiments.pages.__main__ import FOLDER, TABLES, main
 
-PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md", "solvers.md", "ant_colony.md")
+PAGES = ("filters.md", "recordings.md", "sweeps.md", "solvers.md", "ant_colony.md")
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NAMES = {*programs()}
@@ -25,13 +28,10 @@ NUMBER = re.compile(r"(?<![\w.^])\d+(?:,\d{3})*(?:\.\d+)?(?:e-?\d+)?(?![\w^]|\.\
 
 
 def sections(page: str) -> list[tuple[str, str]]:
-    """Parts of a page that name an experiment, by their heading; of papers.md all."""
+    """Parts of a page that name an experiment with published results, by their heading."""
     text = (DOCS / page).read_text(encoding="utf-8")
     parts = re.split(r"^## ", text, flags=re.MULTILINE)
-    return [(part.split("\n")[0], part) for part in parts if "experiments." in part]
-
-
-SECTIONS = [(page, name, text) for page in PAGES for name, text in sections(page)]
+    return [(part.split("\n")[0], part) for part in parts if sources(part)]
 
 
 def sources(text: str) -> set[str]:
@@ -39,6 +39,9 @@ def sources(text: str) -> set[str]:
     flat = " ".join(text.split())
     named = set(re.findall(r"python -m experiments\.([\w.]*\w)", flat))
     return {one for one in named if (RESULTS / f"{one}.json").exists() or one in PARAMETERS}
+
+
+SECTIONS = [(page, name, text) for page in PAGES for name, text in sections(page)]
 
 
 def known(name: str) -> list[float]:
@@ -84,14 +87,39 @@ def is_one_of(figure: str, numbers: list[float]) -> bool:
 @pytest.mark.parametrize(("page", "name", "text"), SECTIONS, ids=[f"{page}: {name}" for page, name, _ in SECTIONS])
 def test_every_figure_is_in_a_result_file(page, name, text):
     named = sources(text)
-    # what is said of the papers as a whole, before the first heading of the page
-    if page == "papers.md" and text.startswith("#"):
-        assert not figures(text)
-        return
-    assert named, f"docs/{page}, {name}: names no experiment with a result file"
     numbers = [one for source in named for one in known(source)]
     missing = [one for one in figures(text) if not is_one_of(one, numbers)]
     assert not missing, f"docs/{page}, {name}: {missing} are in no result file of {sorted(named)}"
+
+
+@pytest.mark.parametrize("name", prose.PAGES)
+def test_every_figure_of_a_page_names_its_claim(name):
+    text = (prose.FOLDER / f"{name}.md").read_text(encoding="utf-8")
+    parts = [part for part in re.split(r"^## ", text, flags=re.MULTILINE) if prose.SLOT.search(part)]
+    items = [item for part in parts for item in re.findall(r"^- .*(?:\n  .*)*", part, flags=re.MULTILINE)]
+    assert sum(map(len, map(prose.SLOT.findall, items))) == len(prose.SLOT.findall(text)) > 20
+    for item in items:
+        # a setting that belongs to a claim stands in its name
+        named = [one for slot in prose.SLOT.findall(item) for one in NUMBER.findall(" ".join(slot[1].split()))]
+        bare = [one for one in figures(prose.SLOT.sub(" ", item).replace("95 % interval", "")) if one not in named]
+        assert not bare, f"{name}, {item[:60]!r}: {bare} name no claim"
+
+
+def test_a_slot_names_one_claim():
+    def filled(slot):
+        return prose.SLOT.sub(prose.figure, slot)
+
+    claim = Results("papers.modified_ekf")["simulation 1, reading mixed: modified / EKF, RMSE of the position"]
+    slot = "{{modified_ekf: simulation 1, reading mixed:\n  modified / EKF, RMSE of the position"
+    assert filled(f"{slot}}}}}") == number(claim.ours) and filled(f"{slot} | low 2}}}}") == number(claim.interval[0], 2)
+    assert filled(f"{slot} | paper 2}}}}") == "0.71"
+    for wrong, words in (
+        ("{{modified_ekf: simulation 1}}", "begins"),
+        ("{{modified_ekf: simulation 7}}", "no claim"),
+        ("{{modified_ekf: B1: RMSE of the EKF | paper}}", "has no paper"),
+    ):
+        with pytest.raises(KeyError, match=words):
+            filled(wrong)
 
 
 def test_the_check_finds_a_wrong_figure():
@@ -110,7 +138,8 @@ def test_tables_are_those_of_the_results_and_each_stands_on_a_page(capsys):
     assert sorted(included) == sorted(TABLES) == sorted(path.stem for path in FOLDER.iterdir())
 
 
-def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
+def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monkeypatch, capsys):
+    commands: dict[str, set[tuple[str, ...]]] = {}
     text = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("papers-*.md"))
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in rows if row[0] not in ("element", "---")]
@@ -122,8 +151,18 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
         # where something is absent there may be nothing to show it with
         assert shown or result.startswith("absent"), element
         for program, what in shown:
-            known = (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES
-            assert known, element
+            module, *words = what.removeprefix("experiments.").split()
+            assert (ROOT / what).exists() if program == "pytest" else module in NAMES, element
+            if program == "python -m":
+                commands.setdefault(module, set()).add(tuple(words))
+    for module, given in commands.items():
+        monkeypatch.setattr("sys.argv", ["program", "--help"])
+        with warnings.catch_warnings(), pytest.raises(SystemExit):
+            warnings.simplefilter("ignore", RuntimeWarning)
+            runpy.run_module(f"experiments.{module}", run_name="__main__")
+        # what follows the options must be given
+        usage = capsys.readouterr().out.split("\n\n")[0]
+        assert given == {tuple(usage.rpartition("]")[2].split())}, module
 
 
 def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
@@ -137,6 +176,7 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
 def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.pages.__main__.FOLDER", tmp_path)
     monkeypatch.setattr("experiments.pages.__main__.TABLES", {"x": lambda: "| a |"})
+    monkeypatch.setattr("experiments.pages.__main__.PAGES", {})
     (tmp_path / "x.md").write_text("old\n")
     assert main(["--check"]) == 1 and (tmp_path / "x.md").read_text() == "old\n"
     assert main([]) == 0 and (tmp_path / "x.md").read_text() == "| a |\n"

@@ -51,6 +51,7 @@ READINGS = (
     Reading("region with a margin of 100 %", scene={"margin": 1.0}),
     Reading("all tuples of the grid are nodes", nodes="grid"),
     Reading("all tuples of the grid, scale 1", nodes="grid", scale=1.0),
+    Reading("all tuples of the grid, scale 1, start on any ant's tour", nodes="grid", scale=1.0, start="any"),
     Reading("all tuples of the grid, single measurements priced by equation 5", nodes="priced grid"),
     Reading("all tuples of the grid, start on the best ant's tour", nodes="grid", start="best"),
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from assoc._types import Array
-from assoc.metrics import label_switches, plot_identity_switches
+from assoc.metrics import identity_after_each, label_switches, plot_identity_switches
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
 from experiments.common.claims import Claim
@@ -59,6 +59,19 @@ def _sources(recording: Recording, taken: Taken) -> Array:
 def switches(recording: Recording, taken: Taken) -> int:
     """How often an aircraft goes over to another confirmed track."""
     return plot_identity_switches(_sources(recording, taken), taken.tracks, taken.confirmed)
+
+
+def swaps(recording: Recording, taken: Taken) -> int:
+    """How many of the switches go to a track that was the other aircraft's; the rest to tracks begun anew."""
+    sources = _sources(recording, taken)
+    held = taken.confirmed & (sources >= 0) & (identity_after_each(sources, taken.tracks) == sources)
+    owner: dict[int, int] = {}
+    known: dict[int, int] = {}
+    count = 0
+    for aircraft, track in zip(sources[held].tolist(), taken.tracks[held].tolist(), strict=True):
+        count += owner.get(aircraft, track) != track and known.get(track, aircraft) != aircraft
+        owner[aircraft], known[track] = track, aircraft
+    return count
 
 
 def wilson(good: list[bool]) -> tuple[float, float]:

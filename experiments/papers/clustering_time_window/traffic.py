@@ -1,6 +1,7 @@
 """Scenario S1: what window, time stamps and hypotheses are each worth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,9 @@ def nearest(recording: Recording, **settings: Any) -> NearestNeighbourTracker:
     return NearestNeighbourTracker(float(noise[0]), float(noise[1]), NearestSettings(**settings))
 
 
-def _reid(recording: Recording, clock: float | None = None) -> HypothesisTracker:
-    options = {} if clock is None else {"life_cycle": _BY_COUNT}
+def reid(recording: Recording, clock: float | None = None, misses: int = MISSES) -> HypothesisTracker:
+    """Reid's MHT; with a clock, a fixed time passes from group to group and tracks are deleted by their misses."""
+    options = {} if clock is None else {"life_cycle": replace(_BY_COUNT, deletion_count=misses)}
     return HypothesisTracker(radar_of(recording), clock, kind=HypothesisOrientedMHT, **options)
 
 
@@ -53,10 +55,10 @@ METHODS: dict[str, tuple[str, Callable[[Recording], TakesWindows]]] = {
     "nearest neighbour, CTW, time stamps": ("window", nearest),
     "MHT, irregular groups, time stamps": ("irregular", lambda r: HypothesisTracker(radar_of(r))),
     "MHT, CTW, time stamps": ("window", lambda r: HypothesisTracker(radar_of(r))),
-    "Reid's MHT, irregular groups": ("irregular", lambda r: _reid(r, MEAN_GROUP)),
-    "Reid's MHT, CTW": ("window", lambda r: _reid(r, ROTATION)),
-    "Reid's MHT, irregular groups, time stamps": ("irregular", lambda r: _reid(r)),
-    "Reid's MHT, CTW, time stamps": ("window", lambda r: _reid(r)),
+    "Reid's MHT, irregular groups": ("irregular", lambda r: reid(r, MEAN_GROUP)),
+    "Reid's MHT, CTW": ("window", lambda r: reid(r, ROTATION)),
+    "Reid's MHT, irregular groups, time stamps": ("irregular", lambda r: reid(r)),
+    "Reid's MHT, CTW, time stamps": ("window", lambda r: reid(r)),
 }
 """Name -> grouping and tracker. Without time stamps: a fixed time from group to group, deletion after three misses.
 
@@ -68,15 +70,20 @@ SLOW = "Reid's MHT"
 """Methods whose names begin so take several times as long, and run on the first few recordings only."""
 
 
+def recordings(
+    runs: int, rng: np.random.Generator, duration: float = DURATION
+) -> Iterator[tuple[Recording, dict[str, list[Window]]]]:
+    """Recordings of S1, each with its groups by name."""
+    for _ in range(runs):
+        recording = simulate_recording("rotating-radar", int(rng.integers(2**31)), duration=duration).recording
+        irregular = irregular_groups(recording, rng, MEAN_GROUP)
+        yield recording, {"window": clustering_time_window(recording), "irregular": irregular}
+
+
 def judge(runs: int, slow_runs: int, rng: np.random.Generator, duration: float = DURATION) -> dict[str, list[CtMtIt]]:
     """Rates of every method on the same recordings; Reid's MHT, which is slower, only on the first few."""
     results: dict[str, list[CtMtIt]] = {name: [] for name in METHODS}
-    for number in range(runs):
-        recording = simulate_recording("rotating-radar", int(rng.integers(2**31)), duration=duration).recording
-        groups: dict[str, list[Window]] = {
-            "window": clustering_time_window(recording),
-            "irregular": irregular_groups(recording, rng, MEAN_GROUP),
-        }
+    for number, (recording, groups) in enumerate(recordings(runs, rng, duration)):
         for name, (grouping, tracker) in METHODS.items():
             if not name.startswith(SLOW) or number < slow_runs:
                 results[name].append(run(tracker(recording), groups[grouping]).rates(recording))
@@ -133,11 +140,17 @@ def claims(results: dict[str, list[CtMtIt]]) -> list[Claim]:
                 made.append(_claim(what, ours[:, k, axis], None, float(row[axis]), source))
         # a recording shorter than the thesis's has no last rows
         if number == 25 and not np.isnan(ours[:, -3:, 1]).all(axis=1).any():
-            late = np.nanmean(ours[:, -3:, 1], axis=1) - np.nanmean(ours[:, :3, 1], axis=1)
+            late = change_of_mt(ours)
             paper = float(paper_table[-3:, 1].mean() - paper_table[:3, 1].mean())
             what = f"MT of the last three rows less that of the first three, {name}"
             made.append(_claim(what, late, (None, -20.0), round(paper, 1), "table 4.25; 20 points chosen by us"))
     return made
+
+
+def change_of_mt(rows: Array) -> Array:
+    """Mean MT of the last three rows of ten windows less that of the first three, (runs,), of rates (runs, K, 3)."""
+    late: Array = np.nanmean(rows[:, -3:, 1], axis=1) - np.nanmean(rows[:, :3, 1], axis=1)
+    return late
 
 
 def tens(every: list[CtMtIt], length: int) -> Array:

@@ -36,19 +36,19 @@ FIRST_GUESS: dict[str, Any] = {
 """Where the tuning begins: the package's sets, chosen by eye."""
 
 
+def rules_of(data: dict[str, Any], name: str) -> FuzzyRules:
+    """Return the paper's rules for "q" or "r", with triangles on these centres."""
+    return FuzzyRules(
+        FuzzyVariable.from_centres(INPUT_SETS, data["inputs"], 1.0),
+        FuzzyVariable.from_centres(OUTPUT_SETS, data[name], min(0.05, data[name][0])),
+        list(zip(INPUT_SETS, OUTPUT_SETS, strict=True)),
+        points=201,
+    )
+
+
 def published_filter(data: dict[str, Any]) -> FuzzyAdaptiveEKF:
     """Return the paper's filter with triangles on these centres, constant acceleration of this base noise."""
-    inputs = FuzzyVariable.from_centres(INPUT_SETS, data["inputs"], 1.0)
-    rules = [
-        FuzzyRules(
-            inputs,
-            FuzzyVariable.from_centres(OUTPUT_SETS, data[name], min(0.05, data[name][0])),
-            list(zip(INPUT_SETS, OUTPUT_SETS, strict=True)),
-            points=201,
-        )
-        for name in ("q", "r")
-    ]
-    return FuzzyAdaptiveEKF(ConstantAcceleration(data["noise"]), *rules)
+    return FuzzyAdaptiveEKF(ConstantAcceleration(data["noise"]), rules_of(data, "q"), rules_of(data, "r"))
 
 
 def chosen_filter() -> FuzzyAdaptiveEKF:
