@@ -69,11 +69,13 @@ class Track(Shown):
         """Where it is in its life.
 
         "tentative"; "confirmed"; "coasting": confirmed, and now missed or out of view; "lost": probably gone (existence
-        below 0.5), after five scans with a detection not before three missed in a row.
+        below 0.5), after five scans with a detection not before three missed in a row, or at a detection that leaves
+        it unlikely, as in dense clutter.
         """
         if not self.confirmed:
             return "tentative"
-        if self.existence < 0.5 and (self.missed >= _LOST_AFTER or self.hits < _KNOWN_AFTER):
+        known = 0 < self.missed < _LOST_AFTER and self.hits >= _KNOWN_AFTER
+        if self.existence < 0.5 and not known:
             return "lost"
         return "coasting" if self.missed or self.hidden else "confirmed"
 
