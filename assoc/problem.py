@@ -368,6 +368,19 @@ class AssignmentProblem:
         return {"dummy": True, **load_npz(path, FORMAT, VERSION, fields)}
 
 
+def check_problem(problem: object) -> None:
+    """Refuse what is no problem; of an array, say how a problem is made of it."""
+    if isinstance(problem, AssignmentProblem):
+        return
+    line = f"problem: expected an AssignmentProblem, got {type(problem).__name__}"
+    if isinstance(problem, (np.ndarray, list, tuple)):
+        line += (
+            "; AssignmentProblem.from_dense(costs, dummy=False) takes a matrix as scipy's linear_sum_assignment does, "
+            "from_dense(costs) one whose row 0 and column 0 are the costs of leaving a measurement alone"
+        )
+    raise InvalidInputError(line)
+
+
 def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
     try:
         array = np.asarray(values)

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
 import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
@@ -105,9 +106,14 @@ def test_assign_refuses(arguments, message):
     assert "\n" not in str(caught.value)
 
 
-def test_assign_takes_problems_only():
-    with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem, got ndarray"):
-        assign(np.zeros((2, 2)))
+@pytest.mark.parametrize("shape", [(4, 4), (3, 5)])
+def test_assign_says_how_a_matrix_is_taken_as_by_scipy(shape):
+    costs = np.random.default_rng(0).normal(size=shape)
+    with pytest.raises(InvalidInputError, match="expected an AssignmentProblem, got ndarray; .*dummy=False") as caught:
+        assign(costs)
+    assert "\n" not in str(caught.value)
+    solution = assign(AssignmentProblem.from_dense(costs, dummy=False))
+    assert np.array_equal(solution.tuples.T - 1, linear_sum_assignment(costs))
 
 
 def test_infeasible_says_why():

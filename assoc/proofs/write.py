@@ -16,7 +16,7 @@ from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.prepare import prepare
-from assoc.problem import AssignmentProblem
+from assoc.problem import AssignmentProblem, check_problem
 from assoc.proofs.components import CLOSED, Parts, decimal, packing_of, trees_of
 from assoc.proofs.tree import Aim
 from assoc.solution import Solution
@@ -67,8 +67,7 @@ def write_proof(
         The solution is not one of this problem, a cost has more decimals than the checker reads, or the file cannot be
         written.
     """
-    if not isinstance(problem, AssignmentProblem):
-        raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
+    check_problem(problem)
     if not isinstance(solution, Solution):
         raise InvalidInputError(f"solution: expected a Solution, got {type(solution).__name__}")
     limit = checked_time_limit(time_limit)

@@ -25,7 +25,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import Prepared, conditioned, prepare
 from assoc.packing.run import Outcome, Run
-from assoc.problem import AssignmentProblem
+from assoc.problem import AssignmentProblem, check_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
@@ -81,8 +81,7 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     K. G. Murty, "An algorithm for ranking all the assignments in order of increasing cost", Operations
     Research 16, 682-687 (1968).
     """
-    if not isinstance(problem, AssignmentProblem):
-        raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
+    check_problem(problem)
     k, clock = checked_k(k), Run(0, time_limit=checked_time_limit(time_limit))
     known: list[Solution] = []
     with interruptible():

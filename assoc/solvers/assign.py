@@ -21,7 +21,7 @@ from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import Prepared, conditioned, prepare
 from assoc.packing.run import Callback, Outcome, Run, SolveFunction
-from assoc.problem import AssignmentProblem
+from assoc.problem import AssignmentProblem, check_problem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify, costs_of
@@ -96,8 +96,7 @@ def assign(
         not be written. Or costs are so large that rounding alone keeps the answer from being proved.
     """
     started, compiled = time.perf_counter(), compile_seconds()
-    if not isinstance(problem, AssignmentProblem):
-        raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
+    check_problem(problem)
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
