@@ -235,7 +235,7 @@ def track_scene(
     """
     table = TrackTable(scene.origin)
     decisions: list[Decision] = []
-    names: dict[int, Counter[str]] = {}
+    names: dict[int, tuple[Counter[str], Counter[str]]] = {}
     qualities = Qualities(len(tracker.sensors))
     for k in range(scene.num_scans) if scans is None else scans:
         scan, before = scene.scan(k), tracker.state
@@ -250,14 +250,14 @@ def track_scene(
         decisions += step.final
         for ids, codes in zip(step.assigned, known or (), strict=False):
             for number, (code, address) in zip(ids.tolist(), codes.tolist(), strict=True):
-                names.setdefault(number, Counter())[f"{address:06x}" if address else f"{code:04o}" if code else ""] += 1
+                for kind, known_as in enumerate((f"{address:06x}" if address else "", f"{code:04o}" if code else "")):
+                    if known_as and number > 0:
+                        names.setdefault(number, (Counter(), Counter()))[kind][known_as] += 1
         qualities.after(tracker, before, step, scan.measurements, scan.times)
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
         truth = None if scene.truth is None else scene.truth.positions[k]
         table.add(listed, tracker.filter.motion.position, qualities=qualities, truth=truth)
     table.name_targets(scene)
-    for number, found in names.items():
-        found.pop("", None)
-        if number > 0 and found:
-            table.targets.setdefault(number, found.most_common(1)[0][0])
+    for number, (addresses, modes) in names.items():
+        table.targets.setdefault(number, (addresses or modes).most_common(1)[0][0])
     return table, [*decisions, *tracker.flush()]

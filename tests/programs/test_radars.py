@@ -1,12 +1,14 @@
 """Several radars' files to a map: positions against geometry of its own, and one line for what is wrong."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from assoc import inspect, track
+from assoc.recordings import read_plots
 from assoc.scene.geodesy import earth_centered
 
 pytest.importorskip("pyarrow")
@@ -82,6 +84,25 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
     text = (tmp_path / "tracks.kml").read_text()
     assert ("absolute" in text) and "4521" in text and "2021-07-12" in text
     capsys.readouterr()
+
+
+def test_asterix_beside_tables(tmp_path, capsys):
+    """Its times are of the day, its codes and addresses are kept, and tracks are named by addresses."""
+    asterix = pytest.importorskip("assoc.integrations.asterix")
+    pytest.importorskip("asterix")
+    file = described(tmp_path)
+    south = read_plots(tmp_path / "south.parquet")
+    addresses = np.where(south.identities > 0, 0x3C6440 + south.identities % 64, 0)
+    of_day = replace(south, times=south.times % 86_400, addresses=addresses)
+    asterix.write_plots(tmp_path / "south.ast", of_day, (25, 10))
+    text = (tmp_path / "radars.toml").read_text().replace('"south.parquet"', '"south.ast"\nradar = "25/10"')
+    (tmp_path / "radars.toml").write_text(text)
+    assert inspect.main([file]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"south: .*2021-07-12 14:00:0.*7\d % with an address", said) and "nothing looks wrong" in said
+    assert track.main([file, "-o", str(tmp_path / "tracks.csv"), "-q"]) == 0
+    found = pd.read_csv(tmp_path / "tracks.csv", dtype={"target": str})
+    assert {f"{0x3C6440 + code % 64:06x}" for code in CODES} == {*found[found.time > 1626098460].target}
 
 
 def test_what_is_understood_and_what_looks_wrong(tmp_path, capsys):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.inputs import read_toml
 from assoc._text.near import did_you_mean
 from assoc._text.plain import printable
+from assoc._text.times import UNIX
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ KEYS = (
 )  # fmt: skip
 """Keys of a table [[radar]]."""
 _TOP = ("name", "origin", "interval", "radar")
+DAY = 86_400.0
 # metres, where a radar's heights by Mode C have no noise of their own: steps of 100 feet, and a pressure that drifts
 _HEIGHT_NOISE = 30.0
 
@@ -58,8 +61,9 @@ def read_radars(path: str) -> Radars:
     read = [_read_radar(path, number, table) for number, table in enumerate(tables, 1)]
     origin = _place(top["origin"], f"{path}: origin") if "origin" in top else read[0][3]
     recordings, radars = [], []
-    for recording, radar, _, place, height_noise in read:
-        own = placed(recording, radar, place, origin, height_noise)
+    days = _days([recording for recording, *_ in read])
+    for (recording, radar, _, place, height_noise), day in zip(read, days, strict=True):
+        own = placed(replace(recording, times=recording.times + day), radar, place, origin, height_noise)
         recordings.append(own[0])
         radars.append(own[1])
     turns = [turn for _, _, turn, _, _ in read]
@@ -67,6 +71,15 @@ def read_radars(path: str) -> Radars:
     scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
     identities = identities_of_radars(recordings, radars, scene.times)
     return Radars(scene, recordings, radars, turns, identities)
+
+
+def _days(recordings: list[Recording]) -> list[float]:
+    """Seconds that bring times of day, as of ASTERIX, to the day of the files with dates, if there are such."""
+    starts = [float(recording.times[0]) for recording in recordings]
+    dated = [start for start in starts if start > UNIX]
+    if not dated:
+        return [0.0] * len(starts)
+    return [0.0 if start > UNIX else DAY * round((dated[0] - start) / DAY) for start in starts]
 
 
 def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...]:
@@ -107,8 +120,6 @@ def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...
         view = radar.field_of_view.copy()
         view[0, 1] = 1e3 * _number(table["reach_km"], f"{where}: reach_km")
         recording = recording.take(np.flatnonzero(recording.ranges <= view[0, 1]))
-        from dataclasses import replace
-
         radar = replace(radar, field_of_view=view)
     heard = bool(np.isfinite(recording.trusted_altitudes).any())
     return recording, radar, turn, place, (given[2] if len(given) == 3 else _HEIGHT_NOISE) if heard else None
