@@ -100,6 +100,17 @@ def test_right_declarations_are_left_as_they_are():
         assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
 
 
+def test_wrong_noise_makes_no_further_tracks():
+    scene, ids = scene_of(radars(240.0), 1), []
+    for adapt in (False, True):
+        tracker, seen = TRACKERS["nearest-neighbour"].for_scene(replace(scene, sensors=radars()), adapt=adapt), set()
+        for k in range(scene.num_scans):
+            tracker.step(scene.times[k], scene.measurements[k])
+            seen |= {track.track_id for track in tracker.tracks if track.reported}
+        ids.append(len(seen))
+    assert ids[0] > 1.5 * TARGETS > ids[1]
+
+
 def test_hard_manoeuvres_are_told_from_noise():
     filter = ExtendedKalmanFilter(ConstantVelocity(3.0, kind="continuous"))
     tracker = tracked(scene_of(radars(), 3, turn=0.15), radars(), filter=filter)
