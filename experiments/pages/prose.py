@@ -15,6 +15,8 @@ FOLDER = Path(__file__).with_name("prose")
 FILE is a result file without "papers.", QUANTITY the claim's, or what it begins with if no other does. After a "|" may
 follow what is meant (ours, paper, low, high: the interval's ends) and the significant digits."""
 SLOT = re.compile(r"\{\{\s*([\w.]+):\s*([^{}|]+?)\s*(?:\|\s*(ours|paper|low|high)?\s*(\d)?\s*)?\}\}")
+ITEM = re.compile(r"^- .*(?:\n  .*)*|^(?![-|#`> ]).+(?:\n(?![-|#`>]).+)*", re.MULTILINE)
+"""An item of a list or a paragraph."""
 _results = cache(Results)
 
 
@@ -46,13 +48,15 @@ def figure(match: re.Match[str]) -> str:
 
 def page(name: str) -> str:
     """Return a page with its figures."""
-    text = SLOT.sub(figure, (FOLDER / f"{name}.md").read_text(encoding="utf-8"))
-    return re.sub(r"^- .*(?:\n  .*)*", _wrapped, text, flags=re.MULTILINE).rstrip("\n")
+    return ITEM.sub(_filled, (FOLDER / f"{name}.md").read_text(encoding="utf-8")).rstrip("\n")
 
 
-def _wrapped(item: re.Match[str]) -> str:
-    words = " ".join(item[0].split())
-    return textwrap.fill(words, 120, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+def _filled(item: re.Match[str]) -> str:
+    if not SLOT.search(item[0]):
+        return item[0]
+    words = " ".join(SLOT.sub(figure, item[0]).split())
+    indent = "  " if words.startswith("- ") else ""
+    return textwrap.fill(words, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _of(name: str) -> Callable[[], str]:
