@@ -170,7 +170,7 @@ def _by_recursion(problem: AssignmentProblem, index: NDArray[np.int64], num: int
         return None
     share = run.part(0, None if run.time_limit is None else 0.4 * run.time_limit)
     columns = price_all_columns(problem, share)
-    found = tuple_bounds(columns, share)
+    found = tuple_bounds(columns, problem.costs, prepare(problem).single_cost, share)
     if found is None:
         return None
     known = np.repeat([[0.0], [0.0], [1.0]], num, axis=1)

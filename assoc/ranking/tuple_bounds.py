@@ -75,8 +75,11 @@ class _Walk(NamedTuple):
     values: Floats
 
 
-def tuple_bounds(columns: AllColumns, run: Run) -> TupleBounds | None:
-    """Bound the probabilities of all columns; None where weights are too large for floats, or a row must be covered."""
+def tuple_bounds(columns: AllColumns, costs: Floats, single: Floats, run: Run) -> TupleBounds | None:
+    """Bound the probabilities of all columns; None where weights are too large for floats, or a row must be covered.
+
+    The costs of the problem's tuples and of each row's cheapest singleton say how exact the columns' weights are.
+    """
     log_weight, rows = -columns.weights, columns.slack.size
     if not columns.slack.all() or log_weight.max(initial=0.0) > _HEAVIEST:
         return None
@@ -90,9 +93,10 @@ def tuple_bounds(columns: AllColumns, run: Run) -> TupleBounds | None:
     row = 0
     while row < rows and not run.should_stop():
         row = _bound_rows(graph, found, row, most)
-    # logarithms of weights are differences of costs
-    largest = float(np.abs(log_weight[counts]).max(initial=0.0))
-    rounding = _ROUNDING + 16.0 * float(np.finfo(float).eps) * rows * largest
+    # logarithms of weights are differences of costs, which may cancel
+    used = columns.rows[counts]
+    largest = np.abs(costs[columns.origin[counts]]).max(initial=0.0) + np.abs(single[used[used >= 0]]).max(initial=0.0)
+    rounding = _ROUNDING + 4.0 * (columns.rows.shape[1] + 2) * float(np.finfo(float).eps * rows * largest)
     for low, high in ((found.lower, found.upper), (found.free_lower, found.free_upper)):
         np.maximum(low - rounding, 0.0, out=low)
         np.minimum(high + rounding, 1.0, out=high)

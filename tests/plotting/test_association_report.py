@@ -115,6 +115,8 @@ def test_text_from_files_is_only_text(tmp_path):
     z = sensors[0].measure(np.array([[1e3, 2e3, 300.0]]))
     evil = Scene(sensors, [0.0], [[z, sensors[1].measure(np.array([[1e3, 2e3, 300.0]]))]], name="</script>" + EVIL)
     path = tmp_path / "out.html"
+    # the first call compiles, and its report says so
+    assoc.associate(evil)
     write_association_report(path, assoc.associate(evil), evil, ['"><b>x.npz'], words=["x", EVIL])
     harmless = tmp_path / "harmless.html"
     plain = Scene([*sensors], [0.0], evil.measurements, name="n")

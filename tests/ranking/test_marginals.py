@@ -101,6 +101,17 @@ def _log_weights(tuples, costs, result, pairs):
     return np.array([of[tuple(row)] for row in result.tuples[pairs].tolist()])
 
 
+def test_intervals_hold_where_large_costs_cancel():
+    """Two pairs and a singleton near 1e18: what they differ by is lost in their digits."""
+    tuples = [[1, 0, 0], [1, 1, 0], [1, 0, 1]]
+    result = marginals(AssignmentProblem(tuples, [1e18, 1e18 - 128.0, 1e18 - 256.0], (1, 1, 1)), 1)
+    near = AssignmentProblem(tuples, [1e15, 1e15 - 0.125, 1e15 - 0.5], (1, 1, 1))
+    truth, found = exact_marginals(near), marginals(near, 1)
+    for key, low, high in zip(found.tuples.tolist(), found.lower, found.upper, strict=True):
+        assert low <= truth[tuple(key)] <= high
+    assert (result.upper - result.lower)[(result.tuples > 0).sum(axis=1) > 1].max() > 0.5
+
+
 def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
     for problem, _ in enumerable(20, 63):
         truth = exact_marginals(problem)
