@@ -123,7 +123,11 @@ def parts_of_radars(recordings: Sequence[Recording], radars: Sequence[Radar2D]) 
     parts = []
     for number, (recording, radar) in enumerate(zip(recordings, radars, strict=True)):
         known = np.isfinite(recording.trusted_altitudes) & (radar.dim == 3)
-        share = float(known.mean())
+        # of the plots of aircraft: false ones have no transponder
+        named = (recording.identities > 0) | (recording.addresses > 0)
+        share = float(known[named].mean() if named.any() else known.mean())
+        if not known.all() and known.any():
+            share = min(max(share, 0.05), 0.95)
         if share < 1.0:
             plain = replace(
                 radar,
@@ -134,7 +138,7 @@ def parts_of_radars(recordings: Sequence[Recording], radars: Sequence[Radar2D]) 
             )
             parts.append(Part(number, recording.take(~known), plain))
         if share > 0.0:
-            # false plots have no transponder, but for a few
+            # but for a few
             rate = radar.false_alarm_rate * (0.1 if share < 1.0 else 1.0)
             heard = replace(radar, detection_probability=radar.detection_probability * share, false_alarm_rate=rate)
             parts.append(Part(number, recording.take(known), heard))

@@ -5,7 +5,9 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.recordings import Recording, radar_of, scene_of_radars
+from assoc.recordings.several import parts_of_radars
 from assoc.scene.own_times import looked_at
+from assoc.sensors import Radar2D
 from assoc.simulation import simulate_recording
 
 
@@ -62,3 +64,21 @@ def test_what_is_refused(recordings):
     ]:
         with pytest.raises(InvalidInputError, match=words):
             scene_of_radars(*arguments, **options)
+
+
+def test_plots_with_and_without_heights_share_the_detections():
+    """Of 100 plots of aircraft 80 have a height; 50 false ones have neither height nor code."""
+    times = np.arange(150.0)
+    codes, heights = np.repeat([1234, 1234, 0], [80, 20, 50]), np.repeat([9000.0, np.nan, np.nan], [80, 20, 50])
+    recording = Recording(times, np.full(150, 5e4), np.zeros(150), identities=codes, altitudes=heights)
+    radar = Radar2D(
+        position=np.zeros(3), noise=[50, 0.002, 30], detection_probability=0.9, false_alarm_rate=2.0, name="north",
+        field_of_view=[[0, 1e5], [-np.pi, np.pi], [-1e3, 2e4]],
+    )  # fmt: skip
+    plain, heard = parts_of_radars([recording], [radar])
+    assert [len(plain.recording), len(heard.recording)] == [70, 80] and (plain.radar.dim, heard.radar.dim) == (2, 3)
+    assert plain.radar.detection_probability == pytest.approx(0.18)
+    assert heard.radar.detection_probability == pytest.approx(0.72)
+    assert plain.radar.false_alarm_rate == 2.0 and heard.radar.false_alarm_rate == pytest.approx(0.2)
+    (one,) = parts_of_radars([recording.take(np.arange(80))], [radar])
+    assert one.radar is radar or one.radar.detection_probability == 0.9
