@@ -7,13 +7,13 @@ from functools import cache
 from pathlib import Path
 
 from experiments.common.claims import Claim
-from experiments.common.results import Results, number
+from experiments.common.results import Results, number, result_file
 
 FOLDER = Path(__file__).with_name("prose")
 """The pages as they are written by hand, with {{FILE: QUANTITY}} where a figure stands.
 
-FILE is a result file without "papers.", QUANTITY the claim's, or what it begins with if no other does. After a "|" may
-follow what is meant (ours, paper, low, high: the interval's ends) and the significant digits."""
+FILE is a result file ("papers." may be left out), QUANTITY the claim's, or what it begins with if no other does. After
+a "|" may follow what is meant (ours, paper, low, high: the interval's ends) and the significant digits."""
 SLOT = re.compile(r"\{\{\s*([\w.]+):\s*([^{}|]+?)\s*(?:\|\s*(ours|paper|low|high)?\s*(\d)?\s*)?\}\}")
 ITEM = re.compile(r"^- .*(?:\n  .*)*|^(?![-|#`> ]).+(?:\n(?![-|#`>]).+)*", re.MULTILINE)
 """An item of a list or a paragraph."""
@@ -25,12 +25,12 @@ def find(file: str, quantity: str) -> Claim:
 
     Raises KeyError: No claim, or several, begin with these words.
     """
-    results = _results(f"papers.{file}")
+    results = _results(file if result_file(file).exists() else f"papers.{file}")
     if quantity in results:
         return results[quantity]
     found = results.starting(quantity)
     if len(found) > 1:
-        raise KeyError(f"{quantity!r} begins {len(found)} claims of papers.{file}")
+        raise KeyError(f"{quantity!r} begins {len(found)} claims of {results.name}")
     return found[0]
 
 
