@@ -20,6 +20,7 @@ PROGRAMS = {
     "track": ("make tracks of scenes or of recorded radar plots", "scene.npz -o tracks.csv"),
     "live": ("make tracks of radar plots as they come", "scene.npz --page 0 < plots > tracks.csv"),
     "register": ("find biases of sensors", "scene.npz -o registered.npz"),
+    "asterix2csv": ("write the records of an ASTERIX file as CSV", "radars.pcap -o records.csv"),
     "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),
 }
 """For each program, a module ``assoc.NAME`` with a function ``start``: what it does, and an example."""
@@ -63,7 +64,7 @@ def _list() -> None:
     print_lines("\nPrograms (each has --help, -q to say nothing and -v to say more):")
     for name, (purpose, example) in {**PROGRAMS, **_OTHERS}.items():
         called = f"assoc {name}" if name == "completion" else command(name)
-        print_lines(f"  {name:<10}  {purpose}: {called} {example}")
+        print_lines(f"  {name:<11}  {purpose}: {called} {example}")
     print_lines("\nassoc --version prints the version.")
 
 

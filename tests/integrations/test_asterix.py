@@ -1,5 +1,6 @@
 """ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
 
+import io
 import math
 import struct
 import subprocess
@@ -12,10 +13,11 @@ import pytest
 
 pytest.importorskip("asterix", reason="libasterix is not installed: pip install 'assoc[asterix]'")
 
-from assoc import track
+from assoc import asterix2csv, track
 from assoc.errors import InvalidInputError
-from assoc.integrations.asterix import read_asterix, read_tracks, write_plots, write_tracks
+from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
 from assoc.integrations.asterix.blocks import edition
+from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
 from assoc.recordings import write_plots as write_table
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
@@ -64,6 +66,42 @@ def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):
         assert read_asterix(tmp_path / "plots.ast").plots[0, 1].identities.tolist() == [0o1234]
         write_table(tmp_path / "again.csv", read_asterix(tmp_path / "plots.ast").plots[0, 1])
         assert read_plots(tmp_path / "again.csv").identities.tolist() == [0o1234]
+
+
+def test_a_table_of_records(plots, file, tmp_path, capfd):
+    """Of a radar: what read_plots makes of the table is the recording; other categories keep their own units."""
+    assert asterix2csv.main([str(file), "-o", str(tmp_path / "records.csv"), "-v"]) == 0
+    assert f"category 048 of 25/201: {len(plots.times)}" in capfd.readouterr().out
+    again, back = read_plots(tmp_path / "records.csv"), read_asterix(file).plots[25, 201]
+    for name in ("times", "ranges", "bearings", "altitudes"):
+        np.testing.assert_allclose(getattr(again, name), getattr(back, name), atol=1e-9, rtol=1e-12)
+    np.testing.assert_array_equal(again.identities, back.identities)
+    # by hand: 5 E, 50 N, FL 350, squawk 1234, address 3C4591, callsign DLH9UF
+    blocks = edition(21).create([edition(21).cv_record.create({
+        "010": (("SAC", 1), ("SIC", 2)), "073": 86_400 * 128 - 1, "145": 1400,
+        "131": (("LAT", 2**30 * 50 // 180), ("LON", 2**30 * 5 // 180)),
+        "070": (0, ("MODE3A", 0o1234)), "080": 0x3C4591, "170": _six_bits("DLH9UF  "),
+    })])  # fmt: skip
+    (tmp_path / "adsb.ast").write_bytes(blocks.unparse().to_bytes() + b"\x01\x00\x04x")
+    assert asterix2csv.main([str(tmp_path / "adsb.ast")]) == 0
+    out, err = capfd.readouterr()
+    assert "adsb.ast: not read: 1 data blocks of category 001" in err
+    shown = pd.read_csv(io.StringIO(out), dtype={"mode3_oct": str}).iloc[0].dropna().to_dict()
+    assert shown.pop("latitude_deg") == pytest.approx(50) and shown.pop("longitude_deg") == pytest.approx(5)
+    assert shown == {
+        "category": 21, "sac": 1, "sic": 2, "time": 86_400 - 1 / 128, "altitude_fl": 350.0, "mode3_oct": "1234",
+        "address_hex": "3C4591", "callsign": "DLH9UF",
+    }  # fmt: skip
+    write_tracks(tmp_path / "tracks.ast", pd.DataFrame([dict.fromkeys(COLUMNS, 4.0)]))
+    [row] = read_records(tmp_path / "tracks.ast")
+    assert [row[name] for name in ("track", "time", "x_m", "y_m", "vx_m_s", "vy_m_s")] == [4.0] * 6
+    (tmp_path / "empty.ast").write_bytes(b"\x01\x00\x04x")
+    assert asterix2csv.main([str(tmp_path / "empty.ast")]) == 2
+    assert "empty.ast: holds no ASTERIX records" in capfd.readouterr().err
+
+
+def _six_bits(letters):
+    return sum((ord(letter) & 63) << shift for letter, shift in zip(letters, range(42, -1, -6), strict=True))
 
 
 def test_a_plot_that_others_encoded(tmp_path):

@@ -1,0 +1,102 @@
+"""The records of a file as rows: what was sent, in units that people read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+from assoc._system.door import door
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix.blocks import EDITIONS, data_blocks, read_bytes, records, signed, value
+from assoc.integrations.asterix.reading import SourceRows
+
+_TIMES = {21: ("073", "071", "077"), 34: ("030",), 48: ("140",), 62: ("070",)}
+# column, step, bits of a signed number or 0, and where it stands by category; of a column's lines the first counts
+_NUMBERS: tuple[tuple[str, float, int, dict[int, tuple[str, ...]]], ...] = (
+    ("range_nmi", 1 / 256, 0, {48: ("040", "RHO")}),
+    ("bearing_deg", 360 / 2**16, 0, {48: ("040", "THETA")}),
+    ("latitude_deg", 180 / 2**30, 32, {21: ("131", "LAT")}),
+    ("latitude_deg", 180 / 2**23, 24, {21: ("130", "LAT")}),
+    ("latitude_deg", 180 / 2**25, 32, {62: ("105", "LAT")}),
+    ("longitude_deg", 180 / 2**30, 32, {21: ("131", "LON")}),
+    ("longitude_deg", 180 / 2**23, 24, {21: ("130", "LON")}),
+    ("longitude_deg", 180 / 2**25, 32, {62: ("105", "LON")}),
+    ("x_m", 0.5, 24, {62: ("100", "X")}),
+    ("y_m", 0.5, 24, {62: ("100", "Y")}),
+    ("vx_m_s", 0.25, 16, {62: ("185", "VX")}),
+    ("vy_m_s", 0.25, 16, {62: ("185", "VY")}),
+    ("altitude_fl", 0.25, 14, {48: ("090", "FL")}),
+    ("altitude_fl", 0.25, 16, {21: ("145",), 62: ("136",)}),
+    ("track", 1, 0, {21: ("161", "TRNUM"), 48: ("161", "TRN"), 62: ("040",)}),
+)
+_CODES = {21: ("070", "MODE3A"), 48: ("070", "MODE3A"), 62: ("060", "MODE3A")}
+_ADDRESSES, _CALLSIGNS = {21: "080", 48: "220"}, {21: "170", 48: "240"}
+COLUMNS = ("category", "sac", "sic", "time", *dict.fromkeys(name for name, *_ in _NUMBERS))
+COLUMNS += ("mode3_oct", "address_hex", "callsign")
+
+
+@door
+def read_records(path: str | os.PathLike[str], notes: dict[str, int] | None = None) -> list[dict[str, Any]]:
+    """Read the records of categories 021, 034, 048 and 062, of all sources, in the order of the file.
+
+    Parameters
+    ----------
+    path : path-like
+        Data blocks, plain or in the UDP packets of a pcap.
+    notes : dict of str to int, optional
+        Gets the counts of content that could not be read, by kind.
+
+    Returns
+    -------
+    list of dict
+        By the names in `COLUMNS`, those that a record has. Times are seconds of the day and continue after midnight.
+        Codes are as sent, also where the radar does not call them valid.
+
+    Raises
+    ------
+    InvalidInputError
+        The file cannot be read, or holds none of these records.
+    MissingExtraError
+        libasterix is not installed.
+    """
+    rows = list(_rows(read_bytes(path), {} if notes is None else notes))
+    if not rows:
+        raise InvalidInputError(f"{os.fspath(path)}: holds no ASTERIX records of categories 021, 034, 048 or 062")
+    return rows
+
+
+def _rows(content: bytes, notes: dict[str, int]) -> Iterator[dict[str, Any]]:
+    clocks: dict[tuple[int, ...], SourceRows] = {}
+    for block in data_blocks(content, notes):
+        category = block.category
+        if category not in EDITIONS:
+            what = f"data blocks of category {category:03d}"
+            notes[what] = notes.get(what, 0) + 1
+            continue
+        for record in records(block, notes):
+            row: dict[str, Any] = {"category": category}
+            row |= {"sac": value(record, "010", "SAC"), "sic": value(record, "010", "SIC")}
+            time = next((t for t in (value(record, item) for item in _TIMES[category]) if t is not None), None)
+            if time is not None:
+                clock = clocks.setdefault((category, row["sac"], row["sic"]), SourceRows())
+                row["time"] = clock.time(time)
+                clock.rows = [(row["time"],)]  # what counts is whether there were any
+            for name, step, bits, items in _NUMBERS:
+                raw = value(record, *items[category]) if category in items else None
+                if raw is not None:
+                    row.setdefault(name, (signed(raw, bits) if bits else raw) * step)
+            code = value(record, *_CODES[category]) if category in _CODES else None
+            address = value(record, _ADDRESSES[category]) if category in _ADDRESSES else None
+            letters = value(record, _CALLSIGNS[category]) if category in _CALLSIGNS else None
+            row |= {} if code is None else {"mode3_oct": f"{code:04o}"}
+            row |= {} if address is None else {"address_hex": f"{address:06X}"}
+            row |= {} if letters is None else {"callsign": _letters(letters)}
+            yield row
+
+
+def _letters(raw: int) -> str:
+    """Eight characters of six bits: A to Z, digits and spaces; others are not defined."""
+    codes = [raw >> shift & 63 for shift in range(42, -1, -6)]
+    letters = [chr(code + 64 if code < 27 else code) for code in codes if 0 < code < 27 or 47 < code < 58 or code == 32]
+    return "".join(letters).strip()
