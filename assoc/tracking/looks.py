@@ -14,6 +14,7 @@ from assoc._types import Array
 from assoc.costs.views import log_missed, places_of, share_in_view
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
+from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.track_batch import TrackBatch
 
 _FORGETTING = 0.05
@@ -44,10 +45,15 @@ def count_out_of_view(progress: Progress) -> Progress:
     hidden = ~in_view(progress, states).any(axis=1)
     if not hidden.any():
         return progress
+    hidden &= _inside(settings, states)
+    return progress.with_state(tracks=tracks.hidden_for(np.where(hidden, dt, 0.0)))
+
+
+def _inside(settings: TrackerSettings, states: Any) -> Array:
+    """Which tracks are inside the region, bool (T,)."""
     region, axes = settings.place.region, len(settings.filter.motion.position)
     where = places_of(settings.filter, states)[0][:, :axes]
-    hidden &= ((where >= region[:axes, 0]) & (where <= region[:axes, 1])).all(axis=1)
-    return progress.with_state(tracks=tracks.hidden_for(np.where(hidden, dt, 0.0)))
+    return np.asarray(((where >= region[:axes, 0]) & (where <= region[:axes, 1])).all(axis=1))
 
 
 def in_view(progress: Progress, states: Any) -> Array:
@@ -92,8 +98,9 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     if most < _LEAST_TURN:
         return np.zeros(len(tracks), dtype=np.bool_)
     seen = in_view(progress, tracks.states)
-    # nothing is lost with a tentative track that no sensor sees
-    seen |= ~(tracks.confirmed | seen.any(axis=1))[:, None]
+    # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
+    waits = tracks.confirmed & _inside(settings, tracks.states)
+    seen |= ~(waits | seen.any(axis=1))[:, None]
     patience = settings.life_cycle.patience(
         np.where(seen, settings.terms.miss, 0.0) * (state.turns / most), state.pace / most
     )

@@ -125,3 +125,15 @@ def test_a_track_crosses_a_gap_between_views_under_its_id(kind):
     for k in range(30, 45):
         tracker.step(4.0 * k, [np.zeros((0, 3))] * 2)
     assert not [track for track in tracker.tracks if track.confirmed]
+
+
+@sample("kind", KINDS, every=3)
+def test_a_track_that_leaves_views_and_region_ends(kind):
+    sensor = radar(reach=40e3)
+    tracker = make(kind, [sensor])
+    # downwards, through the ground
+    falling = Gaussian(np.array([[0.0, 0.0, 1e3, 0.0, 100.0, -600.0]]), np.diag([50.0] * 3 + [5.0] * 3)[None] ** 2)
+    tracker.begin(0.0, falling)
+    for k in range(1, 15):
+        tracker.step(4.0 * k, [np.zeros((0, 3))])
+    assert not tracker.tracks
