@@ -98,6 +98,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         "solver_calls": np.array(state.solver_calls),
         "filter_rng": np.array("" if state.rng is None else json.dumps(state.rng)),
         **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
+        **{f"lost.{name}": value for name, value in state.lost.arrays().items()},
         **settings.method.arrays(state.own),
     }
     if state.registration is not None:
@@ -119,7 +120,8 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     """The state in these arrays, checked; `model` is any state of these settings."""
     saved.require(1 <= int(saved["next_id"]) < 2**62, "next_id", "a whole number above 0")
     _check_tracks(settings, saved.part("tracks."), int(saved["next_id"]))
-    tracks = model.tracks.restored(saved.part("tracks."))
+    _check_tracks(settings, saved.part("lost."), int(saved["next_id"]))
+    tracks, lost = (getattr(model, name).restored(saved.part(f"{name}.")) for name in ("tracks", "lost"))
     time, scan, pace = float(saved["time"]), int(saved["scan"]), float(saved["pace"])
     saved.require(not math.isinf(time), "time", "seconds")
     saved.require(0 <= scan < 2**62, "scan", "a whole number >= 0")
@@ -131,7 +133,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     good = turns.shape == model.turns.shape and ((turns >= 0) & (turns <= 1 + 1e-6)).all()
     saved.require(good, "turns", f"{len(model.turns)} shares of a turn")
     state = model._replace(
-        tracks=tracks, turns=turns, time=None if math.isnan(time) else time, scan=scan, pace=pace,
+        tracks=tracks, lost=lost, turns=turns, time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
         registration=None if model.registration is None else model.registration.restored(saved),

@@ -99,6 +99,10 @@ class Identities(NamedTuple):
         known = told.any(axis=(1, 2))
         return Identities(self.parameters, ids[known], told[known])
 
+    def of_tracks(self, old: Array, new: Array) -> tuple[Array, Array]:
+        """What the last plots of new tracks (K,) say for their being old ones (K,); see `evidence`."""
+        return self.evidence(old, self._of(new)[:, 0])
+
     def _of(self, track_id: Array) -> Array:
         """Codes and addresses of tracks' last plots, (K, MEMORY, 2)."""
         rows = np.searchsorted(self.ids, track_id)

@@ -28,6 +28,8 @@ class TrackerState(NamedTuple):
     """Mean number of turns of each sensor in a scan, (S,)."""
     own: Any
     """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
+    lost: TrackBatch
+    """Confirmed tracks that ended not long ago; see `assoc.tracking.taking_up`."""
     time: float | None = None
     """Time of the last scan, seconds; None before the first."""
     scan: int = 0
@@ -68,6 +70,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         tracks,
         np.ones(count),
         settings.method.begun(settings, tracks),
+        empty_batch(settings.filter),
         registration=settings.registration,
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,

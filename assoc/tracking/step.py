@@ -31,6 +31,7 @@ from assoc.tracking.looks import count_out_of_view, keep_pace
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState, rng_of
+from assoc.tracking.taking_up import take_up
 from assoc.tracking.track import Step
 
 Stage = Callable[[Progress], Progress]
@@ -53,6 +54,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([end_ghosts, grow_nursery] if nursing else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
+        *([] if nursing else [take_up]),
         report,
     ]
 

@@ -15,7 +15,7 @@ from assoc._types import Array
 Status = Literal["tentative", "confirmed", "coasting", "lost"]
 
 # one scan without a detection by several sensors may be a shadow or P_d declared too high
-_LOST_AFTER = 3
+_LOST_AFTER = 2
 # for a ghost of bearings a scan without them is the end
 _KNOWN_AFTER = 5
 
@@ -69,7 +69,7 @@ class Track(Shown):
         """Where it is in its life.
 
         "tentative"; "confirmed"; "coasting": confirmed, and now missed or out of view; "lost": probably gone (existence
-        below 0.5), after five scans with a detection not before three missed in a row, or at a detection that leaves
+        below 0.5), after five scans with a detection not before two missed in a row, or at a detection that leaves
         it unlikely, as in dense clutter.
         """
         if not self.confirmed:

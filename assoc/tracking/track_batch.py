@@ -160,6 +160,13 @@ class TrackBatch:
         counts[:, SURE] = confirmed
         return TrackBatch(self.states, self.numbers, counts)
 
+    def renamed(self, ids: Array, names: Array) -> TrackBatch:
+        """The same tracks with these names (K,) in place of ids (K,)."""
+        counts = self.counts.copy()
+        for i, name in zip(ids.tolist(), names.tolist(), strict=True):
+            counts[self.track_id == i, ID] = name
+        return TrackBatch(self.states, self.numbers, counts)
+
     def confirm(self, life_cycle: LifeCycle) -> TrackBatch:
         """Confirm the tracks that meet the criterion."""
         return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections))

@@ -137,3 +137,24 @@ def test_a_track_that_leaves_views_and_region_ends(kind):
     for k in range(1, 15):
         tracker.step(4.0 * k, [np.zeros((0, 3))])
     assert not tracker.tracks
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lost_track_is_taken_up_again_under_its_id(kind):
+    """Twice 24 s of shadow that nobody knows; and a target that appears elsewhere gets an id of its own."""
+    sensors, seen, other = [radar(-20e3, P=0.9), radar(20e3, P=0.9)], [], []
+    tracker = make(kind, sensors)
+    for k, (time, z) in enumerate(flight(sensors, 7, 40, (-14e3, 0.0, 5e3))):
+        if 10 <= k < 16 or 25 <= k < 31:
+            z = [one[-1:] for one in z]
+        if k >= 14:
+            where = np.array([[0.0, 15e3 + 800.0 * (k - 14), 4e3]])
+            z = [np.concatenate([one, sensor.measure(where)]) for one, sensor in zip(z, sensors, strict=True)]
+        step = tracker.step(time, z)
+        shown = [track for track in tracker.tracks if track.confirmed]
+        seen.append({track.track_id for track in shown if abs(track.position[1]) < 5e3})
+        other.append({track.track_id for track in shown if track.position[1] > 12e3})
+    assert seen[8] == seen[20] == seen[39] and len(seen[8]) == 1
+    assert set() in seen[10:20]
+    assert len(other[39]) == 1 and other[39] != seen[39]
+    assert any(seen[39] <= set(ids.tolist()) for ids in step.assigned)

@@ -60,6 +60,11 @@ class Method(ABC):
         """Probability with which each sensor has detected each track in a step, (T, S)."""
         return np.stack([np.isin(state.tracks.track_id, ids) for ids in step.assigned], axis=1).astype(np.float64)
 
+    def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
+        """The state with these names (K,) in place of ids (K,); tracks that had these names end."""
+        tracks = state.tracks[~np.isin(state.tracks.track_id, names)].renamed(ids, names)
+        return state._replace(tracks=tracks[np.argsort(tracks.track_id, kind="stable")])
+
     def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> Any:
         """The method's own part of the state before the first scan, with tracks that are known."""
         return None

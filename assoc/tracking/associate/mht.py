@@ -176,6 +176,13 @@ class TrackTrees(DeferringMethod):
             stay &= ~((own.window.history == row) & (row > 0)).any(axis=1)
         return state._replace(tracks=tracks[stay], own=own.of(stay)), tracks[grown]
 
+    def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
+        """The state with these names (K,) in place of ids (K,); trees that had these names end."""
+        rows = np.flatnonzero(~np.isin(state.tracks.track_id, names))
+        tracks = state.tracks[rows].renamed(ids, names)
+        order = np.argsort(tracks.track_id, kind="stable")
+        return state._replace(tracks=tracks[order], own=state.own.of(rows[order]))
+
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
         """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
         return state.own.window.decisions(state.scan - 1, state.tracks, np.flatnonzero(state.own.chosen))

@@ -149,13 +149,16 @@ class ClusteredHypotheses(DeferringMethod):
         # a track is deleted if all its branches are to be deleted
         ids = tracks.track_id
         gone = ~np.isin(ids, ids[~to_delete(progress, tracks)])
-        if gone.any():
-            left = [group for group in own.clusters if not gone[group.branches].all()]
-            tracks, own = _kept(tracks, own, [without(group, gone[group.branches]) for group in left])
+        tracks, own = _without(tracks, own, gone)
         tracks, own = _kept(tracks, own, _split(tracks, own))
         ended = np.setdiff1d(known, tracks.track_id)
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
         return progress.with_state(tracks=tracks, own=own)._replace(step=step)
+
+    def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
+        """The state with these names (K,) in place of ids (K,); tracks that had these names end."""
+        tracks, own = _without(state.tracks, state.own, np.isin(state.tracks.track_id, names))
+        return state._replace(tracks=tracks.renamed(ids, names), own=own)
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
         """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
@@ -239,6 +242,14 @@ def _kept(tracks: TrackBatch, own: Hypotheses, clusters: Iterable[Cluster]) -> t
     """Keep only these clusters."""
     found, kept = _renumbered(clusters)
     return tracks[kept], Hypotheses(own.window.of(kept), tuple(found))
+
+
+def _without(tracks: TrackBatch, own: Hypotheses, gone: Array) -> tuple[TrackBatch, Hypotheses]:
+    """Take out branches, bool (B,): all those of their tracks."""
+    if not gone.any():
+        return tracks, own
+    left = [group for group in own.clusters if not gone[group.branches].all()]
+    return _kept(tracks, own, [without(group, gone[group.branches]) for group in left])
 
 
 def _agreeing(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:

@@ -312,6 +312,6 @@ class LatePlots:
 
 
 def _ids(state: TrackerState) -> set[int]:
-    """Ids of the tracks that live, those in the nursery included."""
-    ids = set(state.tracks.track_id.tolist())
+    """Ids of the tracks that live or may be taken up again, those in the nursery included."""
+    ids = set(state.tracks.track_id.tolist()) | set(state.lost.track_id.tolist())
     return ids if state.nursery is None else ids | set(state.nursery.state.tracks.track_id.tolist())

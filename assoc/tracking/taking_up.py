@@ -1,0 +1,113 @@
+"""A track that was lost is taken up again: a new track that continues it gets its id.
+
+Ends of confirmed tracks are predicted on for a while. When a track is confirmed that began after such an end, or after
+the last detection of a track that is probably gone, two explanations are compared: the target of the old track, with
+its predicted position and velocity; or a new target, born anywhere in the region with any usual velocity. Old ends and
+new starts are matched by the assignment problem of these log likelihood ratios.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.views import places_of
+from assoc.filters.base import predict_each
+from assoc.problem import AssignmentProblem
+from assoc.tracking.births.initiation import velocity_components
+from assoc.tracking.life_cycle import OVERLOOKED
+from assoc.tracking.progress import Progress
+from assoc.tracking.track import Step
+from assoc.tracking.track_batch import TrackBatch
+
+# ends are kept for this share of a target's mean lifetime
+_KEPT = 0.25
+# share of lost targets that have manoeuvred, and their variance as a multiple of the prediction's
+_MANOEUVRED, _WIDER = 0.2, 16.0
+
+
+def take_up(progress: Progress) -> Progress:
+    """Stage: give newly confirmed tracks the ids of the old ones that they continue; keep the ends of this step."""
+    assert progress.found is not None and progress.step is not None
+    method, step, known = progress.settings.method, progress.step, progress.found.tracks
+    tracks, lost = method.current(progress.state), _predicted(progress)
+    new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, known.track_id[known.confirmed])]
+    # those that are probably gone; log odds
+    coasting = tracks[tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0)]
+    if len(new) and len(lost) + len(coasting):
+        old = TrackBatch.concatenate([lost, coasting])
+        start, end = _matched(progress, new, old)
+        if len(start):
+            ids, names = new.track_id[start], old.track_id[end]
+            progress = progress._replace(state=method.renamed(progress.state, ids, names))
+            lost, step = lost[~np.isin(lost.track_id, names)], _renamed(step, ids, names)
+    ended = known[np.isin(known.track_id, step.ended)]
+    # of several branches the best
+    ended = ended[np.lexsort((-ended.score, ended.track_id))]
+    ended = ended[np.unique(ended.track_id, return_index=True)[1]]
+    return progress.with_state(lost=TrackBatch.concatenate([lost, ended]))._replace(step=step)
+
+
+def _predicted(progress: Progress) -> TrackBatch:
+    """The ends that may still be taken up, predicted to the scan."""
+    settings, lost, dt = progress.settings, progress.state.lost, progress.elapsed
+    if not len(lost):
+        return lost
+    lost = lost.moved(predict_each(settings.filter, lost.states, np.full(len(lost), dt))) if dt else lost
+    recent = progress.scan.time - lost.last_detection <= _KEPT * settings.life_cycle.lifetime
+    return lost[recent & settings.births.narrow(places_of(settings.filter, lost.states)[1])]
+
+
+def _matched(progress: Progress, new: TrackBatch, old: TrackBatch) -> tuple[Array, Array]:
+    """Rows of new tracks and of the old ones that they continue."""
+    settings = progress.settings
+    motion, region = settings.filter.motion, settings.place.region
+    place, velocity = np.array(motion.position), velocity_components(motion)
+    both = np.concatenate([place, velocity])
+    start, end = np.nonzero(new.started[:, None] > old.last_detection[None, :])
+    off = new.states.mean[start][:, both] - old.states.mean[end][:, both]
+    spread = (new.states.covariance[start] + old.states.covariance[end])[:, both[:, None], both]
+    # where a track was lost its target may have manoeuvred more than the filter expects
+    square, size = _square(off, spread), np.linalg.slogdet(2.0 * math.pi * spread)[1]
+    wider = -0.5 * (square / _WIDER + size + len(both) * math.log(_WIDER)) + math.log(_MANOEUVRED)
+    continued = np.logaddexp(math.log1p(-_MANOEUVRED) - 0.5 * (square + size), wider)
+    prior = (
+        settings.initiation.prior(motion)[1][velocity[:, None], velocity]
+        + new.states.covariance[start][:, velocity[:, None], velocity]
+    )
+    width = np.maximum(region[:, 1] - region[:, 0], 1.0)[: len(place)]
+    born = -0.5 * (_square(new.states.mean[start][:, velocity], prior) + np.linalg.slogdet(2.0 * math.pi * prior)[1])
+    born += math.log(settings.initiation.birth_rate) - np.log(width).sum()
+    # sensors may have missed it together: no less than a target that is missed until its track ends
+    silent = progress.scan.time - old.last_detection[end]
+    there = (
+        np.maximum(-np.logaddexp(0.0, -old.existence[end]), math.log(OVERLOOKED))
+        - silent / settings.life_cycle.lifetime
+    )
+    gain = there + continued - born
+    if progress.state.identities is not None:
+        says, possible = progress.state.identities.of_tracks(old.track_id[end], new.track_id[start])
+        gain = np.where(possible, gain + says, -np.inf)
+    good = np.flatnonzero(gain > 0)
+    if not len(good):
+        return start[:0], end[:0]
+    pairs = np.stack([start, end], axis=1)[good]
+    solution = progress.work.assign(AssignmentProblem(pairs + 1, -gain[good], [len(new), len(old)]))
+    chosen = pairs[solution.indices[solution.indices < len(pairs)]]
+    return chosen[:, 0], chosen[:, 1]
+
+
+def _square(off: Array, spread: Array) -> Array:
+    """Squared Mahalanobis distances, (K,)."""
+    return np.asarray((off * np.linalg.solve(spread, off[:, :, None])[:, :, 0]).sum(axis=1))
+
+
+def _renamed(step: Step, ids: Array, names: Array) -> Step:
+    """The step with these names (K,) in place of ids (K,)."""
+    name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
+    assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
+    final = tuple(replace(one, assigned=assigned) if one.scan == step.scan else one for one in step.final)
+    return replace(step, assigned=assigned, final=final)
