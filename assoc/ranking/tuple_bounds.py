@@ -134,6 +134,7 @@ def _bound_rows(graph: _Graph, found: TupleBounds, row: int, most: int) -> int:
         np.zeros(rows, np.int64), np.zeros(1, np.int64), np.empty((_DEEPEST, 4), np.int64), np.empty((_DEEPEST, 5))
     )
     low, high = np.empty(row_cols.size), np.empty(row_cols.size)
+    low_after, high_after = np.empty(row_cols.size + 1), np.empty(row_cols.size + 1)
     steps = 0
     while row < rows and steps < _AT_ONCE:
         influence, spent, width = _INFLUENCE, 0, 1.0
@@ -150,11 +151,20 @@ def _bound_rows(graph: _Graph, found: TupleBounds, row: int, most: int) -> int:
             width = 1.0 / low_sum - 1.0 / high_sum
             found.free_lower[row] = max(found.free_lower[row], 1.0 / high_sum)
             found.free_upper[row] = min(found.free_upper[row], 1.0 / low_sum)
+            # sums of all terms but one, from both ends: a difference of sums would lose the small ones
+            low_after[row_ptr[row + 1] - row_ptr[row]], high_after[row_ptr[row + 1] - row_ptr[row]] = 0.0, 0.0
+            for i in range(row_ptr[row + 1] - row_ptr[row] - 1, -1, -1):
+                low_after[i] = low_after[i + 1] + low[row_ptr[row] + i]
+                high_after[i] = high_after[i + 1] + high[row_ptr[row] + i]
+            low_before, high_before = 1.0, 1.0
             for x in range(row_ptr[row], row_ptr[row + 1]):
-                j, least, most_likely = row_cols[x], 0.0, 0.0
+                j, after, least, most_likely = row_cols[x], x + 1 - row_ptr[row], 0.0, 0.0
+                if low[x] > 0.0:
+                    least = low[x] / (low[x] + high_before + high_after[after])
                 if high[x] > 0.0:
-                    least = low[x] / (low[x] + (high_sum - high[x]))
-                    most_likely = high[x] / (high[x] + (low_sum - low[x]))
+                    most_likely = high[x] / (high[x] + low_before + low_after[after])
+                low_before += low[x]
+                high_before += high[x]
                 found.lower[j], found.upper[j] = max(found.lower[j], least), min(found.upper[j], most_likely)
                 width = max(width, found.upper[j] - found.lower[j])
             spent = most - walk.left[0]

@@ -65,14 +65,14 @@ def _by_processor_time(workers: int) -> Iterator[None]:
     """Let a run's clock count the processor time of this process, shared among its workers."""
     began = time.process_time()
 
-    def elapsed(self: Run) -> float:
+    def runtime(self: Run) -> float:
         return (time.process_time() - began) / workers
 
     def deadline(self: Run) -> float:
         left = self.remaining()
         return time.monotonic() + left * _LATER * _pace.ratio
 
-    with mock.patch.object(Run, "elapsed", elapsed), mock.patch.object(Run, "deadline", deadline):
+    with mock.patch.object(Run, "runtime", runtime), mock.patch.object(Run, "deadline", deadline):
         yield
 
 

@@ -20,7 +20,7 @@ def test_a_runs_clock_counts_processor_time_by_worker(monkeypatch):
     clock = iter((3.0, 4.0))
     monkeypatch.setattr(running.time, "process_time", lambda: next(clock))
     with running._by_processor_time(2):
-        assert run.elapsed() == 0.5
+        assert run.runtime() == 0.5
 
 
 def test_what_comes_after_the_budget_does_not_count(monkeypatch):

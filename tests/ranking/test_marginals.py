@@ -112,6 +112,15 @@ def test_intervals_hold_where_large_costs_cancel():
     assert (result.upper - result.lower)[(result.tuples > 0).sum(axis=1) > 1].max() > 0.5
 
 
+def test_intervals_hold_where_one_tuple_outweighs_the_others():
+    """Small terms beside a large one: their sum may not be a difference of sums."""
+    tuples = [[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1], [0, 2, 1], [2, 0, 1], [1, 2, 0]]
+    problem = AssignmentProblem(tuples, [-40.0, -200.0, -130.0, -90.0, -150.0, -60.0, -170.0], (2, 2, 1))
+    truth, found = exact_marginals(problem), marginals(problem, 1)
+    for key, low, high in zip(found.tuples.tolist(), found.lower, found.upper, strict=True):
+        assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
+
+
 def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
     for problem, _ in enumerable(20, 63):
         truth = exact_marginals(problem)
