@@ -22,7 +22,7 @@ from assoc.filters.kernels.linear_algebra import all_factors
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
-from assoc.sensors.base import numbers
+from assoc.sensors.arrays import numbers
 
 
 class State(Protocol):

@@ -11,7 +11,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.linear_algebra import all_factors
-from assoc.sensors.base import numbers, require_finite
+from assoc.sensors.arrays import numbers, require_finite
 
 
 def finite(value: object, what: str, *dimensions: int) -> Array:

@@ -14,7 +14,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
-from assoc.sensors.base import numbers
+from assoc.sensors.arrays import numbers
 
 
 class Ospa(NamedTuple):

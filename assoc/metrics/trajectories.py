@@ -13,7 +13,7 @@ from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
-from assoc.sensors.base import numbers, require_finite
+from assoc.sensors.arrays import numbers, require_finite
 
 SAME_TIME = 1e-6
 """Time stamps that differ by less than about this (s) are one epoch."""

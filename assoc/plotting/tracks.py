@@ -12,7 +12,7 @@ from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, 
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,8 @@ from assoc._system.door import doors
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import finite_array, wrap_angle
+from assoc.sensors.arrays import finite_array
+from assoc.sensors.base import wrap_angle
 
 UNDECODED = 0
 """The identity (Mode 3) of a plot whose transponder answer was not decoded."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 SEMI_MAJOR_AXIS = 6_378_137.0
 """WGS-84 equatorial radius, metres."""

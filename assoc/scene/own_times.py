@@ -10,7 +10,7 @@ import numpy as np
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 FULL_TURN = 2.0 * math.pi
 # an antenna that takes exactly a scan for a turn may come out a rounding error above it

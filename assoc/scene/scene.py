@@ -22,7 +22,8 @@ from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
-from assoc.sensors.base import ANGLES, finite_array
+from assoc.sensors.arrays import finite_array
+from assoc.sensors.base import ANGLES
 
 # a planar scene still needs some height for the prior; radars see aircraft up to about here (metres)
 _DEFAULT_HEIGHT = 20_000.0

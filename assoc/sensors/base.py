@@ -6,15 +6,14 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
-
-if TYPE_CHECKING:
-    from assoc.sensors.platform import Platform
+from assoc.sensors.arrays import finite_array
+from assoc.sensors.platform import Platform
 
 ANGLES = ("azimuth", "elevation")
 """Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
@@ -22,44 +21,11 @@ ANGLES = ("azimuth", "elevation")
 LARGEST_ANGLE_NOISE = 0.3
 """Standard deviation of an angle (rad, 17 degrees) from which a warning suggests degrees."""
 
-LARGEST = 1e12
-"""Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
-
 
 def wrap_angle(angle: Array) -> Array:
     """Angles brought into (-pi, pi]."""
     wrapped: Array = math.pi - np.mod(math.pi - angle, 2 * math.pi)
     return wrapped
-
-
-def numbers(value: object, what: str) -> Array:
-    """Return a C-ordered float64 copy; errors name it `what`."""
-    try:
-        if np.asarray(value).dtype.kind in "mM":
-            raise TypeError  # numpy would count their days or nanoseconds
-        return np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        kind = value.dtype if isinstance(value, np.ndarray) else type(value).__name__
-        raise InvalidInputError(f"{what} must be numbers, got {kind}") from error
-
-
-def require_finite(array: Array, what: str) -> Array:
-    """Return an array of finite numbers; errors name it `what`."""
-    if not np.isfinite(array).all():
-        raise InvalidInputError(f"{what} must be finite, got {array[~np.isfinite(array)][0]}")
-    return array
-
-
-def finite_array(value: object, what: str, shape: tuple[int, ...] | None = None) -> Array:
-    """Return a read-only float64 copy of finite numbers of usual size; errors name it `what`."""
-    array = numbers(value, what)
-    if shape is not None and array.shape != shape:
-        raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
-    require_finite(array, what)
-    if array.size and np.abs(array).max() > LARGEST:
-        raise InvalidInputError(f"{what} must be within +-{LARGEST:g}, got {np.abs(array).max():g}")
-    array.setflags(write=False)
-    return array
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -139,8 +105,6 @@ class Sensor(ABC):
                     f"{label}: field_of_view of {component} spans {high - low:g} rad, more than a full circle"
                 )
         if self.platform is not None:
-            from assoc.sensors.platform import Platform
-
             if not isinstance(self.platform, Platform):
                 raise InvalidInputError(f"{label}: platform must be a Platform, got {type(self.platform).__name__}")
         for line in self.warnings:

@@ -10,7 +10,7 @@ import numpy as np
 from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 # a step is taken for a jump if it is faster than this (m/s) and so many times as fast as nine in ten steps
 _FAST, _FASTER = 100.0, 10.0

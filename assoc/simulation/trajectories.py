@@ -10,7 +10,7 @@ import numpy as np
 from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 
 @dataclass(frozen=True)

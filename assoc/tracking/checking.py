@@ -11,7 +11,8 @@ from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors import Sensor
-from assoc.sensors.base import ANGLES, finite_array
+from assoc.sensors.arrays import finite_array
+from assoc.sensors.base import ANGLES
 
 # noise may carry a range this many standard deviations below 0
 _NOISE = 10.0

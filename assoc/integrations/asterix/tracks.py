@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
 from assoc.integrations.asterix.reading import Source, SourceRows
 from assoc.integrations.asterix.writing import check_source, time_of_day, write_blocks
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 
 if TYPE_CHECKING:
     import pandas as pd

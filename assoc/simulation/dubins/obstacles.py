@@ -16,7 +16,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InfeasibleError, InvalidInputError, LimitExceededError
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 from assoc.simulation.dubins.kernels import SENSES, TURN, WORDS, distance, free_word, free_words, pieces, turn
 from assoc.simulation.dubins.paths import Path, Pose, Segment, positive_radius
 

@@ -15,7 +15,7 @@ import numpy as np
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import finite_array
+from assoc.sensors.arrays import finite_array
 from assoc.simulation.dubins.kernels import SENSES, WORDS, advance, distance, pieces, turn
 
 # bytes of a sample, measured

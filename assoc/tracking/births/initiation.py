@@ -14,7 +14,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import gaussian
-from assoc.sensors.base import numbers
+from assoc.sensors.arrays import numbers
 
 
 @dataclass(frozen=True)

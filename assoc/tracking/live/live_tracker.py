@@ -18,7 +18,7 @@ from assoc.costs.positions import positions_of_scan
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.sensors.base import LARGEST
+from assoc.sensors.arrays import LARGEST
 from assoc.tracking.checking import checked
 from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.live import state_file
