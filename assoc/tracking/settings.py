@@ -20,8 +20,8 @@ from assoc.solvers.registry import make_parameters
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.new_tracks import NewTracks
 from assoc.tracking.filter_choice import open_heights
-from assoc.tracking.identity_evidence import IdentityParameters
-from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.stages.identity_evidence import IdentityParameters
+from assoc.tracking.stages.life_cycle import LifeCycle
 
 _CLIMB = 0.1
 """Usual climb of a target as a share of its usual speed."""

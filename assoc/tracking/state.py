@@ -14,8 +14,8 @@ from assoc.registration.online import OnlineRegistration
 from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import Estimates
 from assoc.tracking.births.ghosts import Unseen
-from assoc.tracking.identity_evidence import Identities
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.identity_evidence import Identities
 from assoc.tracking.track_batch import TrackBatch, empty_batch
 
 
@@ -29,7 +29,7 @@ class TrackerState(NamedTuple):
     own: Any
     """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
     lost: TrackBatch
-    """Confirmed tracks that ended not long ago; see `assoc.tracking.taking_up`."""
+    """Confirmed tracks that ended not long ago; see `assoc.tracking.stages.taking_up`."""
     time: float | None = None
     """Time of the last scan, seconds; None before the first."""
     scan: int = 0

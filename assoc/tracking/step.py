@@ -25,13 +25,13 @@ from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimates
 from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
-from assoc.tracking.checking import checked_measurements, checked_time
-from assoc.tracking.identity_evidence import checked_identities
-from assoc.tracking.looks import count_out_of_view, keep_pace
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.checking import checked_measurements, checked_time
+from assoc.tracking.stages.identity_evidence import checked_identities
+from assoc.tracking.stages.looks import count_out_of_view, keep_pace
+from assoc.tracking.stages.taking_up import take_up
 from assoc.tracking.state import TrackerState, rng_of
-from assoc.tracking.taking_up import take_up
 from assoc.tracking.track import Step
 
 Stage = Callable[[Progress], Progress]

@@ -12,7 +12,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.filters.state import gaussian
 from assoc.tracking.births.initiation import velocity_components
-from assoc.tracking.life_cycle import HISTORY, LifeCycle
+from assoc.tracking.stages.life_cycle import HISTORY, LifeCycle
 from assoc.tracking.track import Track
 
 MASK = (1 << HISTORY) - 1

@@ -25,11 +25,11 @@ from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
-from assoc.tracking.checking import checked_time
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
-from assoc.tracking.identity_evidence import IdentityParameters
-from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.checking import checked_time
+from assoc.tracking.stages.identity_evidence import IdentityParameters
+from assoc.tracking.stages.life_cycle import LifeCycle
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
 from assoc.tracking.target_kinds import target_kind

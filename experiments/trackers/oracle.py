@@ -14,9 +14,9 @@ from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
-from assoc.tracking.looks import misses
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.looks import misses
 from assoc.tracking.track_batch import TrackBatch
 
 

@@ -10,8 +10,8 @@ import pytest
 from assoc.errors import InvalidInputError
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.tracking import TRACKERS, IdentityParameters
-from assoc.tracking.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
 from assoc.tracking.plots import track_plots
+from assoc.tracking.stages.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
 from tests.sizes import few_or_all, sample
 from tests.tracking.crossing import TURN, crossing, radar
 

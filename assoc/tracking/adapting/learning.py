@@ -16,8 +16,8 @@ from assoc.scene.own_times import FULL_TURN
 from assoc.tracking.adapting.estimates import ALARMS, declared_values
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
-from assoc.tracking.looks import dwells
 from assoc.tracking.progress import Progress
+from assoc.tracking.stages.looks import dwells
 from assoc.tracking.track_batch import TrackBatch
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there

@@ -9,8 +9,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.tracking.looks import looked
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.stages.looks import looked
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
 
@@ -31,7 +31,7 @@ def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: 
     born : int array (K, S)
         Tuples that belong to no track.
     missed : array (T, S)
-        Scores of a miss of the tracks; see `assoc.tracking.looks.misses`.
+        Scores of a miss of the tracks; see `assoc.tracking.stages.looks.misses`.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
     return _joined(progress, tracks, rows, _begin(progress, born), missed)

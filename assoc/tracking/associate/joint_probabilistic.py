@@ -45,9 +45,9 @@ from assoc.ranking.pairs.permutations import without_permutations
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
-from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.looks import in_view, looked, misses_of
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch

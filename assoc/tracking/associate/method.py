@@ -19,9 +19,9 @@ from assoc.costs.tracks.own_times import TimedScan
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
-from assoc.tracking.looks import to_delete
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.looks import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import TrackBatch

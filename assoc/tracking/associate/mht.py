@@ -28,13 +28,13 @@ from assoc.costs.tracks.own_times import TimedScan
 from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.tracking.file import Saved
-from assoc.tracking.looks import to_delete
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.growth import AtOnce, Offers, growth_of
 from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.looks import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, SURE, TrackBatch

@@ -29,13 +29,13 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
-from assoc.tracking.looks import to_delete
 from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
 from assoc.tracking.mht.generation import generated, with_births
 from assoc.tracking.mht.growth import AtOnce, Grown, Growth, Offers, growth_of
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.looks import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, TrackBatch

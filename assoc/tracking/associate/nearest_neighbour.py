@@ -16,8 +16,8 @@ from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
-from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.stages.looks import in_view, looked, misses_of
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker

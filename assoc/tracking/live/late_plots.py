@@ -20,8 +20,8 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.births.nursery import current
-from assoc.tracking.checking import checked_measurements
-from assoc.tracking.identity_evidence import checked_identities, no_identities
+from assoc.tracking.stages.checking import checked_measurements
+from assoc.tracking.stages.identity_evidence import checked_identities, no_identities
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.tracker import Tracker

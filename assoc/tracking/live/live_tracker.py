@@ -19,12 +19,12 @@ from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.arrays import LARGEST
-from assoc.tracking.checking import checked
-from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
 from assoc.tracking.live.pictures import Antenna, Heard, Picture, PlotKey, SoundPlot
+from assoc.tracking.stages.checking import checked
+from assoc.tracking.stages.identity_evidence import checked_identities
 from assoc.tracking.tracker import Tracker
 
 JUMP = 60.0

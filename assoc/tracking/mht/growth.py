@@ -17,8 +17,8 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
 from assoc.filters.batches import concatenate
-from assoc.tracking.looks import in_view, looked, misses_of
 from assoc.tracking.progress import Progress
+from assoc.tracking.stages.looks import in_view, looked, misses_of
 from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100

@@ -18,8 +18,8 @@ from assoc.costs.views import places_of
 from assoc.filters.base import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.tracking.births.initiation import velocity_components
-from assoc.tracking.life_cycle import OVERLOOKED
 from assoc.tracking.progress import Progress
+from assoc.tracking.stages.life_cycle import OVERLOOKED
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import TrackBatch
 
