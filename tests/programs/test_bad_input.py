@@ -163,7 +163,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--json", "s.npz"], "s.npz: is given twice, or would overwrite an input file"),
         (["s.npz", "--csv", "."], "is a folder"),
         (["s.npz", "none.npz"], "none.npz: no such file"),
-        (["s.npz", "--config", "none.toml"], "none.toml: cannot be read"),
+        (["s.npz", "--config", "none.toml"], "none.toml: no such file"),
         (["s.npz", "--config", "s.npz"], "s.npz: is not a TOML file"),
         (["s.npz", "--config", "unknown.toml"], "unknown.toml: colour: unknown key"),
         (["s.npz", "--config", "type.toml"], "seed: expected a whole number >= 0, got 'four'"),

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ from tests.sizes import few_or_all
 from tests.tracking import plain
 
 GATE = 0.99
+# so wide that no track comes near the edges, where a sensor misses less
+REGION = 3.0 * plain.REGION
+SENSOR = replace(plain.sensor(rate=0.5), field_of_view=REGION)
 
 
 class WholeScene:
@@ -80,9 +84,9 @@ class WholeScene:
 
 def tracker(depth, **options):
     return HypothesisOrientedMHT(
-        [plain.sensor(rate=0.5)],
+        [SENSOR],
         KalmanFilter(ConstantVelocity(plain.Q_SIGMA, kind="continuous")),
-        region=plain.REGION,
+        region=REGION,
         life_cycle=LifeCycle(missed_probability=1e-12, false_probability=1e-2),
         initiation=Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
         gate_probability=GATE,
@@ -120,7 +124,7 @@ def named(own, row):
 
 @pytest.mark.parametrize(("seed", "depth"), [(0, 2), (1, 2), (2, 2), pytest.param(0, 3, marks=pytest.mark.slow)])
 def test_clusters_say_what_hypotheses_about_everything_say(seed, depth):
-    own, whole = tracker(depth), WholeScene(plain.sensor(rate=0.5), depth)
+    own, whole = tracker(depth), WholeScene(SENSOR, depth)
     shared = []
     for scan, (time, z) in enumerate(meeting(seed)):
         own.step(time, [z])
