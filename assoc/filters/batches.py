@@ -17,14 +17,24 @@ from assoc.filters.state import Gaussian
 
 def arrays_of(state: Any) -> dict[str, Array]:
     """Return the arrays that a state holds, each with the targets along its first axis."""
-    found = {}
-    for field in fields(state):
-        value = getattr(state, field.name)
+    found, count = {}, len(state)
+    for name in _names(type(state)):
+        value = getattr(state, name)
         # values common to all targets may be stored once
-        if len(value) != len(state):
-            value = np.broadcast_to(value, (len(state), *value.shape[1:]))
-        found[field.name] = value
+        if len(value) != count:
+            value = np.broadcast_to(value, (count, *value.shape[1:]))
+        found[name] = value
     return found
+
+
+_known_names: dict[type, tuple[str, ...]] = {}
+
+
+def _names(kind: type) -> tuple[str, ...]:
+    """Names of a state's arrays, kept: a tracker asks for them some hundred times a scan."""
+    if kind not in _known_names:
+        _known_names[kind] = tuple(field.name for field in fields(kind))
+    return _known_names[kind]
 
 
 def state_from(kind: type, arrays: Mapping[str, Array]) -> Any:
@@ -39,7 +49,7 @@ class Batch:
     """Length, selection and text of a state."""
 
     def __len__(self) -> int:
-        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+        return len(getattr(self, _names(type(self))[0]))
 
     def __getitem__(self, rows: Any) -> Self:
         """Return the targets that an index array, mask or slice selects."""
@@ -47,7 +57,7 @@ class Batch:
         return selected
 
     def __repr__(self) -> str:
-        shape = getattr(self, fields(self)[0].name).shape  # type: ignore[arg-type]
+        shape = getattr(self, _names(type(self))[0]).shape
         return f"{type(self).__name__}({' x '.join(map(str, shape))})"
 
 
