@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
@@ -20,6 +21,19 @@ settings.load_profile("assoc")
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def _same_signals() -> Iterator[None]:
+    """Undo what a program called in this process did to signals: processes of later tests would inherit it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    blocked, handler = signal.pthread_sigmask(signal.SIG_BLOCK, ()), signal.getsignal(signal.SIGINT)
+    yield
+    signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+    with contextlib.suppress(ValueError):
+        signal.signal(signal.SIGINT, handler)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
