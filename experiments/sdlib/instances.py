@@ -149,7 +149,7 @@ def _from_trackers() -> list[Instance]:
         for targets in sizes:
             for seed in (1, 2):
                 posed = _posed(kind, targets, seed)
-                found.append(Instance(f"{kind}-{targets}-{seed}", name, posed, kept=kind == "mht"))
+                found.append(Instance(f"{kind}-{targets}-{seed}", name, posed, kept=True))
     return found
 
 
