@@ -25,15 +25,17 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 @pytest.fixture(autouse=True)
 def _same_signals() -> Iterator[None]:
-    """Undo what a program called in this process did to signals: processes of later tests would inherit it."""
+    """Fail a test that changes what signals do: processes of later tests would inherit it, and not hear Ctrl-C."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    blocked, handler = signal.pthread_sigmask(signal.SIG_BLOCK, ()), signal.getsignal(signal.SIGINT)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ()), signal.getsignal(signal.SIGINT)
     yield
-    signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+    after = signal.pthread_sigmask(signal.SIG_BLOCK, ()), signal.getsignal(signal.SIGINT)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before[0])
     with contextlib.suppress(ValueError):
-        signal.signal(signal.SIGINT, handler)
+        signal.signal(signal.SIGINT, before[1])
+    assert after == before, "the test left signals blocked or handled"
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
