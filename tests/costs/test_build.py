@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
+from assoc._system import memory
 from assoc.costs import build_problem, pairs, positions_and_covariances, tuple_costs
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene import Scene
@@ -118,6 +119,14 @@ def test_the_guard_names_the_number_and_what_to_change():
     crowd = gated_scene(4, 300, [3000, 3000, 1000])
     with pytest.raises(LimitExceededError, match="max_tuples"):
         build_problem(crowd, 0, max_tuples=100_000)
+
+
+def test_without_a_number_the_guard_follows_the_memory(monkeypatch):
+    crowd = gated_scene(3, 100, [3000, 3000, 1000])
+    assert build_problem(crowd, 0).num_tuples > 100
+    monkeypatch.setattr(memory, "available", lambda own=True: 30_000.0)
+    with pytest.raises(LimitExceededError, match=r"candidate tuples \(\d+ MB\), more than max_tuples = 100;"):
+        build_problem(crowd, 0)
 
 
 @pytest.mark.parametrize("kinds", ["R", "b", "RRR"])
