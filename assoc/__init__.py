@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     )
     from assoc.association.associate import associate
     from assoc.association.association import Association
+    from assoc.association.link import link
     from assoc.association.source import load
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
@@ -55,6 +56,7 @@ __all__ = [
     "build_problem",
     "filters",
     "kbest",
+    "link",
     "load",
     "marginals",
     "metrics",
@@ -82,6 +84,7 @@ __getattr__, __dir__ = lazy_names(
         "build_problem": "costs",
         "filters": "filters",
         "kbest": "ranking.kbest",
+        "link": "association",
         "load": "association.source",
         "marginals": "ranking.marginals",
         "metrics": "metrics",

@@ -2,6 +2,7 @@
 
 from assoc.association.associate import associate
 from assoc.association.association import Association
+from assoc.association.link import Links, link
 from assoc.association.scan import ScanAssociation
 
-__all__ = ["Association", "ScanAssociation", "associate"]
+__all__ = ["Association", "Links", "ScanAssociation", "associate", "link"]
