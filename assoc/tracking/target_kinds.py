@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
@@ -37,8 +38,8 @@ TARGETS = {
 """Kinds by name: turns of 25 degrees of bank, of 5 g, of a rudder, of 0.5 g, and steps aside."""
 
 
-def target_kind(name: str, scene: Scene | None = None) -> TargetKind:
-    """The kind of this name; "auto" is the one that makes the best tracks of a scene's first scans.
+def target_kind(name: str, scene: Scene | None, make: Callable[..., Any]) -> TargetKind:
+    """The kind of this name; "auto" is the one with which the trackers of `make` track a scene's first scans best.
 
     Raises
     ------
@@ -51,15 +52,12 @@ def target_kind(name: str, scene: Scene | None = None) -> TargetKind:
         return TARGETS[name]
     if scene is None:
         raise InvalidInputError(f"targets: auto needs a scene; name one of {', '.join(TARGETS)}")
-    evidence = {kind: _evidence(scene, kind) for kind in TARGETS}
+    evidence = {kind: _evidence(make(scene, targets=kind), scene) for kind in TARGETS}
     return TARGETS[max(evidence, key=lambda kind: evidence[kind])]
 
 
-def _evidence(scene: Scene, name: str) -> float:
+def _evidence(tracker: Any, scene: Scene) -> float:
     """Sum of the scores of the confirmed tracks: how much likelier the measurements are with these targets."""
-    from assoc.tracking.associate.nearest_neighbour import NearestNeighbourTracker
-
-    tracker = NearestNeighbourTracker.for_scene(scene, targets=name)
     for k in range(min(scene.num_scans, _SCANS)):
         scan = scene.scan(k)
         tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)

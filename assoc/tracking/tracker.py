@@ -91,6 +91,8 @@ class Tracker:
     name: ClassVar[str]
     method: ClassVar[type[Method]]
     """How scans are associated; see `assoc.tracking.associate.method`."""
+    plain: ClassVar[type[Tracker]]
+    """The tracker that tries kinds of targets for "auto"."""
 
     def __init__(
         self,
@@ -139,7 +141,7 @@ class Tracker:
             What is tracked, a name of `assoc.tracking.target_kinds.TARGETS`, or "auto", which tries them: the prior of
             speeds (without an `initiation`) and the default filter's process noise suit it.
         """
-        kind = None if targets is None else target_kind(targets, scene)
+        kind = None if targets is None else target_kind(targets, scene, cls.plain.for_scene)
         if kind is not None and options.get("initiation") is None:
             options["initiation"] = Initiation(speed=kind.speed)
         if not arguments and options.get("filter") is None:

@@ -6,7 +6,7 @@ import pytest
 from assoc import InvalidInputError, Scene, simulation
 from assoc._cli.track import options
 from assoc.sensors import Radar2D
-from assoc.tracking import Initiation, MultiSensorTracker
+from assoc.tracking import Initiation, MultiSensorTracker, NearestNeighbourTracker
 from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise
 from assoc.tracking.target_kinds import TARGETS, target_kind
@@ -43,9 +43,9 @@ def test_boats_in_a_small_region_get_tracks(targets):
 
 
 def test_auto_tells_aircraft_from_boats():
-    assert target_kind("auto", harbour(1)).speed <= TARGETS["ship"].speed
+    assert target_kind("auto", harbour(1), NearestNeighbourTracker.for_scene).speed <= TARGETS["ship"].speed
     aircraft = simulation.simulate("three-radar", 1, scans=8)
-    assert target_kind("auto", aircraft).speed >= TARGETS["airliner"].speed
+    assert target_kind("auto", aircraft, NearestNeighbourTracker.for_scene).speed >= TARGETS["airliner"].speed
 
 
 def test_priors_of_a_kind():
@@ -63,4 +63,4 @@ def test_unknown_kinds():
     with pytest.raises(InvalidInputError, match="targets: unknown name 'boat'; known: airliner"):
         MultiSensorTracker.for_scene(harbour(scans=2), targets="boat")
     with pytest.raises(InvalidInputError, match="auto needs a scene"):
-        target_kind("auto")
+        target_kind("auto", None, NearestNeighbourTracker.for_scene)

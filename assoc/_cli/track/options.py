@@ -299,7 +299,7 @@ def make_tracker(
     parsed.check_use(_OF_TRACKERS, tracker=name)
     noise = parsed["process_noise"]
     if parsed["targets"] is not None:
-        kind = target_kind(parsed["targets"], scene)
+        kind = target_kind(parsed["targets"], scene, KINDS[name].plain.for_scene)
         if noise is None:
             noise = kind.acceleration if parsed["filter"] in ("imm", "fuzzy") else kind.noise(pace)
         if parsed["speed"] is None:

@@ -166,3 +166,6 @@ class NearestNeighbourTracker(Tracker):
 
     name = "nearest-neighbour"
     method = NearestNeighbour
+
+
+Tracker.plain = NearestNeighbourTracker

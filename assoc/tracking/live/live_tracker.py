@@ -7,7 +7,6 @@ import os
 import time as clock
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,7 +21,8 @@ from assoc.sensors.arrays import LARGEST
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
-from assoc.tracking.live.pictures import Antenna, Heard, Picture, PlotKey, SoundPlot
+from assoc.tracking.live.pictures import Antenna, Heard, Picture, SoundPlot
+from assoc.tracking.live.state import LiveSettings, LiveState
 from assoc.tracking.stages.checking import checked
 from assoc.tracking.stages.identity_evidence import checked_identities
 from assoc.tracking.tracker import Tracker
@@ -31,60 +31,7 @@ JUMP = 60.0
 """A plot whose time is this many seconds ahead of all others is doubted."""
 _AGREE = 10
 """Doubtful plots in a row, close in time, after which the clock is taken to have jumped."""
-SHORTEST = 1e-3
-"""Shortest interval, seconds."""
 _MOST_TIMED = 100_000
-
-
-@dataclass(frozen=True, eq=False)
-class LiveSettings:
-    """Settings of a live tracker; see `LiveTracker`."""
-
-    scene: Scene
-    make: Callable[[], Tracker]
-    interval: float
-    turns: Sequence[float] | None
-    horizon: float
-    wait: float
-    tell: Callable[[str], object]
-
-    def __post_init__(self) -> None:
-        if self.interval < SHORTEST:
-            raise InvalidInputError(f"interval: expected at least {SHORTEST:g} s, got {self.interval:g}")
-        count = len(self.scene.sensors)
-        if self.turns is not None and len(self.turns) != count:
-            raise InvalidInputError(f"turns: expected one for each of {count} sensors, got {len(self.turns)}")
-        if self.turns is not None and min(self.turns) < self.interval:
-            raise InvalidInputError(f"turns: must not be shorter than the interval, {self.interval:g} s")
-
-    def name_of(self, s: int) -> object:
-        """Name of a sensor, or its number from 1."""
-        return self.scene.sensors[s].name or s + 1
-
-    def turn_of(self, s: int) -> float | None:
-        """Seconds for a turn of a sensor's antenna; None where it does not turn."""
-        turns = "azimuth" in self.scene.sensors[s].components
-        return self.turns[s] if self.turns is not None and turns else None
-
-
-@dataclass
-class LiveState:
-    """State of a live tracker since its tracks last started anew."""
-
-    tracker: LatePlots
-    antennas: list[Antenna]
-    end: float = math.nan
-    """End of the open interval, seconds."""
-    newest: float = -math.inf
-    """Time of the newest plot, seconds."""
-    pending: list[SoundPlot] = field(default_factory=list)
-    """Plots of the open interval, and later ones."""
-    ahead: list[SoundPlot] = field(default_factory=list)
-    """Plots whose times are doubted."""
-    behind: set[PlotKey] = field(default_factory=set)
-    """Consecutive plots that were too old."""
-    recent: dict[PlotKey, None] = field(default_factory=dict)
-    """Plots so recent that a repetition must be recognised."""
 
 
 @doors
@@ -163,7 +110,7 @@ class LiveTracker:
         reserve : int
             Number of ids that new tracks will not get, since they may be used before the next `save`.
         """
-        state_file.save(path, self, self.state.tracker.next_id + reserve)
+        state_file.save(path, self.settings, self.state, self.confirmed, self.counts, reserve)
 
     def restore(self, path: str | os.PathLike[str]) -> None:
         """Read the state of a tracker with the same scene and settings; plots that it has are taken for repeated.
@@ -173,7 +120,7 @@ class LiveTracker:
         InvalidInputError
             The file is not such a state.
         """
-        state_file.restore(path, self)
+        self.state, self.confirmed, self.counts = state_file.restore(path, self.settings)
 
     @property
     def heard(self) -> list[Heard]:

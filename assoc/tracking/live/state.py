@@ -1,0 +1,67 @@
+"""What a live tracker knows: its settings, and its state since its tracks last started anew."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from assoc.errors import InvalidInputError
+from assoc.scene.scene import Scene
+from assoc.tracking.live.late_plots import LatePlots
+from assoc.tracking.live.pictures import Antenna, PlotKey, SoundPlot
+from assoc.tracking.tracker import Tracker
+
+SHORTEST = 1e-3
+"""Shortest interval, seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveSettings:
+    """Settings of a live tracker; see `LiveTracker`."""
+
+    scene: Scene
+    make: Callable[[], Tracker]
+    interval: float
+    turns: Sequence[float] | None
+    horizon: float
+    wait: float
+    tell: Callable[[str], object]
+
+    def __post_init__(self) -> None:
+        if self.interval < SHORTEST:
+            raise InvalidInputError(f"interval: expected at least {SHORTEST:g} s, got {self.interval:g}")
+        count = len(self.scene.sensors)
+        if self.turns is not None and len(self.turns) != count:
+            raise InvalidInputError(f"turns: expected one for each of {count} sensors, got {len(self.turns)}")
+        if self.turns is not None and min(self.turns) < self.interval:
+            raise InvalidInputError(f"turns: must not be shorter than the interval, {self.interval:g} s")
+
+    def name_of(self, s: int) -> object:
+        """Name of a sensor, or its number from 1."""
+        return self.scene.sensors[s].name or s + 1
+
+    def turn_of(self, s: int) -> float | None:
+        """Seconds for a turn of a sensor's antenna; None where it does not turn."""
+        turns = "azimuth" in self.scene.sensors[s].components
+        return self.turns[s] if self.turns is not None and turns else None
+
+
+@dataclass
+class LiveState:
+    """State of a live tracker since its tracks last started anew."""
+
+    tracker: LatePlots
+    antennas: list[Antenna]
+    end: float = math.nan
+    """End of the open interval, seconds."""
+    newest: float = -math.inf
+    """Time of the newest plot, seconds."""
+    pending: list[SoundPlot] = field(default_factory=list)
+    """Plots of the open interval, and later ones."""
+    ahead: list[SoundPlot] = field(default_factory=list)
+    """Plots whose times are doubted."""
+    behind: set[PlotKey] = field(default_factory=set)
+    """Consecutive plots that were too old."""
+    recent: dict[PlotKey, None] = field(default_factory=dict)
+    """Plots so recent that a repetition must be recognised."""
