@@ -53,7 +53,7 @@ def parser() -> Parser:
     made = Parser(
         prog="assoc.asterix2csv",
         usage=f"{command('asterix2csv')} FILE [-o FILE.csv]",
-        description="Write the records of an ASTERIX file (categories 021, 034, 048, 062) as CSV, a row each.",
+        description="Write the records of an ASTERIX file as CSV (categories 001, 002, 010, 020, 021, 034, 048, 062).",
     )
     made.declare(*_OPTIONS)
     return made

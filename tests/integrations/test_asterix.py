@@ -16,7 +16,7 @@ pytest.importorskip("asterix", reason="libasterix is not installed: pip install 
 from assoc import asterix2csv, track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
-from assoc.integrations.asterix.blocks import edition
+from assoc.integrations.asterix.blocks import edition, library, value
 from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
 from assoc.recordings import write_plots as write_table
@@ -175,13 +175,13 @@ def test_tracks_there_and_back(tmp_path):
             write_tracks(tmp_path / "far.ast", frame.assign(x=x))
     with pytest.raises(InvalidInputError, match="'vz' is missing"):
         write_tracks(tmp_path / "far.ast", frame.drop(columns="vz"))
-    for name, value, message in (
+    for name, wrong, message in (
         ("time", np.nan, "tracks: time"), ("time", "noon", "tracks: time"), ("track_id", np.nan, "tracks: track_id"),
         ("track_id", "first", "tracks: track_id"), ("track_id", 1.5, "whole numbers in the column 'track_id'"),
         ("vx", "fast", "tracks: expected numbers in the column 'vx'"),
     ):  # fmt: skip
         with pytest.raises(InvalidInputError, match=message):
-            write_tracks(tmp_path / "far.ast", frame.assign(**{name: value}))
+            write_tracks(tmp_path / "far.ast", frame.assign(**{name: wrong}))
     assert not (tmp_path / "far.ast").exists()
 
 
@@ -322,3 +322,76 @@ def test_the_program_takes_them(file, plots, tmp_path, capsys):
     capsys.readouterr()
     assert track.main([str(tmp_path / "cut.ast"), *words]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_plots_of_older_radars(tmp_path):
+    """Bytes by hand: times of day in cycles of 512 s, which service messages complete; the track has no time."""
+
+    def block(category, *records):
+        content = bytes.fromhex("".join(records))
+        return bytes([category]) + (len(content) + 3).to_bytes(2, "big") + content
+
+    def plot(time):
+        return f"fa0102200a0020000fff0578{time * 128 % 65536:04x}"
+
+    def north(time):
+        return f"d0010201{time * 128:06x}"
+
+    track = "f380010290" + "00010a0020000fff0578"
+    name = tmp_path / "old.ast"
+    name.write_bytes(
+        block(2, north(36_000))
+        + block(1, plot(36_001), track, plot(36_007))
+        + block(2, north(36_519))
+        + block(1, plot(36_520))
+    )
+    read = read_asterix(name)
+    assert list(read.plots) == [(1, 2)] and read.radars[1, 2].norths.tolist() == [36_000.0, 36_519.0]
+    old = read.plots[1, 2]
+    assert old.times.tolist() == [36_001.0, 36_007.0, 36_520.0] and set(old.identities) == {0o7777}
+    np.testing.assert_allclose(old.ranges, 20 * NAUTICAL_MILE)
+    np.testing.assert_allclose(old.azimuths, math.pi / 4)
+    np.testing.assert_allclose(old.altitudes, 350 * FLIGHT_LEVEL)
+    assert read.notes == {"records of category 001 without time or position": 1}
+    rows = read_records(name)
+    assert [row.get("time") for row in rows] == [36_000.0, 36_001.0, None, 36_007.0, 36_519.0, 36_520.0]
+    assert {key: rows[2][key] for key in ("range_nmi", "bearing_deg", "altitude_fl", "mode3_oct", "track")} == {
+        "range_nmi": 20.0, "bearing_deg": 45.0, "altitude_fl": 350.0, "mode3_oct": "7777", "track": 1,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("category", "code", "step", "unit"), [(10, "060", 2**31, 1.0), (20, "070", 2**25, 2.0)])
+def test_multilateration(category, code, step, unit, tmp_path):
+    kind = edition(category)
+    common = {"010": (("SAC", 3), ("SIC", 4)), "140": 128 * 50, code: (0, 0, 0, 0, ("MODE3A", 0o1234)), "220": 0x3C4591}
+    there = (("LAT", round(50.0 / 180 * step)), ("LON", round(5.0 / 180 * step)))
+    near = (("X", int(-300 * unit) & (0xFFFF if category == 10 else 0xFFFFFF)), ("Y", int(400 * unit)))
+    records = [common | {"041": there, "090": (0, 0, ("FL", 4 * 100))}, common | {"042": near}]
+    made = kind.create([kind.cv_record.create(one) for one in records]).unparse().to_bytes()
+    (tmp_path / "system.ast").write_bytes(made)
+    read = read_asterix(tmp_path / "system.ast", origin=(math.radians(50.0), math.radians(5.0), 0.0))
+    located, plot = read.multilateration[3, 4], read.plots[3, 4]
+    assert located.times.tolist() == plot.times.tolist() == [50.0]
+    assert located.ranges[0] == pytest.approx(100 * FLIGHT_LEVEL, abs=1.0)  # straight above the origin
+    assert plot.ranges[0] == pytest.approx(500.0) and plot.azimuths[0] == pytest.approx(math.atan2(400.0, -300.0))
+    assert located.identities.tolist() == plot.identities.tolist() == [0o1234]
+    assert located.addresses.tolist() == plot.addresses.tolist() == [0x3C4591]
+    first, second = read_records(tmp_path / "system.ast")
+    assert (first["latitude_deg"], first["longitude_deg"]) == pytest.approx((50.0, 5.0), abs=1e-5)
+    assert (second["x_m"], second["y_m"], second["address_hex"]) == (-300.0, 400.0, "3C4591")
+
+
+def test_tracks_with_accuracies_and_places(tmp_path):
+    row = dict.fromkeys(COLUMNS, 4.0) | {"sigma_x": 12.3, "sigma_y": 1e9, "sigma_z": 0.0, "confirmed": True}
+    row |= {"latitude": -33.25, "longitude": 179.9999999, "altitude": 1905.0}
+    frame = pd.DataFrame([row | {"status": "confirmed"}, row | {"time": 8.0, "sigma_z": 40.0, "status": "coasting"}])
+    write_tracks(tmp_path / "tracks.ast", frame)
+    back = read_tracks(tmp_path / "tracks.ast")
+    assert back["sigma_x"].tolist() == [12.5, 12.5] and back["sigma_y"].tolist() == [65535 / 2] * 2  # never too small
+    assert np.isnan(back["sigma_z"][0]) and 40.0 <= back["sigma_z"][1] < 42.0
+    np.testing.assert_allclose(back["altitude"], 1905.0)
+    np.testing.assert_allclose(back[["latitude", "longitude"]], [[-33.25, 179.9999999]] * 2, atol=6e-6)
+    content = (tmp_path / "tracks.ast").read_bytes()[3:]
+    records = edition(62).cv_uap.parse(library()[0].Bits.from_bytes(content))
+    flags = [[value(record, "080", name) for name in ("CNF", "TSB", "TSE", "CST")] for record in records]
+    assert flags == [[0, 1, 0, 0], [0, 0, 1, 1]]

@@ -12,7 +12,10 @@ from typing import Any, NamedTuple
 from assoc._files import reading
 from assoc._system.imports import check_extra, load_extra
 
-EDITIONS = {21: "Cat_021_2_7", 34: "Cat_034_1_29", 48: "Cat_048_1_32", 62: "Cat_062_1_21"}
+EDITIONS = {
+    1: "Cat_001_1_4", 2: "Cat_002_1_2", 10: "Cat_010_1_1", 20: "Cat_020_1_11", 21: "Cat_021_2_7", 34: "Cat_034_1_29",
+    48: "Cat_048_1_32", 62: "Cat_062_1_21",
+}  # fmt: skip
 """Editions by category; earlier ones of the same numbering decode alike."""
 
 _PCAP = {b"\xd4\xc3\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\x3c\x4d": ">"}
@@ -113,20 +116,41 @@ def edition(category: int) -> Any:
 
 def records(block: Block, notes: dict[str, int]) -> list[Any]:
     """Decoded records of a data block; if they cannot be decoded, none, and a count in `notes`."""
-    found = edition(block.category).cv_uap.parse(library()[0].Bits.from_bytes(block.content))
+    kind, base = edition(block.category).cv_uap, library()[0]
+    content = base.Bits.from_bytes(block.content)
+    found = _mixed(kind, content) if issubclass(kind, base.UapMultiple) else kind.parse(content)
     if isinstance(found, ValueError):
         _count(notes, f"data blocks of category {block.category:03d} that cannot be decoded", 1)
         return []
     return list(found)
 
 
+def _mixed(kind: Any, content: Any) -> list[Any] | ValueError:
+    """Records of category 001: item 020, in the same place in both, says which are plots and which tracks."""
+    (item, element), names = kind.cv_selector
+    found = []
+    while len(content):
+        for number, name in names.items():
+            parsed = kind.cv_uaps[name].parse(library()[0].ParsingMode.StrictParsing, content)
+            if not isinstance(parsed, ValueError) and value(parsed[0], item, element) == number:
+                break
+        else:
+            return ValueError("neither plot nor track")
+        found.append(parsed[0])
+        content = parsed[1]
+    return found
+
+
 def value(record: Any, item: str, *path: str) -> int | None:
     """Raw number of an item or of an element in it; None if absent."""
     found = record.get_item(item)
-    for name in path:
-        if found is None:
-            return None
-        found = found.variation.get_item(name)
+    try:
+        for name in path:
+            if found is None:
+                return None
+            found = found.variation.get_item(name)
+    except ValueError:  # the item has no such element in this category
+        return None
     return None if found is None else int(found.as_uint())
 
 

@@ -1,4 +1,4 @@
-"""Read plots (category 048), radar service messages (034) and ADS-B reports (021) as recordings."""
+"""Read plots (categories 001, 010, 020, 048), service messages (002, 034) and reports (010, 020, 021) as recordings."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,15 +25,53 @@ RANGE_STEP, ANGLE_STEP = NAUTICAL_MILE / 256.0, 2.0 * math.pi / 65536.0
 """Steps of measured positions in category 048."""
 LEVEL_STEP = 0.25 * FLIGHT_LEVEL
 _FINE, _COARSE = math.pi / 2**30, math.pi / 2**23
-_CATEGORIES = (21, 34, 48)
+_SERVICE = (2, 34)
+# truncated times of day begin anew every 512 s
+_CYCLE = 65536
 
 Source = tuple[int, int]
 """System area code and system identification code of a radar or ground station."""
 
 
+class _Plot(NamedTuple):
+    """Where a category has what a plot needs."""
+
+    time: str
+    polar: tuple[str, str, str]
+    step: float
+    code: str
+    level: tuple[str, str]
+    cartesian: tuple[float, int] = (0.0, 0)
+    """Step and bits of item 042, if that is an alternative."""
+
+
+class _Report(NamedTuple):
+    """Where a category has what a report of a position in WGS 84 needs: items with bits and steps, best first."""
+
+    times: tuple[str, ...]
+    places: tuple[tuple[str, int, float], ...]
+    code: str
+    level: tuple[str, ...]
+    level_bits: int
+    address: str
+
+
+_PLOTS = {
+    1: _Plot("141", ("040", "RHO", "THETA"), NAUTICAL_MILE / 128.0, "070", ("090", "HGT")),
+    10: _Plot("140", ("040", "RHO", "TH"), 1.0, "060", ("090", "FL"), (1.0, 16)),
+    20: _Plot("140", ("040", "RHO", "THETA"), 1.0, "070", ("090", "FL"), (0.5, 24)),
+    48: _Plot("140", ("040", "RHO", "THETA"), RANGE_STEP, "070", ("090", "FL")),
+}
+_REPORTS = {
+    10: _Report(("140",), (("041", 32, math.pi / 2**31),), "060", ("090", "FL"), 14, "220"),
+    20: _Report(("140",), (("041", 32, math.pi / 2**25),), "070", ("090", "FL"), 14, "220"),
+    21: _Report(("071", "073", "077"), (("131", 32, _FINE), ("130", 24, _COARSE)), "070", ("145",), 16, "080"),
+}
+
+
 @dataclass(frozen=True)
 class RadarNote:
-    """Service messages of a radar (category 034).
+    """Service messages of a radar (categories 002 and 034).
 
     Attributes
     ----------
@@ -59,10 +97,12 @@ class AsterixContent:
     plots : dict of (SAC, SIC) to Recording
         Plots of each radar; `Recording.addresses` are the aircraft's ICAO addresses.
     adsb : dict of (SAC, SIC) to Recording
-        Reports of each ground station, as seen from `origin`.
+        ADS-B reports of each ground station, as seen from `origin`.
+    multilateration : dict of (SAC, SIC) to Recording
+        Positions in WGS 84 of each multilateration system, as seen from `origin`.
     radars : dict of (SAC, SIC) to RadarNote
     origin : tuple of latitude, longitude, height, or None
-        Point from which ADS-B reports are given as range and azimuth.
+        Point from which reports are given as range and azimuth.
     notes : dict of str to int
         Counts of content that could not be read, by kind.
     """
@@ -72,6 +112,7 @@ class AsterixContent:
     radars: Mapping[Source, RadarNote]
     origin: tuple[float, float, float] | None = None
     notes: Mapping[str, int] = field(default_factory=dict)
+    multilateration: Mapping[Source, Recording] = field(default_factory=dict)
 
 
 class SourceRows:
@@ -107,13 +148,15 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
     ----------
     path : path-like
     origin : tuple of latitude, longitude, height, optional
-        Point from which ADS-B reports are given, radians and metres; default: on the ground below the first report.
+        Point from which reports are given, radians and metres; default: on the ground below the first report.
 
     Returns
     -------
     AsterixContent
         Times are seconds of the day and continue after midnight. Identities are Mode 3/A codes (12 bits as a number,
-        0 not decoded). What cannot be decoded in a truncated or damaged file is counted in the notes.
+        0 not decoded). Truncated times (001) take their multiple of 512 s from the radar's service messages (002);
+        without these they begin at the first plot's. What cannot be decoded in a truncated or damaged file is counted
+        in the notes.
 
     Raises
     ------
@@ -127,10 +170,11 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
     notes: dict[str, int] = {}
     plots: dict[Source, SourceRows] = {}
     reports: dict[Source, SourceRows] = {}
+    located: dict[Source, SourceRows] = {}
     radars: dict[Source, dict[str, Any]] = {}
     clocks: dict[Source, SourceRows] = {}
     for block in data_blocks(content, notes):
-        if block.category not in _CATEGORIES:
+        if block.category not in _PLOTS and block.category not in _REPORTS and block.category not in _SERVICE:
             what = f"data blocks of category {block.category:03d}"
             notes[what] = notes.get(what, 0) + 1
             continue
@@ -140,26 +184,22 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
                 notes["records without a source"] = notes.get("records without a source", 0) + 1
                 continue
             source = (sac, sic)
-            if block.category == 34:
+            if block.category in _SERVICE:
                 radar, clock = radars.setdefault(source, {"norths": []}), clocks.setdefault(source, SourceRows())
                 _take_service(record, radar, clock)
                 continue
-            row, kept = (_plot, plots) if block.category == 48 else (_report, reports)
-            rows = kept.setdefault(source, SourceRows())
-            found = row(record, rows)
-            if found is None:
+            if not _taken(record, block.category, source, clocks, plots, reports if block.category == 21 else located):
                 what = f"records of category {block.category:03d} without time or position"
                 notes[what] = notes.get(what, 0) + 1
-            else:
-                rows.rows.append(found)
-    if not any(rows.rows for rows in (*plots.values(), *reports.values())):
+    if not any(rows.rows for rows in (*plots.values(), *reports.values(), *located.values())):
         skipped = "; ".join(f"{count} {what}" for what, count in notes.items())
         raise InvalidInputError(
-            f"{os.fspath(path)}: holds no ASTERIX plots (048) or reports (021){': ' + skipped if skipped else ''}"
+            f"{os.fspath(path)}: holds no ASTERIX plots (001, 010, 020, 048) or reports (010, 020, 021)"
+            f"{': ' + skipped if skipped else ''}"
         )
     name = os.path.basename(os.fspath(path))
     if seen_from is None:
-        first = next((rows.rows[0] for rows in reports.values() if rows.rows), None)
+        first = next((rows.rows[0] for rows in (*reports.values(), *located.values()) if rows.rows), None)
         seen_from = None if first is None else (first[1], first[2], 0.0)
     return AsterixContent(
         {source: _recording(rows, name, notes) for source, rows in plots.items() if rows.rows},
@@ -167,21 +207,61 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
         {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in radars.items()},
         seen_from,
         notes,
+        {source: _seen(rows, seen_from, name, notes) for source, rows in located.items() if rows.rows and seen_from},
     )
 
 
-def _plot(record: Any, rows: SourceRows) -> tuple[float, ...] | None:
-    """Time, range, azimuth, identity, altitude, whether that is garbled, address."""
-    time, rho, theta = value(record, "140"), value(record, "040", "RHO"), value(record, "040", "THETA")
-    if time is None or rho is None or theta is None:
+def _taken(
+    record: Any,
+    category: int,
+    source: Source,
+    clocks: dict[Source, SourceRows],
+    plots: dict[Source, SourceRows],
+    reports: dict[Source, SourceRows],
+) -> bool:
+    """Whether a record is a report or a plot; it is added to those of its source."""
+    report = _report(record, _REPORTS[category]) if category in _REPORTS else None
+    plot = _plot(record, _PLOTS[category]) if report is None and category in _PLOTS else None
+    found = plot or report
+    if found is None:
+        return False
+    kept = reports if plot is None else plots
+    rows = kept.setdefault(source, SourceRows())
+    raw, *rest = found
+    if category == 1:
+        raw = full_time(int(raw), rows, clocks.get(source))
+    rows.rows.append((rows.time(int(raw)), *rest))
+    return True
+
+
+def full_time(raw: int, *clocks: SourceRows | None) -> int:
+    """The raw time of day of a truncated one: that nearest to the latest time on the source's clocks."""
+    known = [clock.latest for clock in clocks if clock is not None and clock.rows]
+    if not known:
+        return raw
+    steps = round(max(known) % DAY / SECOND)
+    return (steps + (raw - steps + _CYCLE // 2) % _CYCLE - _CYCLE // 2) % round(DAY / SECOND)
+
+
+def _plot(record: Any, items: _Plot) -> tuple[float, ...] | None:
+    """Raw time, range, azimuth, identity, altitude, whether that is garbled, address."""
+    item, first, second = items.polar
+    time, rho, theta = value(record, items.time), value(record, item, first), value(record, item, second)
+    if time is None:
         return None
-    level = value(record, "090", "FL")
-    doubtful = bool(value(record, "090", "V") or value(record, "090", "G"))
+    if rho is not None and theta is not None:
+        where = (rho * items.step, math.pi / 2 - theta * ANGLE_STEP)
+    else:
+        x, y = value(record, "042", "X"), value(record, "042", "Y")
+        step, bits = items.cartesian
+        if x is None or y is None or not bits:
+            return None
+        east, north = signed(x, bits) * step, signed(y, bits) * step
+        where = (math.hypot(east, north), math.atan2(north, east))
+    level = value(record, *items.level)
+    doubtful = bool(value(record, items.level[0], "V") or value(record, items.level[0], "G"))
     altitude = math.nan if level is None else signed(level, 14) * LEVEL_STEP
-    return (
-        rows.time(time), rho * RANGE_STEP, math.pi / 2 - theta * ANGLE_STEP, _identity(record, "070"), altitude,
-        float(doubtful), float(value(record, "220") or 0),
-    )  # fmt: skip
+    return (time, *where, _identity(record, items.code), altitude, float(doubtful), float(value(record, "220") or 0))
 
 
 def _identity(record: Any, item: str) -> float:
@@ -193,26 +273,26 @@ def _identity(record: Any, item: str) -> float:
     return float(code & 0o7777)
 
 
-def _report(record: Any, rows: SourceRows) -> tuple[float, ...] | None:
-    """Time, latitude, longitude, identity, altitude, address of an ADS-B report."""
-    time = next((t for t in (value(record, item) for item in ("071", "073", "077")) if t is not None), None)
-    for item, bits, step in (("131", 32, _FINE), ("130", 24, _COARSE)):
+def _report(record: Any, items: _Report) -> tuple[float, ...] | None:
+    """Raw time, latitude, longitude, identity, altitude, address of a report."""
+    time = next((t for t in (value(record, item) for item in items.times) if t is not None), None)
+    for item, bits, step in items.places:
         lat, lon = value(record, item, "LAT"), value(record, item, "LON")
         if time is not None and lat is not None and lon is not None:
-            level = value(record, "145")
-            altitude = math.nan if level is None else signed(level, 16) * LEVEL_STEP
+            level = value(record, *items.level)
+            altitude = math.nan if level is None else signed(level, items.level_bits) * LEVEL_STEP
             place = (signed(lat, bits) * step, signed(lon, bits) * step)
-            code = value(record, "070")
-            return (rows.time(time), *place, float(code or 0), altitude, float(value(record, "080") or 0))
+            return (time, *place, _identity(record, items.code), altitude, float(value(record, items.address) or 0))
     return None
 
 
 def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None:
     kind, time, turn = value(record, "000"), value(record, "030"), value(record, "041")
-    if kind == 1 and time is not None:
+    if time is not None:
         now = clock.time(time)
         clock.rows.append((now,))
-        radar["norths"].append(now)
+        if kind == 1:
+            radar["norths"].append(now)
     if turn:
         radar["rotation"] = turn * SECOND
     height, lat, lon = (value(record, "120", name) for name in ("HGT", "LAT", "LON"))

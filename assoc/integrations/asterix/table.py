@@ -9,36 +9,51 @@ from typing import Any
 from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import EDITIONS, data_blocks, read_bytes, records, signed, value
-from assoc.integrations.asterix.reading import SourceRows
+from assoc.integrations.asterix.reading import SourceRows, full_time
 
-_TIMES = {21: ("073", "071", "077"), 34: ("030",), 48: ("140",), 62: ("070",)}
+_TIMES = {1: ("141",), 2: ("030",), 10: ("140",), 20: ("140",), 21: ("073", "071", "077"), 34: ("030",)}
+_TIMES |= {48: ("140",), 62: ("070",)}
 # column, step, bits of a signed number or 0, and where it stands by category; of a column's lines the first counts
 _NUMBERS: tuple[tuple[str, float, int, dict[int, tuple[str, ...]]], ...] = (
     ("range_nmi", 1 / 256, 0, {48: ("040", "RHO")}),
-    ("bearing_deg", 360 / 2**16, 0, {48: ("040", "THETA")}),
+    ("range_nmi", 1 / 128, 0, {1: ("040", "RHO")}),
+    ("range_nmi", 1 / 1852, 0, {10: ("040", "RHO")}),
+    ("bearing_deg", 360 / 2**16, 0, {1: ("040", "THETA"), 10: ("040", "TH"), 48: ("040", "THETA")}),
     ("latitude_deg", 180 / 2**30, 32, {21: ("131", "LAT")}),
     ("latitude_deg", 180 / 2**23, 24, {21: ("130", "LAT")}),
-    ("latitude_deg", 180 / 2**25, 32, {62: ("105", "LAT")}),
+    ("latitude_deg", 180 / 2**25, 32, {20: ("041", "LAT"), 62: ("105", "LAT")}),
+    ("latitude_deg", 180 / 2**31, 32, {10: ("041", "LAT")}),
+    ("longitude_deg", 180 / 2**31, 32, {10: ("041", "LON")}),
     ("longitude_deg", 180 / 2**30, 32, {21: ("131", "LON")}),
     ("longitude_deg", 180 / 2**23, 24, {21: ("130", "LON")}),
-    ("longitude_deg", 180 / 2**25, 32, {62: ("105", "LON")}),
-    ("x_m", 0.5, 24, {62: ("100", "X")}),
-    ("y_m", 0.5, 24, {62: ("100", "Y")}),
+    ("longitude_deg", 180 / 2**25, 32, {20: ("041", "LON"), 62: ("105", "LON")}),
+    ("x_m", 0.5, 24, {20: ("042", "X"), 62: ("100", "X")}),
+    ("y_m", 0.5, 24, {20: ("042", "Y"), 62: ("100", "Y")}),
+    ("x_m", 1, 16, {10: ("042", "X")}),
+    ("y_m", 1, 16, {10: ("042", "Y")}),
     ("vx_m_s", 0.25, 16, {62: ("185", "VX")}),
     ("vy_m_s", 0.25, 16, {62: ("185", "VY")}),
-    ("altitude_fl", 0.25, 14, {48: ("090", "FL")}),
+    ("altitude_fl", 0.25, 14, {1: ("090", "HGT"), 10: ("090", "FL"), 20: ("090", "FL"), 48: ("090", "FL")}),
     ("altitude_fl", 0.25, 16, {21: ("145",), 62: ("136",)}),
-    ("track", 1, 0, {21: ("161", "TRNUM"), 48: ("161", "TRN"), 62: ("040",)}),
+    (
+        "track",
+        1,
+        0,
+        {1: ("161",), 10: ("161", "TRK"), 20: ("161", "TRN"), 21: ("161", "TRNUM"), 48: ("161", "TRN"), 62: ("040",)},
+    ),
 )
-_CODES = {21: ("070", "MODE3A"), 48: ("070", "MODE3A"), 62: ("060", "MODE3A")}
-_ADDRESSES, _CALLSIGNS = {21: "080", 48: "220"}, {21: "170", 48: "240"}
+_CODES = {category: ("060" if category in (10, 62) else "070", "MODE3A") for category in (1, 10, 20, 21, 48, 62)}
+_ADDRESSES = {10: "220", 20: "220", 21: "080", 48: "220"}
+_CALLSIGNS = {10: ("245", "CHR"), 20: ("245", "CHR"), 21: ("170",), 48: ("240",)}
+NAMES = ", ".join(f"{category:03d}" for category in EDITIONS)
+"""Categories that are read."""
 COLUMNS = ("category", "sac", "sic", "time", *dict.fromkeys(name for name, *_ in _NUMBERS))
 COLUMNS += ("mode3_oct", "address_hex", "callsign")
 
 
 @door
 def read_records(path: str | os.PathLike[str], notes: dict[str, int] | None = None) -> list[dict[str, Any]]:
-    """Read the records of categories 021, 034, 048 and 062, of all sources, in the order of the file.
+    """Read the records of the categories in `EDITIONS`, of all sources, in the order of the file.
 
     Parameters
     ----------
@@ -62,7 +77,7 @@ def read_records(path: str | os.PathLike[str], notes: dict[str, int] | None = No
     """
     rows = list(_rows(read_bytes(path), {} if notes is None else notes))
     if not rows:
-        raise InvalidInputError(f"{os.fspath(path)}: holds no ASTERIX records of categories 021, 034, 048 or 062")
+        raise InvalidInputError(f"{os.fspath(path)}: holds no ASTERIX records of categories {NAMES}")
     return rows
 
 
@@ -80,6 +95,8 @@ def _rows(content: bytes, notes: dict[str, int]) -> Iterator[dict[str, Any]]:
             time = next((t for t in (value(record, item) for item in _TIMES[category]) if t is not None), None)
             if time is not None:
                 clock = clocks.setdefault((category, row["sac"], row["sic"]), SourceRows())
+                if category == 1:
+                    time = full_time(time, clock, clocks.get((2, row["sac"], row["sic"])))
                 row["time"] = clock.time(time)
                 clock.rows = [(row["time"],)]  # what counts is whether there were any
             for name, step, bits, items in _NUMBERS:
@@ -88,7 +105,7 @@ def _rows(content: bytes, notes: dict[str, int]) -> Iterator[dict[str, Any]]:
                     row.setdefault(name, (signed(raw, bits) if bits else raw) * step)
             code = value(record, *_CODES[category]) if category in _CODES else None
             address = value(record, _ADDRESSES[category]) if category in _ADDRESSES else None
-            letters = value(record, _CALLSIGNS[category]) if category in _CALLSIGNS else None
+            letters = value(record, *_CALLSIGNS[category]) if category in _CALLSIGNS else None
             row |= {} if code is None else {"mode3_oct": f"{code:04o}"}
             row |= {} if address is None else {"address_hex": f"{address:06X}"}
             row |= {} if letters is None else {"callsign": _letters(letters)}
