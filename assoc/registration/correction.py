@@ -24,11 +24,13 @@ def sensor_biases(terms: Sequence[Term], biases: Array, sensor: int) -> dict[str
 
 
 def corrected_sensor(sensor: Sensor, biases: Mapping[str, float]) -> Sensor:
-    """The sensor at its true position; a `PositionSensor` stays unchanged."""
-    if isinstance(sensor, PositionSensor):
+    """The sensor, or its platform, at its true position; a `PositionSensor` that stands stays unchanged."""
+    offset, platform = np.array([biases.get(axis, 0.0) for axis in AXES]), sensor.platform
+    if not offset.any() or (platform is None and isinstance(sensor, PositionSensor)):
         return sensor
-    offset = np.array([biases.get(axis, 0.0) for axis in AXES])
-    return replace(sensor, position=sensor.position - offset) if offset.any() else sensor
+    if platform is not None:
+        return replace(sensor, platform=replace(platform, positions=platform.positions - offset))
+    return replace(sensor, position=sensor.position - offset)
 
 
 def corrected_measurements(
@@ -59,9 +61,10 @@ def corrected_measurements(
     array (n, d)
     """
     z = np.array(measured, dtype=np.float64)
-    named = AXES if isinstance(sensor, PositionSensor) else sensor.components
-    for i, component in enumerate(named[: sensor.dim]):
-        z[:, i] -= biases.get(component, 0.0)
+    carried = isinstance(sensor, PositionSensor) and sensor.platform is not None
+    for i, component in enumerate(sensor.components[: sensor.dim]):
+        # the offset of a position that is measured from a platform is the platform's
+        z[:, i] -= 0.0 if carried else biases.get(component, 0.0)
         if sensor.angular[i]:
             z[:, i] = wrap_angle(z[:, i])
     shift = np.broadcast_to(np.asarray(late, dtype=np.float64) + biases.get("time", 0.0), (len(z),))

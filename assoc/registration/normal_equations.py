@@ -34,6 +34,8 @@ class Tuples(NamedTuple):
     """Position of the target, near enough to linearise, (T, 3), metres."""
     velocity: Array
     """Its velocity, (T, 3), m/s; NaN where unknown: the tuple then has no information on clocks."""
+    places: Array
+    """Where the sensors stood, (T, S, 3), metres."""
 
 
 class NormalEquations(NamedTuple):
@@ -68,12 +70,13 @@ def _bias_column(kind: int, index: int, H: Array, v: Array, d: int, column: Arra
 
 @inner_njit
 def _linearise_tuple(
-    sensors: SensorArrays, z: Array, seen: Array, at: Array, H: Array, nu: Array, a: Array, u: Array
+    sensors: SensorArrays, tuples: Tuples, t: int, H: Array, nu: Array, a: Array, u: Array
 ) -> tuple[float, int]:
-    """Linearise the measurements of one tuple: H (S, 3, 3), residuals nu (S, 3), a = H' W H, u = H' W nu.
+    """Linearise the measurements of tuple t: H (S, 3, 3), residuals nu (S, 3), a = H' W H, u = H' W nu.
 
     Returns nu' W nu and the degrees of freedom.
     """
+    z, seen, at = tuples.z[t], tuples.seen[t], tuples.at[t]
     a[:], u[:] = 0.0, 0.0
     h = np.empty(3)
     squares, measured, tall = 0.0, 0, 0
@@ -81,7 +84,7 @@ def _linearise_tuple(
         if not seen[s]:
             continue
         code, d, W = sensors.code[s], sensors.dim[s], sensors.weight[s]
-        linearise(code, d, sensors.position[s], at[0], at[1], at[2], h, H[s])
+        linearise(code, d, tuples.places[t, s], at[0], at[1], at[2], h, H[s])
         for i in range(d):
             nu[s, i] = z[s, i] - h[i]
         wrap(code, nu[s])
@@ -140,7 +143,7 @@ def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, l
     a, u = np.zeros((3, 3)), np.zeros(3)
     for t in range(total):
         seen = tuples.seen[t]
-        squares, freedom[t] = _linearise_tuple(sensors, tuples.z[t], seen, tuples.at[t], H, nu, a, u)
+        squares, freedom[t] = _linearise_tuple(sensors, tuples, t, H, nu, a, u)
         # directions that no measurement determines must not make the matrix singular, nor add information
         least = 1e-12 * (a[0, 0] + a[1, 1] + a[2, 2])
         A = (a[0, 0] + least, a[0, 1], a[0, 2], a[1, 1] + least, a[1, 2], a[2, 2] + least)

@@ -59,6 +59,8 @@ class OnlineRegistration:
                 raise InvalidInputError(f"components: {component!r} is not estimated online, register a recording")
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         scene = Scene(sensors, np.zeros(1), empty, region)  # type: ignore[arg-type]
+        if any(sensor.platform is not None for sensor in scene.sensors):
+            raise InvalidInputError("registration: sensors on platforms are registered from scenes, not online")
         self._problem = make_problem(scene, self.parameters)
         n = len(self._problem.terms)
         nothing = Chosen(np.zeros(0, dtype=np.int64), np.zeros((0, len(scene.sensors)), dtype=np.int64))

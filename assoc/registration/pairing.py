@@ -123,7 +123,7 @@ def widened(scene: Scene, terms: Sequence[Term], deviations: Array) -> Scene:
 
 
 def _usual_distance(scene: Scene, s: int) -> float:
-    sensor = scene.sensors[s]
+    sensor = scene.sensors[s].at(float(scene.times[0]))
     if "range" in sensor.components:
         ranges = np.concatenate([scan[s][:, 0] for scan in scene.measurements])
         return max(float(np.median(ranges)) if len(ranges) else 1.0, 1.0)
@@ -166,13 +166,16 @@ def tuple_arrays(scene: Scene, epochs: Sequence[Epoch], chosen: Chosen, clocks: 
     total, count = chosen.rows.shape
     z, seen = np.zeros((total, count, 3)), chosen.rows >= 0
     at, velocity = np.zeros((total, 3)), np.full((total, 3), np.nan)
+    places = np.zeros((total, count, 3))
     edges = np.searchsorted(chosen.epoch, np.arange(scene.num_scans + 1))
     for k, epoch in enumerate(epochs):
         part = slice(int(edges[k]), int(edges[k + 1]))
         rows = chosen.rows[part]
         if not len(rows):
             continue
-        at[part] = positions_and_covariances(scene, k, rows + 1)[0]
+        there, scan = scene.at(epoch.time), scene.scan(k).aligned(scene.sensors)
+        places[part] = [sensor.position for sensor in there.sensors]
+        at[part] = positions_and_covariances(there, scan, rows + 1)[0]
         if epoch.velocities is not None:
             velocity[part] = _mean_velocities(epoch.velocities, rows)
         for s in range(count):
@@ -180,7 +183,7 @@ def tuple_arrays(scene: Scene, epochs: Sequence[Epoch], chosen: Chosen, clocks: 
             if not len(mine):
                 continue
             numbers = rows[mine, s]
-            measured = scene.measurements[k][s][numbers]
+            measured = scan.measurements[s][numbers]
             if epoch.velocities is not None:
                 # measurements without a velocity are moved to the epoch's time with that of their tuple
                 late = np.where(
@@ -188,9 +191,9 @@ def tuple_arrays(scene: Scene, epochs: Sequence[Epoch], chosen: Chosen, clocks: 
                 )
                 speed, where = velocity[part.start + mine], at[part.start + mine]
                 seen[part.start + mine, s] = (late == 0.0) | ~np.isnan(speed[:, 0])
-                measured = corrected_measurements(scene.sensors[s], measured, {}, speed, late, where)
+                measured = corrected_measurements(there.sensors[s], measured, {}, speed, late, where)
             z[part.start + mine, s, : measured.shape[1]] = measured
-    return Tuples(z, seen, at, velocity)
+    return Tuples(z, seen, at, velocity, places)
 
 
 def _mean_velocities(velocities: Sequence[Array], rows: Array) -> Array:

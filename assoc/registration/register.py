@@ -62,8 +62,11 @@ def register(scene: Scene, parameters: RegistrationParameters | None = None, **v
 
 def make_problem(scene: Scene, parameters: RegistrationParameters) -> Problem:
     """The biases of a scene's sensors, and their prior."""
-    if any(sensor.platform is not None for sensor in scene.sensors):
-        raise InvalidInputError("registration: sensors on platforms cannot be registered")
+    carried = any(sensor.platform is not None for sensor in scene.sensors)
+    if carried and not (scene.measurement_times is None and scene.sectors is None):
+        raise InvalidInputError(
+            "registration: of sensors on platforms scans of one instant are expected, without times and sectors"
+        )
     terms = make_terms(scene.sensors, parameters)
     spreads = np.array([parameters.spread(term.component) for term in terms])
     return Problem(tuple(scene.sensors), terms, spreads, scene.region, parameters)

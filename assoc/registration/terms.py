@@ -66,6 +66,11 @@ def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) ->
     for s, sensor in enumerate(sensors):
         if type(sensor) not in CODES:
             raise InvalidInputError(f"sensor {s}: biases of a {type(sensor).__name__} cannot be registered")
+        if isinstance(sensor, PositionSensor) and sensor.platform is not None and sensor.platform.headings is not None:
+            raise InvalidInputError(
+                f"sensor {s}: positions relative to a platform with headings cannot be registered, those in the axes "
+                "of the scene can"
+            )
         if not known[s] & {*parameters.reference}:
             terms += [Term(s, component) for component in _components(sensor, parameters.components)]
     if not terms:
@@ -80,8 +85,8 @@ def _components(sensor: Sensor, wanted: Sequence[str]) -> list[str]:
         found = [name for name in sensor.components[:3] if name in wanted]
         if "position" in wanted:
             found += AXES if isinstance(sensor, Radar3D) else AXES[:2]
-    # bearings have no information on motion
-    if "time" in wanted and not isinstance(sensor, BearingSensor):
+    # bearings have no information on motion; a platform's own motion would have to be known by the same clock
+    if "time" in wanted and not isinstance(sensor, BearingSensor) and sensor.platform is None:
         found.append("time")
     return found
 

@@ -36,10 +36,10 @@ def target_velocities(sensor: Sensor, times: Sequence[Array], measurements: Sequ
     Returns
     -------
     list over epochs of arrays (n, 3)
-        m/s, NaN where unknown; the vertical speed is 0 for sensors that leave the height open.
+        m/s, NaN where unknown, as from a platform; the vertical speed is 0 for sensors that leave the height open.
     """
     unknown = [np.full((len(z), 3), np.nan) for z in measurements]
-    if isinstance(sensor, BearingSensor) or len(measurements) < 2:
+    if isinstance(sensor, BearingSensor) or sensor.platform is not None or len(measurements) < 2:
         return unknown
     located = sensor.position_part
     positions = [pointed_at(located, np.asarray(z)[:, : located.dim]) for z in measurements]

@@ -89,8 +89,6 @@ class TrackerSettings:
         online = self.registration
         if not (online is None or isinstance(online, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {online!r}")
-        if online is not None and any(sensor.platform is not None for sensor in self.sensors):
-            raise InvalidInputError("registration: sensors on platforms cannot be registered; leave it out")
         if online is not None and online.sensors != self.sensors:
             raise InvalidInputError("registration: its sensors are not those of the tracker")
         if not (self.identity is None or isinstance(self.identity, IdentityParameters)):

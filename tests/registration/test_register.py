@@ -1,6 +1,7 @@
 """Registration against biases that were put in, against scipy's least squares, and where nothing can be known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from assoc.registration import RegistrationParameters, Term, register, with_bias
 from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
 from assoc.registration.observability import describe
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D
+from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import radar_over
@@ -374,3 +375,36 @@ def test_biases_that_are_none_are_refused():
     ):
         with pytest.raises(InvalidInputError, match=match):
             with_biases(scene, biases)
+
+
+def test_heading_and_position_of_platforms():
+    """A ship whose compass and position are off by the same all the time, beside a radar on land."""
+    seconds = np.arange(60.0)
+    heading = 0.5 + 0.02 * seconds
+    way = np.cumsum(12.0 * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1), axis=0)
+    ship = Platform(seconds, way + [20e3, -10e3, 0], heading)
+    view = [[0, 2e5], [-np.pi, np.pi], [-0.2, 1.5]]
+    on_board = Radar3D(position=[8, 0, 25], noise=[50, 1e-3, 1e-3], field_of_view=view, name="ship", platform=ship)
+    aside = PositionSensor(
+        position=[-8, 0, 9], noise=[60, 60, 60], field_of_view=[[-9e4, 9e4], [-9e4, 9e4], [0, 12e3]], name="lidar",
+        platform=Platform(seconds, ship.positions),
+    )  # fmt: skip
+    scene = scene_of([radars(1)[0], on_board, aside])
+    offset, turn = np.array([150.0, -100.0, 40.0]), np.radians(0.3)
+    stated = Platform(seconds, ship.positions + offset, heading + turn)
+    north = replace(stated, headings=None)
+    told = replace(
+        scene, sensors=[scene.sensors[0], replace(on_board, platform=stated), replace(aside, platform=north)]
+    )
+    found = register(told, components=("azimuth", "position"), reference=("radar 1",))
+    assert found.of(1).keys() == {"azimuth", "x", "y", "z"} and found.of(2).keys() == {*"xyz"}
+    truth = np.array([{"azimuth": turn, **dict(zip("xyz", offset, strict=True))}[one.component] for one in found.terms])
+    off = found.biases - truth
+    assert found.observed.all() and (np.abs(off) < 4.5 * found.deviations).all() and 0.9 < found.noise < 1.1
+    assert found.deviations.max() < 25.0 and np.degrees(found.deviations.min()) < 0.02
+    for sensor, true in zip(found.correct(told).sensors, scene.sensors, strict=True):
+        assert np.abs(sensor.at(30.0).position - true.at(30.0).position).max() < 60.0
+    with pytest.raises(InvalidInputError, match="on platforms scans of one instant"):
+        register(replace(told, sectors=np.tile([-np.pi, np.pi], (15, 3, 1))))
+    with pytest.raises(InvalidInputError, match="platform with headings cannot be registered"):
+        register(replace(told, sensors=[*told.sensors[:2], replace(aside, platform=ship)]))
