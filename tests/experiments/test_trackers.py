@@ -93,19 +93,39 @@ def test_close_targets_and_the_oracle():
 @pytest.mark.parametrize("row", as_they_are.ROWS)
 def test_rows_of_sensors_as_they_are(row):
     """Each row has its targets, with the source of each measurement."""
-    case = as_they_are.ROWS[row](3)
+    case = as_they_are.ROWS[row].make(3)
     for scene in (case.declared, case.known or case.declared):
         assert scene.num_scans >= 10 and len(np.unique(np.concatenate(scene.truth.target_ids))) >= 2
         assert sum(int((one >= 0).sum()) for scan in scene.truth.sources for one in scan) > 100
 
 
 def test_the_table_of_sensors_as_they_are(capsys):
-    arguments = ["--seeds", "1", "--rows", "splitting,ships, radar and AIS", "--trackers", "oracle"]
+    arguments = ["--seeds", "1", "--only", "splitting", "ships, radar and AIS", "--trackers", "oracle"]
     assert as_they_are.program(arguments) == 0
-    shown = [line for line in capsys.readouterr().out.splitlines() if "+-" in line]
+    shown = [line for line in capsys.readouterr().out.splitlines() if "oracle  " in line]
     assert [line.split("oracle")[0] for line in shown] == ["splitting, ", "ships, radar and AIS, "]
     with pytest.raises(SystemExit):
-        as_they_are.program(["--rows", "nothing"])
+        as_they_are.program(["--only", "nothing"])
+
+
+@pytest.mark.parametrize(
+    ("label", "part"),
+    [
+        ("ships, radar and AIS", "views"),
+        ("three 2-D radars", "heights"),
+        ("noise twice the declared", "estimates"),
+        ("wind farm", "map"),
+        ("dark band of 4 km", "life"),
+    ],
+)
+def test_what_is_left_out_is_missed(label, part):
+    """Without a part, trackers are worse on a scene that needs it."""
+    row = as_they_are.ROWS[label]
+    assert part in row.without
+    case = row.make(7)
+    with_it = as_they_are.judge(as_they_are.ADAPTING, case, case.declared)
+    without = as_they_are.judge(f"multi-sensor, without {part}", case, case.declared)
+    assert without.gospa > 1.04 * with_it.gospa
 
 
 def test_goals_hold_by_their_intervals():

@@ -1,0 +1,434 @@
+"""Scenes with something not as trackers are told, or as real sensors are; what a tracker is judged on, row by row.
+
+Twelve targets, 40 scans of 4 s, three 3-D radars, default settings unless a row says otherwise.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
+from assoc.registration import register
+from assoc.scene import Scene, Truth
+from assoc.sensors import Platform, PositionSensor, Radar2D, Radar3D, Sensor
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import on_circle, radar_over
+from assoc.tracking import Initiation
+from assoc.tracking.filter_choice import make_filter, manoeuvre_noise, two_speeds
+from experiments.trackers.close_scenes import REGION, SETTINGS, Setting, radars, simulate
+
+TARGETS, SCANS, INTERVAL = 12, 40, 4.0
+SEPARATE = SETTINGS["separate"]
+
+
+class Case(NamedTuple):
+    """One seed of a row.
+
+    declared: Its measurements and the sensors that trackers are told of.
+    known: The same with sensors as they are; left out where there is nothing to be known.
+    options: Of every tracker and the oracle.
+    level: Whether tracks are judged by their horizontal places alone.
+    """
+
+    declared: Scene
+    known: Scene | None = None
+    options: Mapping[str, Any] = {}
+    level: bool = False
+
+
+Make = Callable[[int], Case]
+
+
+def short_radars(seed: int, detection_probability: float = 0.9) -> Case:
+    """Six radars that reach 17 km each; all know it."""
+    sensors = [_short(one, 17e3, detection_probability) for one in on_circle(np.zeros(3), 16e3, 6)]
+    return Case(simulate(SEPARATE, seed, sensors=sensors))
+
+
+def _short(place: Array, reach: float, detection_probability: float) -> Sensor:
+    full = radar_over(
+        REGION, place, range_noise=50.0, angle_noise=1e-3, detection_probability=detection_probability,
+        false_alarm_rate=10.0, name=f"radar at {place[0] / 1e3:.0f}, {place[1] / 1e3:.0f} km",
+    )  # fmt: skip
+    return replace(full, field_of_view=np.concatenate([[[0.0, reach]], full.field_of_view[1:]]))
+
+
+def dark_band(seed: int) -> Case:
+    """Nothing is detected within 2 km of the plane x = 0, and nobody knows."""
+    scene = simulate(SEPARATE, seed)
+    assert scene.truth is not None
+    hidden = [
+        ids[np.abs(at[:, 0]) < 2e3] for ids, at in zip(scene.truth.target_ids, scene.truth.positions, strict=True)
+    ]
+    return Case(_without(scene, hidden))
+
+
+def _without(scene: Scene, hidden: Sequence[Array]) -> Scene:
+    """The scene without measurements of these targets, scan by scan."""
+    assert scene.truth is not None and scene.truth.sources is not None
+    kept = [[~np.isin(one, gone) for one in scan] for scan, gone in zip(scene.truth.sources, hidden, strict=True)]
+
+    def left(arrays: Any) -> list[list[Array]]:
+        return [[a[k] for a, k in zip(scan, keep, strict=True)] for scan, keep in zip(arrays, kept, strict=True)]
+
+    truth = Truth(scene.truth.target_ids, scene.truth.positions, left(scene.truth.sources))
+    return Scene(scene.sensors, scene.times, left(scene.measurements), scene.region, truth)
+
+
+def splitting(seed: int) -> Case:
+    """Six targets; a second one leaves each at half time, at 5 to 15 m/s."""
+    rng = np.random.default_rng(seed)
+    half, count, times = SCANS // 2, TARGETS // 2, INTERVAL * np.arange(SCANS)
+    heading, speed = rng.uniform(-np.pi, np.pi, count), rng.uniform(150.0, 230.0, count)
+    ahead = np.stack([np.cos(heading), np.sin(heading), np.zeros(count)], axis=1)
+    aside = np.stack([-np.sin(heading), np.cos(heading), np.zeros(count)], axis=1)
+    middle = rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (count, 3))
+    after = (times - times[half])[:, None, None]
+    parents = middle + after * speed[:, None] * ahead
+    parted = parents + np.maximum(after, 0.0) * rng.uniform(5.0, 15.0, (count, 1)) * aside
+    ids = [np.arange(count if k <= half else TARGETS) for k in range(SCANS)]
+    paths = [np.concatenate([parents[k], parted[k]])[: len(ids[k])] for k in range(SCANS)]
+    return Case(observe(radars(SEPARATE), times, ids, paths, rng, region=REGION))
+
+
+def wind_farm(seed: int) -> Case:
+    """Each radar has ten returns a scan from a patch of 3 x 3 km, 200 m high."""
+    rng, scene = np.random.default_rng([seed, 1]), simulate(SEPARATE, seed)
+    assert scene.truth is not None and scene.truth.sources is not None
+    low = np.append(rng.uniform(-15e3, 12e3, 2), 0.0)
+    measurements, sources = [], []
+    for scan, source in zip(scene.measurements, scene.truth.sources, strict=True):
+        more = [
+            sensor.measure(rng.uniform(low, low + [3e3, 3e3, 200.0], (10, 3)))
+            + rng.standard_normal((10, sensor.dim)) @ np.linalg.cholesky(sensor.covariance).T
+            for sensor in scene.sensors
+        ]
+        measurements.append([np.concatenate(both) for both in zip(scan, more, strict=True)])
+        sources.append([np.append(one, np.full(10, -1)) for one in source])
+    truth = Truth(scene.truth.target_ids, scene.truth.positions, sources)
+    return Case(Scene(scene.sensors, scene.times, measurements, scene.region, truth))
+
+
+def ships(seed: int, reports: bool = True) -> Case:
+    """Ships seen by a radar; with `reports`, each tells its position every 10 s, as a sensor that never looks."""
+    rng, region = np.random.default_rng(seed), np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 1.0]])
+    times = INTERVAL * np.arange(SCANS)
+    heading, speed = rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(3.0, 10.0, TARGETS)
+    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(TARGETS)], axis=1)
+    middle = np.append(rng.uniform(-8e3, 8e3, (TARGETS, 2)), np.zeros((TARGETS, 1)), axis=1)
+    paths = middle + (times - times.mean())[:, None, None] * velocity
+    view = np.array([[0.0, 15e3], [-np.pi, np.pi]])
+    radar = Radar2D(
+        position=np.zeros(3), noise=np.array([50.0, 5e-3]), detection_probability=0.9, false_alarm_rate=10.0,
+        field_of_view=view, name="radar",
+    )  # fmt: skip
+    ais = PositionSensor(
+        position=np.zeros(3), noise=np.array([10.0, 10.0]), detection_probability=0.9, false_alarm_rate=0.1,
+        field_of_view=region[:2], name="AIS",
+    )  # fmt: skip
+    ids = [np.arange(TARGETS)] * SCANS
+    sensors: list[Sensor] = [radar, ais] if reports else [radar]
+    scene = observe(sensors, times, ids, list(paths), rng, region=region)
+    filter = ExtendedKalmanFilter(ConstantVelocity(0.1, dimensions=2, kind="continuous"))
+    options = {"filter": filter, "initiation": Initiation(speed=8.0)}
+    if not reports:
+        return Case(scene, options=options)
+    phase = rng.uniform(0.0, 10.0, TARGETS)
+    turn = np.floor((times[:, None] + phase) / 10.0)
+    due = np.diff(turn, axis=0, prepend=turn[:1] - (phase < INTERVAL)) > 0
+    scene = _at_times(scene, 1, due)
+    everywhere, nowhere = (-np.pi, np.pi), (0.0, 0.0)
+    sectors = np.array([[everywhere, nowhere]] * SCANS)
+    return Case(replace(scene, sectors=sectors), options=options)
+
+
+def _at_times(scene: Scene, s: int, due: Array) -> Scene:
+    """The scene in which sensor `s` has measurements of a target only when they are due, bool (K, T)."""
+    assert scene.truth is not None and scene.truth.sources is not None
+    measurements = [list(scan) for scan in scene.measurements]
+    sources = [list(scan) for scan in scene.truth.sources]
+    for k, row in enumerate(due):
+        kept = np.append(row, True)[sources[k][s]]
+        measurements[k][s], sources[k][s] = measurements[k][s][kept], sources[k][s][kept]
+    truth = Truth(scene.truth.target_ids, scene.truth.positions, sources)
+    return Scene(scene.sensors, scene.times, measurements, scene.region, truth)
+
+
+def misdeclared(declared: Setting, true: Setting) -> Make:
+    """Scenes of true sensors, of which trackers are told something else."""
+
+    def row(seed: int) -> Case:
+        known = simulate(true, seed)
+        return Case(replace(known, sensors=radars(declared)), known)
+
+    return row
+
+
+def agile(seed: int, interval: float = INTERVAL) -> Case:
+    """Targets of 250 m/s that now and then turn with 8 g for 2 to 6 s."""
+    rng, fine, turn = np.random.default_rng(seed), 0.1, 8 * 9.81 / 250.0
+    steps = round(SCANS * interval / fine)
+    rate = np.zeros((steps, TARGETS))
+    for target in range(TARGETS):
+        k = 0
+        while k < steps:
+            k += round(rng.uniform(8.0, 30.0) / fine)
+            length = round(rng.uniform(2.0, 6.0) / fine)
+            rate[k : k + length, target] = turn * rng.choice([-1.0, 1.0])
+            k += length
+    heading = rng.uniform(-np.pi, np.pi, TARGETS) + np.cumsum(rate, axis=0) * fine
+    velocity = 250.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=-1)
+    path = np.cumsum(velocity, axis=0) * fine
+    middle = rng.uniform([-12e3, -12e3, 0.0], [12e3, 12e3, 1.0], (TARGETS, 3))
+    middle[:, 2] = rng.permutation(np.linspace(1e3, 11e3, TARGETS))
+    path = (path - path.mean(axis=0) + middle)[:: round(interval / fine)]
+    times, ids = interval * np.arange(SCANS), [np.arange(TARGETS)] * SCANS
+    return Case(observe(radars(SEPARATE), times, ids, list(path), rng, region=REGION))
+
+
+def one_planar(seed: int, declared: float = 100.0) -> Case:
+    """Low targets under one radar without heights, 100 false alarms a scan, of which so many are declared."""
+    scene, region = simulate(SEPARATE, seed), np.array([*REGION[:2], [0.0, 2e3]])
+    assert scene.truth is not None
+    full, rng = scene.sensors[0], np.random.default_rng([seed, 1])
+    radar = Radar2D(
+        position=full.position, noise=full.noise[:2], detection_probability=0.9, false_alarm_rate=100.0,
+        field_of_view=full.field_of_view[:2], name="radar",
+    )  # fmt: skip
+    paths = [_at_height(at, 1e3) for at in scene.truth.positions]
+    scene = observe([radar], scene.times, scene.truth.target_ids, paths, rng, region=region)
+    told = [replace(radar, false_alarm_rate=declared)]
+    filter = make_filter("imm-cv", told, pace=INTERVAL, region=region)
+    return Case(replace(scene, sensors=told), options={"filter": filter}, level=True)
+
+
+def _at_height(places: Array, height: float) -> Array:
+    return np.column_stack([places[:, :2], np.full(len(places), height)])
+
+
+def flat_radars(seed: int, height: float | None = None) -> Case:
+    """Three radars without elevations, and the filter of the programs; with a height, all targets fly there."""
+    sensors: list[Sensor] = [
+        Radar2D(
+            position=one.position, noise=one.covariance[:2, :2], detection_probability=one.detection_probability,
+            false_alarm_rate=one.false_alarm_rate, field_of_view=one.field_of_view[:2], name=one.name,
+        )
+        for one in radars(SEPARATE)
+    ]  # fmt: skip
+    scene = simulate(SEPARATE, seed, sensors=sensors)
+    assert scene.truth is not None
+    if height is not None:
+        paths = [_at_height(at, height) for at in scene.truth.positions]
+        rng = np.random.default_rng(seed)
+        scene = observe(sensors, scene.times, scene.truth.target_ids, paths, rng, region=REGION)
+    filter = make_filter("imm-cv", sensors, pace=INTERVAL, region=REGION)
+    return Case(scene, options={"filter": filter}, level=True)
+
+
+def abreast(seed: int, gap: float) -> Case:
+    """Two targets side by side for the whole time."""
+    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    heading = rng.uniform(-np.pi, np.pi)
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
+    side = np.array([[-0.5], [0.5]]) * gap * np.array([-ahead[1], ahead[0], 0.0])
+    paths = [0.0, 0.0, 6e3] + side + (200.0 * (times - times.mean()))[:, None, None] * ahead
+    return Case(observe(radars(SEPARATE), times, [np.arange(2)] * SCANS, list(paths), rng, region=REGION))
+
+
+def landing(seed: int) -> Case:
+    """Aircraft at 75 m/s on glide paths of 3 degrees, 5 km apart, to three runways 5 km before each radar."""
+    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    places = on_circle(np.zeros(3), 20e3, 3)
+    sensors = [
+        radar_over(
+            REGION, place, range_noise=80.0, angle_noise=1.6e-3, detection_probability=0.9, false_alarm_rate=10.0,
+            name=f"radar {number}",
+        )
+        for number, place in enumerate(places, 1)
+    ]  # fmt: skip
+    ids, paths = [], []
+    first = rng.uniform(3e3, 8e3, 3)
+    for t in times.tolist():
+        left = first[:, None] + 5e3 * np.arange(TARGETS // 3) - 75.0 * t
+        along = -places / np.linalg.norm(places, axis=1)[:, None]
+        where = (places + 5e3 * along)[:, None] + left[..., None] * along[:, None]
+        where[..., 2] = np.tan(np.radians(3.0)) * left
+        flying = left.ravel() > 0
+        ids.append(np.flatnonzero(flying))
+        paths.append(where.reshape(-1, 3)[flying])
+    return Case(observe(sensors, times, ids, paths, rng, region=REGION))
+
+
+def crossing(seed: int) -> Case:
+    """Pairs that meet at half time at right angles, 50 m off."""
+    rng, times, pairs = np.random.default_rng(seed), INTERVAL * np.arange(SCANS), TARGETS // 2
+    middle = np.repeat(rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (pairs, 3)), 2, axis=0)
+    middle[:, 2] = np.repeat(rng.permutation(np.linspace(2e3, 10e3, pairs)), 2)
+    middle[:, :2] += rng.normal(0.0, 50.0, (TARGETS, 2))
+    heading = np.repeat(rng.uniform(-np.pi, np.pi, pairs), 2) + np.tile([0.0, np.pi / 2], pairs)
+    velocity = 200.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros(TARGETS)], axis=1)
+    paths = middle + (times - times.mean())[:, None, None] * velocity
+    return Case(observe(radars(SEPARATE), times, [np.arange(TARGETS)] * SCANS, list(paths), rng,
+                        region=REGION))  # fmt: skip
+
+
+def hovering(seed: int) -> Case:
+    """Drones that stand for half of the time, then fly at 5 to 15 m/s."""
+    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    heading, speed = rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(5.0, 15.0, TARGETS)
+    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(TARGETS)], axis=1)
+    start = rng.uniform([-15e3, -15e3, 300.0], [15e3, 15e3, 1500.0], (TARGETS, 3))
+    paths = start + np.maximum(times - times.mean(), 0.0)[:, None, None] * velocity
+    return Case(observe(radars(SEPARATE), times, [np.arange(TARGETS)] * SCANS, list(paths), rng,
+                        region=REGION))  # fmt: skip
+
+
+def late_clock(seed: int) -> Case:
+    """The stamps of the second radar are late by 0.5 s, and found by registration; the first has the right time."""
+    scene = simulate(SEPARATE, seed)
+    truth = scene.truth
+    assert truth is not None and truth.sources is not None
+    velocity = (truth.positions[1] - truth.positions[0]) / INTERVAL
+    before = [at - 0.5 * velocity for at in truth.positions]
+    rng = np.random.default_rng([seed, 1])
+    late = observe(scene.sensors[1:2], scene.times, truth.target_ids, before, rng, region=REGION)
+    assert late.truth is not None and late.truth.sources is not None
+    measurements = [[a, b, c] for (a, _, c), (b,) in zip(scene.measurements, late.measurements, strict=True)]
+    sources = [[a, b, c] for (a, _, c), (b,) in zip(truth.sources, late.truth.sources, strict=True)]
+    scene = replace(scene, measurements=measurements, truth=replace(truth, sources=sources))
+    found = register(scene, components=("time",), reference=(scene.sensors[0].name,))
+    return Case(found.correct(scene))
+
+
+def under_way(seed: int) -> Case:
+    """Three radars on ships that circle at 10 m/s."""
+    rng, times = np.random.default_rng(seed), np.arange(0.0, INTERVAL * SCANS)
+    sensors: list[Sensor] = []
+    for number, place in enumerate(on_circle(np.zeros(3), 20e3, 3), 1):
+        heading = rng.uniform(-np.pi, np.pi) + rng.choice([-1.0, 1.0]) * 0.01 * times
+        step = 10.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros(len(times))], axis=1)
+        carrier = Platform(times, place + np.cumsum(step, axis=0), np.angle(np.exp(1j * heading)))
+        sensors.append(Radar3D(
+            position=np.array([5.0, 0.0, 20.0]), noise=np.array([80.0, 1.6e-3, 1.6e-3]), detection_probability=0.9,
+            false_alarm_rate=10.0, field_of_view=np.array([[0.0, 60e3], [-np.pi, np.pi], [-0.1, np.pi / 2]]),
+            name=f"radar {number}", platform=carrier,
+        ))  # fmt: skip
+    return Case(simulate(SEPARATE, seed, sensors=sensors))
+
+
+def range_rates(seed: int) -> Case:
+    """Formations under radars that measure range rates, too (1 m/s)."""
+    sensors = [
+        radar_over(
+            REGION, one.position, range_noise=80.0, angle_noise=1.6e-3, detection_probability=0.9,
+            false_alarm_rate=10.0, name=one.name, range_rate_noise=1.0, fastest=300.0,
+        )
+        for one in radars(SETTINGS["formations"])
+    ]  # fmt: skip
+    return Case(simulate(SETTINGS["formations"], seed, sensors=sensors))
+
+
+def untold_views(scene: Scene) -> Scene:
+    """The scene with sensors that are said to see everything, with the same density of false alarms."""
+    across = float(np.linalg.norm(np.diff(REGION, axis=1)))
+    sensors = []
+    for one in scene.sensors:
+        view = np.array(one.field_of_view)
+        view[[name == "range" for name in one.components[: one.dim]], 1] = across
+        full = replace(one, field_of_view=view)
+        sensors.append(replace(full, false_alarm_rate=one.false_alarm_rate * full.volume / one.volume))
+    return replace(scene, sensors=sensors, sectors=None)
+
+
+def flat_states(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The options with states in the plane."""
+    return {**options, "filter": two_speeds(manoeuvre_noise(INTERVAL), 2)}
+
+
+QUIET, NOISY, LOUD = ((noise, noise, noise) for noise in (80.0, 160.0, 240.0))
+ADAPTING = "multi-sensor, adapting"
+"""What the programs run."""
+JOINT = "joint-probabilistic"
+SITES = "sites"
+"""A tracker at each sensor, which sends tracks alone; see `experiments.trackers.sites`."""
+WITHOUT = ("views", "heights", "estimates", "map", "life")
+"""What can be left out of the programs' tracker; `joint-probabilistic, all permutations` is the sixth."""
+
+
+class Row(NamedTuple):
+    """A row of the table.
+
+    make: Its scene, from a seed.
+    also: Trackers besides the usual ones.
+    without: Of `WITHOUT`, what the scene needs.
+    goals: Largest value of what is judged, by tracker and field of `Judged`.
+    harmless: Nothing is wrong, or it does no harm: trackers have to be as good as the oracle, nearly.
+    """
+
+    make: Make
+    also: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    goals: Mapping[str, float] = {}
+    harmless: bool = False
+
+
+def _separate(**values: Any) -> Setting:
+    return SEPARATE._replace(**values)
+
+
+ROWS: dict[str, Row] = {
+    "six radars of 17 km": Row(short_radars, without=("views",), goals={"gospa": 190.0}),
+    "six radars of 17 km, P_d 0.6": Row(
+        lambda seed: short_radars(seed, 0.6), without=("views",), goals={"gospa": 300.0}
+    ),
+    "ships, radar alone": Row(lambda seed: ships(seed, reports=False)),
+    "ships, radar and AIS": Row(ships, without=("views",)),
+    "three 2-D radars": Row(flat_radars, without=("heights",), goals={"gospa": 170.0}),
+    "three 2-D radars, all at 9 km": Row(lambda seed: flat_radars(seed, 9e3), without=("heights",)),
+    "P_d 0.6, declared 0.9": Row(
+        misdeclared(SEPARATE, _separate(detection_probability=0.6)), without=("estimates",),
+        goals={"gospa": 310.0},
+    ),
+    "noise twice the declared": Row(
+        misdeclared(SEPARATE, _separate(noise=NOISY)), without=("estimates",), goals={"gospa": 360.0}
+    ),
+    "noise three times the declared": Row(
+        misdeclared(SEPARATE, _separate(noise=LOUD)), without=("estimates",), goals={"gospa": 450.0, "false": 0.3}
+    ),
+    "formations, noise twice the declared": Row(
+        misdeclared(SETTINGS["formations"], Setting("formations", NOISY)), without=("estimates",)
+    ),
+    "8 g": Row(agile, without=("estimates", "life"), goals={"gospa": 260.0}),
+    "8 g, scans of 2 s": Row(lambda seed: agile(seed, 2.0), without=("estimates", "life")),
+    "wind farm": Row(wind_farm, without=("map",), goals={"gospa": 230.0, "false": 0.5}),
+    "one 2-D radar, 100 false alarms": Row(
+        one_planar, without=("map",), goals={"missed": 0.2 * TARGETS, "false": 0.02}
+    ),
+    "one 2-D radar, 100 false alarms, declared 20": Row(lambda seed: one_planar(seed, 20.0), without=("estimates",)),
+    "one 2-D radar, 100 false alarms, declared 500": Row(lambda seed: one_planar(seed, 500.0), without=("estimates",)),
+    "dark band of 4 km": Row(dark_band, without=("life",)),
+    "splitting": Row(splitting),
+    "100 m abreast": Row(lambda seed: abreast(seed, 100.0), also=(JOINT, f"{JOINT}, all permutations")),
+    "200 m abreast": Row(lambda seed: abreast(seed, 200.0), also=(JOINT, f"{JOINT}, all permutations")),
+    "formations": Row(
+        lambda seed: Case(simulate(SETTINGS["formations"], seed)),
+        also=("GNN", JOINT, f"{JOINT}, all permutations", SITES), goals={f"{JOINT}: gospa": 205.0},
+    ),
+    "formations, range rates": Row(range_rates, also=(JOINT,)),
+    "radars on ships under way": Row(under_way),
+    "all as declared": Row(lambda seed: Case(simulate(SEPARATE, seed)), also=(SITES,), harmless=True),
+    "P_d 0.6, rightly declared": Row(
+        lambda seed: Case(simulate(_separate(detection_probability=0.6), seed)), also=(SITES,), harmless=True
+    ),
+    "P_d 0.9, declared 0.6": Row(misdeclared(_separate(detection_probability=0.6), SEPARATE), harmless=True),
+    "noise half the declared": Row(misdeclared(_separate(noise=NOISY), SEPARATE), harmless=True),
+    "five times the false alarms": Row(misdeclared(SEPARATE, _separate(false_alarms=50.0)), harmless=True),
+    "a fifth of the false alarms": Row(misdeclared(SEPARATE, _separate(false_alarms=2.0)), harmless=True),
+    "landing": Row(landing, harmless=True),
+    "crossings at right angles": Row(crossing, harmless=True),
+    "hovering drones": Row(hovering, harmless=True),
+    "clock off by 0.5 s, registered": Row(late_clock, harmless=True),
+}  # fmt: skip
