@@ -36,6 +36,8 @@ class Tuples(NamedTuple):
     """Its velocity, (T, 3), m/s; NaN where unknown: the tuple then has no information on clocks."""
     places: Array
     """Where the sensors stood, (T, S, 3), metres."""
+    flat: bool
+    """Whether all targets are at one height, which is then no unknown: it would explain each range that is too long."""
 
 
 class NormalEquations(NamedTuple):
@@ -85,11 +87,13 @@ def _linearise_tuple(
             continue
         code, d, W = sensors.code[s], sensors.dim[s], sensors.weight[s]
         linearise(code, d, tuples.places[t, s], at[0], at[1], at[2], h, H[s])
+        if tuples.flat:
+            H[s, :, 2] = 0.0
         for i in range(d):
             nu[s, i] = z[s, i] - h[i]
         wrap(code, nu[s])
         measured += d
-        tall += 0 if (code == BEARING and d == 1) or (code == POSITION and d == 2) else 1
+        tall += 0 if tuples.flat or (code == BEARING and d == 1) or (code == POSITION and d == 2) else 1
         for i in range(d):
             for j in range(d):
                 squares += nu[s, i] * W[i, j] * nu[s, j]

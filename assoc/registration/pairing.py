@@ -6,6 +6,7 @@ known so far and whose noise is widened by their uncertainty.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -193,7 +194,18 @@ def tuple_arrays(scene: Scene, epochs: Sequence[Epoch], chosen: Chosen, clocks: 
                 seen[part.start + mine, s] = (late == 0.0) | ~np.isnan(speed[:, 0])
                 measured = corrected_measurements(there.sensors[s], measured, {}, speed, late, where)
             z[part.start + mine, s, : measured.shape[1]] = measured
-    return Tuples(z, seen, at, velocity, places)
+    flat = _is_flat(scene)
+    if flat:
+        at[:, 2] = scene.region[2].mean()
+    return Tuples(z, seen, at, velocity, places, flat)
+
+
+def _is_flat(scene: Scene) -> bool:
+    """Whether the region is so low, as at sea, that no range tells one height in it from another."""
+    if any(sensor.dim == 3 for sensor in scene.sensors):
+        return False
+    ranges = [math.sqrt(sensor.covariance[0, 0]) for sensor in scene.sensors if sensor.dim == 2]
+    return bool(ranges) and bool(np.ptp(scene.region[2]) <= min(ranges))
 
 
 def _mean_velocities(velocities: Sequence[Array], rows: Array) -> Array:
