@@ -240,7 +240,9 @@ def _as_options() -> Iterator[None]:
     try:
         yield
     except InvalidInputError as error:
-        text = str(error).replace("the rotation time", "rotation: the rotation time", 1)
+        text = str(error)
+        if " rotation time " in text:
+            text = f"rotation: {text}"
         name, _, rest = text.partition(": ")
         flags = {**{argument: flag for flag, argument in RADAR.items()}, "rotation": "rotation"}
         if name not in flags:

@@ -114,7 +114,7 @@ def choose(
 
 
 def seconds(text: str) -> tuple[float, bool]:
-    """Read a time: seconds, a clock time h:mm:ss, or a date with a time (ISO 8601, UTC by default).
+    """Read a time: seconds, a clock time h:mm:ss, or a date with a time (UTC by default): ISO 8601, or day.month.year.
 
     Returns
     -------
@@ -134,6 +134,7 @@ def seconds(text: str) -> tuple[float, bool]:
         if hours > 24 or minutes > 59 or rest >= 61:
             raise ValueError(text)
         return 3600.0 * hours + 60.0 * minutes + rest, True
+    text = re.sub(r"^(\d\d)\.(\d\d)\.(\d{4})(?=[T ])", r"\3-\2-\1", text)
     # 1.5e-05 has a dash there, too
     if text[4:5] == "-" and text[:4].isdigit() and len(text) <= 40:
         moment = datetime.datetime.fromisoformat(text)

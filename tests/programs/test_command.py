@@ -319,6 +319,7 @@ def test_other_shells(run, tmp_path):
         (sweep, ["s.npz", "--solver", "aco", "--alpha", "2", "-o", "x"], "write --grid alpha=2"),
         (sweep, ["s.npz", "--solver", "aco", "--rho=0.1", "-o", "x"], "write --grid rho=V1,V2"),
         (track, ["fine.csv", "-o", "x.csv"], "--range-noise: the plots do not come in steps.*30 to 150 m"),
+        (track, ["rad.csv", "-o", "x.csv"], "--rotation: no rotation time from 2 to 30 s fits the plots"),
         (track, ["few.csv", "-o", "x.csv"], r"--rotation: the rotation time .*: give it \(4 to 12 seconds are usual\)"),
     ],
 )  # fmt: skip
@@ -328,6 +329,7 @@ def test_errors_in_the_words_of_the_program(here, program, words, said, capsys):
     rows = [f"{t * 4 + b / 90},{r},{b}" for t in range(30) for r, b in rng.uniform([1, 0], [90, 360], (3, 2)).tolist()]
     rows.sort(key=lambda row: float(row.partition(",")[0]))
     (here / "fine.csv").write_text("\n".join(["time,range,bearing", *rows]))
+    (here / "rad.csv").write_text("\n".join(["time,range,bearing", *(f"{k},{k % 7},{k * k % 9}" for k in range(99))]))
     (here / "few.csv").write_text("\n".join(["time,range,bearing", *rows[:3]]))
     try:
         code = program.main(words)

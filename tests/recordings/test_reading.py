@@ -285,6 +285,7 @@ FOUND = [
     ("time;Range [NM];Azimuth (°);Mode 3/A;Flight Level\r\n12:00:01,5;20,5;45,25;4521;85\r\n", (43201.5, 0o4521, 85)),
     ("\ufeffTimestamp,Range (km),brg,squawk,FL\n2021-07-12T14:00:02.5Z,37.966,45.25,4521,85\n", (NOON, 0o4521, 85)),
     ("utc\trho_m\taz\tMode A\tAlt_feet\n2021-07-12 14:00:02,5\t37966\t45,25\t4521\t8500\n", (NOON, 0o4521, 85)),
+    ("time;rho_m;az;squawk;FL\n12.07.2021 14:00:02,5;37966;45,25;4521;85\n", (NOON, 0o4521, 85)),
     ("Zürich;time;range;theta;mode_c\n12:00;1,5;20,5;45,25;\n", (1.5, 0, math.nan)),
 ]
 

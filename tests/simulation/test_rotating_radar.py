@@ -7,6 +7,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.recordings import GARBLED_CODES, clustering_time_window, estimate_rotation, radar_of
+from assoc.scene.geodesy import geodetic
 from assoc.simulation import names, recording_names, simulate, simulate_recording
 from assoc.simulation.antenna import dwells
 from assoc.simulation.flights import Flight, Turn
@@ -172,3 +173,21 @@ def test_scenes_and_recordings_have_their_own_doors():
 def test_bad_parameters(values, message):
     with pytest.raises(InvalidInputError, match=message):
         simulate_recording("rotating-radar", **values)
+
+
+def test_two_places_see_the_same_aircraft():
+    """Both know the same places on the earth at the same time, and the same codes."""
+    found, codes = [], []
+    for latitude, longitude in ((47.5, 8.0), (46.2, 9.5)):
+        one = simulate_recording("rotating-radar", 4, duration=30, latitude=latitude, longitude=longitude)
+        truth, plots = one.truth, one.recording
+        here = geodetic(truth.positions, (math.radians(latitude), math.radians(longitude), 0.0))
+        rows = {k: truth.ids == k for k in np.unique(truth.ids).tolist()}
+        found.append({k: [np.interp(15.0, truth.times[own], axis[own]) for axis in here.T] for k, own in rows.items()})
+        codes.append({k: c for k, c in zip(plots.sources.tolist(), plots.identities.tolist(), strict=True) if c})
+    shared = found[0].keys() & found[1].keys()
+    assert len(shared) > 5 and all(codes[0][k] == codes[1][k] for k in codes[0].keys() & codes[1].keys())
+    for k in shared:
+        assert (np.abs(np.subtract(found[0][k], found[1][k])) < [1e-5, 1e-5, 30.0]).all()
+    with pytest.raises(InvalidInputError, match="latitude, longitude: expected both or neither"):
+        simulate_recording("rotating-radar", latitude=47.0)

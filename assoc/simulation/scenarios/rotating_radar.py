@@ -21,6 +21,7 @@ from assoc.errors import InvalidInputError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
+from assoc.scene.geodesy import east_north_up, geodetic
 from assoc.simulation.antenna import bearings_in_steps, dwells, in_steps, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
 from assoc.simulation.option import option
@@ -33,6 +34,8 @@ Traffic = Literal["random", "crossing", "parallel", "head-on"]
 BEARING_STEP = 1440 / 4095
 # bytes, measured (tests/reliability/test_memory.py): of a step of one path, of a plot
 _STEP, _PLOT = 300, 250
+TRAFFIC = (math.radians(47.0), math.radians(8.0), 0.0)
+"""What aircraft fly around, seen by radars that have a place: latitude, longitude, height."""
 PARALLEL_SEPARATION = 5.0
 """Nautical miles: what air traffic control keeps between aircraft en route."""
 
@@ -56,6 +59,8 @@ class RotatingRadarParameters(Parameters):
     separation: float | None = option(
         None, "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"
     )
+    latitude: float | None = option(None, "of the radar, degrees; aircraft fly around 47 N, 8 E (default: flat earth)")
+    longitude: float | None = option(None, "of the radar, degrees")
 
     def __post_init__(self) -> None:
         if self.traffic not in get_args(Traffic):
@@ -76,6 +81,11 @@ class RotatingRadarParameters(Parameters):
                 raise InvalidInputError(
                     "separation: is of a pair (traffic crossing, parallel or head-on), not of random"
                 )
+        if (self.latitude is None) != (self.longitude is None):
+            raise InvalidInputError("latitude, longitude: expected both or neither")
+        for name, most in (("latitude", 90.0), ("longitude", 360.0)):
+            if getattr(self, name) is not None:
+                self._number(name, least=-most, most=most)
         if self.duration > 1e7 * self.rotation:
             raise InvalidInputError(f"duration: expected at most 1e7 rotations, got {self.duration:g} s")
 
@@ -126,13 +136,13 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
         flights = _pair(p, rng)
     codes = rng.choice(np.arange(1, 4096), len(flights), replace=False)
     seen = [_seen(p, flight) for flight in flights]
-    source = np.repeat(np.arange(len(flights)), [len(times) for times, _, _ in seen])
-    time, position, velocity = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    source = np.repeat(np.arange(len(flights)), [len(times) for times, *_ in seen])
+    time, position, velocity, height = (np.concatenate(parts) for parts in zip(*seen, strict=True))
     order = np.lexsort((source, time))
     source, time, position, velocity = source[order], time[order], position[order], velocity[order]
     hit = rng.random(len(time)) < p.detection_probability
     distance, bearing = slant_range_and_bearing(position[hit])
-    level = np.round(position[hit, 2] / FLIGHT_LEVEL)
+    level = np.round(height[order][hit] / FLIGHT_LEVEL)
     identity = np.where(rng.random(hit.sum()) < p.identity_loss, UNDECODED, codes[source[hit]])
     wrong = rng.random(hit.sum()) < p.garbled
     level[wrong] = rng.choice(GARBLED_CODES, int(wrong.sum()))
@@ -163,17 +173,23 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
     return SimulatedPlots(recording, Trajectories(time, source, position), velocity)
 
 
-def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Array]:
-    """Times at which the antenna points at an aircraft within reach, its positions and velocities then."""
+def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Array, Array]:
+    """Times at which the antenna points at an aircraft within reach; its positions, velocities and altitudes then."""
     times, positions, velocities = flight.path(p.duration)
+    heights = positions[:, 2:]
+    if p.latitude is not None and p.longitude is not None:
+        latitude, longitude, _ = geodetic(positions * [1, 1, 0], TRAFFIC).T
+        place = math.radians(p.latitude), math.radians(p.longitude), 0.0
+        positions = east_north_up(latitude, longitude, heights[:, 0], place)
+        velocities = np.gradient(positions, STEP, axis=0)
     when = dwells(times, positions, p.rotation)
     when = when[when <= p.duration]
-    position, velocity = (
-        np.column_stack([np.interp(when, times, axis) for axis in x.T]) for x in (positions, velocities)
+    position, velocity, height = (
+        np.column_stack([np.interp(when, times, axis) for axis in x.T]) for x in (positions, velocities, heights)
     )
     step = p.range_step * NAUTICAL_MILE
     inside = in_steps(np.linalg.norm(position, axis=1), step) <= p.reach * NAUTICAL_MILE
-    return when[inside], position[inside], velocity[inside]
+    return when[inside], position[inside], velocity[inside], height[inside, 0]
 
 
 def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
