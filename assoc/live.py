@@ -41,9 +41,8 @@ def _live(words: list[str]) -> None:
         raise InvalidInputError("--udp and --replay: expected one of them")
     given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
     from assoc._cli.track.plot_lines import Lines, header_of
-    from assoc.scene.scene import Scene
 
-    scene = Scene.load(given["file"])
+    scene = _scene(given)
     going_on = given["state"] is not None and os.path.exists(given["state"])
     _check_output(given["output"], header_of(scene.origin), going_on)
     with announcement.silenced() if given["quiet"] else nullcontext():
@@ -81,6 +80,20 @@ def _live(words: list[str]) -> None:
     with _INTERRUPTION.reported(end):
         _take_plots(lines, scene, tracker, given, show)
     end()
+
+
+def _scene(given: Given) -> Scene:
+    """The scene of the sensors; the file of several radars gives the turns of their antennas, too."""
+    from assoc._cli.track.radars_file import read_radars
+    from assoc.scene.scene import Scene
+
+    if not given["file"].lower().endswith(".toml"):
+        return Scene.load(given["file"])
+    if given["turns"] is not None:
+        raise InvalidInputError(f"--turns: {given['file']} says how the antennas turn")
+    found = read_radars(given["file"])
+    given["turns"] = found.sensor_turns
+    return found.scene
 
 
 class _StateFile:
@@ -131,7 +144,14 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
     def make() -> Tracker:
         return make_tracker(name, scene.sensors, given, settings, scene.region, pace)
 
-    tracker = LiveTracker(scene, make, turns=turns, tell=_print, **given.some(("interval", "horizon", "wait")))
+    tracker = LiveTracker(
+        scene,
+        make,
+        turns=turns,
+        tell=_print,
+        quality=given["page"] is not None,
+        **given.some(("interval", "horizon", "wait")),
+    )
     tracker.warm_up()
     note = height_note(scene.sensors, len(tracker.positions))
     if note is not None:

@@ -21,6 +21,8 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Radar2D
 from assoc.sensors.base import wrap_angle
 
+NO_HEIGHT = ", no height"
+"""Ends the name of the sensor that is a radar's plots without heights."""
 FULL_TURN = 2.0 * math.pi
 MOST_SCANS = 1_000_000
 EARTH = 6.37e6
@@ -91,7 +93,8 @@ def scene_of_radars(
     for part in parts:
         z = part.recording.measurements
         if part.radar.dim == 3:
-            z = np.column_stack([z, _heights(part.recording, part.radar, origin)])
+            heights = part.recording.trusted_altitudes
+            z = np.column_stack([z, heights if origin is None else heights_above(z, heights, part.radar, origin)])
         # a plot on an edge belongs to the scan before it, but for the first
         cut = np.searchsorted(part.recording.times, edges[1:-1], side="right")
         measured.append(np.split(z, cut))
@@ -134,7 +137,7 @@ def parts_of_radars(recordings: Sequence[Recording], radars: Sequence[Radar2D]) 
                 noise=radar.covariance[:2, :2],
                 field_of_view=radar.field_of_view[:2],
                 detection_probability=radar.detection_probability * (1.0 - share),
-                name=f"{radar.name}, no height" if share else radar.name,
+                name=f"{radar.name}{NO_HEIGHT}" if share else radar.name,
             )
             parts.append(Part(number, recording.take(~known), plain))
         if share > 0.0:
@@ -156,16 +159,13 @@ def identities_of_radars(
     return list(zip(*found, strict=True))
 
 
-def _heights(recording: Recording, radar: Radar2D, origin: Origin | None) -> Array:
-    """Heights above the scene's plane (n,) at which the plots have their altitudes."""
-    altitudes = recording.trusted_altitudes
-    if origin is None:
-        return altitudes
+def heights_above(z: Array, altitudes: Array, radar: Radar2D, origin: Origin) -> Array:
+    """Heights above a scene's plane (n,) of measurements (n, 2) at altitudes above the ellipsoid, metres."""
     heights = altitudes - origin[2]
-    directions = np.stack([np.cos(recording.azimuths), np.sin(recording.azimuths)], axis=1)
+    directions = np.stack([np.cos(z[:, 1]), np.sin(z[:, 1])], axis=1)
     # two rounds leave centimetres
     for _ in range(3):
-        ground = np.sqrt(np.maximum(recording.ranges**2 - (heights - radar.position[2]) ** 2, 0.0))
+        ground = np.sqrt(np.maximum(z[:, 0] ** 2 - (heights - radar.position[2]) ** 2, 0.0))
         places = np.column_stack([radar.position[:2] + ground[:, None] * directions, heights])
         heights = heights + altitudes - geodetic(places, origin)[:, 2]
     return heights

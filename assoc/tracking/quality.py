@@ -14,7 +14,7 @@ Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Trackin
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +84,16 @@ class Qualities:
         """Quality of a track, also of one that has ended."""
         return self._of.setdefault(track_id, TrackQuality(np.zeros(self._sensors, np.int64)))
 
+    def keep(self, track_ids: Iterable[int]) -> None:
+        """Forget all tracks but these."""
+        self._of = {number: self._of[number] for number in track_ids if number in self._of}
+
+    def count(self, assigned: Sequence[Array]) -> None:
+        """Count measurements of each sensor by their tracks; 0 is none."""
+        for s, ids in enumerate(assigned):
+            for number in ids[ids > 0].tolist():
+                self.of_track(number).hits[s] += 1
+
     def after(
         self,
         tracker: Tracker,
@@ -92,7 +102,20 @@ class Qualities:
         measurements: Sequence[Array],
         times: Sequence[Array] | None = None,
     ) -> None:
-        """Take in a step.
+        """Take in a step; see `compare`."""
+        self.count(step.assigned)
+        self.compare(tracker, before, step, measurements, times)
+
+    def compare(
+        self,
+        tracker: Tracker,
+        before: TrackerState,
+        step: Step,
+        measurements: Sequence[Array],
+        times: Sequence[Array] | None = None,
+        names: Mapping[int, int] | None = None,
+    ) -> None:
+        """Compare a step's measurements with the predictions of their tracks.
 
         Parameters
         ----------
@@ -103,6 +126,8 @@ class Qualities:
         step : Step
         measurements, times
             As they were given to the step.
+        names : mapping of int to int, optional
+            From the tracker's ids to those of the step.
         """
         scan = Scan(step.scan, step.time, tuple(measurements), times=None if times is None else tuple(times))
         scan = scan.aligned(tracker.sensors)
@@ -112,14 +137,12 @@ class Qualities:
         if before.estimates is not None:
             settings = in_use(settings, before.estimates)
         known = current(settings, before)
-        row_of = {number: row for row, number in enumerate(known.track_id.tolist())}
+        names = names or {}
+        row_of = {names.get(number, number): row for row, number in enumerate(known.track_id.tolist())}
         found: dict[int, list[tuple[float, int]]] = {}
         stamps = scan.own_times()
         for s, (z, ids, sensor) in enumerate(zip(scan.measurements, step.assigned, settings.sensors, strict=True)):
-            taken = [(m, i, row_of.get(i)) for m, i in enumerate(ids.tolist()) if i]
-            for _, i, _ in taken:
-                self.of_track(i).hits[s] += 1
-            fit = [one for one in taken if one[2] is not None]
+            fit = [(m, i, row_of[i]) for m, i in enumerate(ids.tolist()) if i in row_of]
             # from a platform that moved since the scan began: the prediction would be seen from elsewhere
             if not fit or before.time is None or (scan.paths and scan.paths[s] is not None):
                 continue

@@ -4,9 +4,11 @@ import errno
 import http.client
 import io
 import itertools
+import re
 import socket
 import threading
 import time
+from dataclasses import replace
 from socketserver import TCPServer
 
 import numpy as np
@@ -17,7 +19,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage, server
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
-from assoc.tracking.live.pictures import Heard
+from assoc.tracking.live.pictures import Agreement, Heard
 from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
@@ -29,15 +31,24 @@ def scene():
 @pytest.fixture(scope="module")
 def film(scene):
     """Pictures of half a minute."""
-    tracker = LiveTracker(scene, lambda: TRACKERS["nearest-neighbour"].for_scene(scene), turns=[4, 5, 5.5])
+    tracker = LiveTracker(
+        scene, lambda: TRACKERS["nearest-neighbour"].for_scene(scene), turns=[4, 5, 5.5], quality=True
+    )
     return [picture for plot in replayed(scene, 0.0) for picture in tracker.take(*plot)]
 
 
 HEARD = [
-    Heard("radar 1", 29.5, 120, 0, False),
-    Heard("radar 2", 14.0, 60, 3, True),
-    Heard("radar 3", -np.inf, 0, 0, False),
+    Heard("radar 1", 29.5, 120, 0, False, (0,)),
+    Heard("radar 2", 14.0, 60, 3, True, (1,)),
+    Heard("radar 3", -np.inf, 0, 0, False, (2,)),
 ]
+
+
+def with_doubts(picture):
+    """The picture with a track that is coasting, and one that does not agree with its measurements."""
+    first, *rest = picture.tracks
+    worse = {rest[0].track_id: Agreement(3.25, False, (9, 4, 0))}
+    return picture._replace(tracks=[replace(first, missed=1), *rest], agreements=picture.agreements | worse)
 
 
 def wait_for(browser, script):
@@ -85,7 +96,7 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         wait_for(browser, "return scene !== null")
         shots = []
         for part in (film[:12], film[12:]):
-            for one in part:
+            for one in (*part[:-1], with_doubts(part[-1])):
                 page.show(one, HEARD, {"late": 2, "lost": 7, "repeated": 0})
             wait_for(browser, f"return time === {part[-1].time} && !pending")
             name = f"live-{'dark' if dark else 'light'}-{size[0]}-{len(shots)}.png"
@@ -96,7 +107,7 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         assert first.shape == second.shape and (np.abs(first - second).sum(axis=2) > 60).sum() > 200
         assert f"{len(film[-1].tracks)} tracks" in browser.execute_script("return state.textContent")
         said = browser.execute_script("return state.textContent")
-        assert said.endswith(", 2 late, 7 lost")
+        assert said.endswith(", 2 late, 7 lost") and re.search(r" tracks \((\d+ coasting.*, )?1 inconsistent\)", said)
         chips = browser.execute_script(
             "return [...document.querySelectorAll('#sensors li')].map((one) => one.textContent)"
         )
@@ -126,9 +137,13 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         screenshot(browser, pictures / f"live-{'dark' if dark else 'light'}-{size[0]}-track.png")
         text = browser.execute_script("return detail.textContent")
         assert text.startswith(f"Track{id}") and "m/s" in text and "Since" in text
+        assert "Statuscoasting" in text and "from radar 1" in text and "NIS" in text
         for key, expected in (("n", "tracks[1][0]"), ("p", "tracks[0][0]"), ("Escape", "null")):
             browser.execute_script(f"map.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}))")
             assert browser.execute_script(f"return chosen === {expected}")
+            if key == "n":
+                text = browser.execute_script("return detail.textContent")
+                assert "from radar 19from radar 24from radar 30" in text and text.endswith("NIS3.25: inconsistent")
         # two fingers twice as far apart, and the arrows
         for script, change in ((PINCH, 2.0), ("map.dispatchEvent(new KeyboardEvent('keydown', {key: '0'}))", 1.0)):
             browser.execute_script(script)

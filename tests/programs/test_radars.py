@@ -7,9 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from assoc import inspect, track
+from assoc import inspect, live, track
+from assoc._cli.track.plot_lines import parse_line
+from assoc._cli.track.radars_file import read_radars
+from assoc.plotting.live import LivePage
 from assoc.recordings import read_plots
-from assoc.scene.geodesy import earth_centered
+from assoc.scene.geodesy import earth_centered, geodetic
 
 pytest.importorskip("pyarrow")
 PLACES = {"north": (47.5, 8.0, 450.0), "south": (46.2, 9.0, 600.0)}
@@ -124,6 +127,57 @@ def test_what_is_understood_and_what_looks_wrong(tmp_path, capsys):
         "once in 5.9 s, not in 7.7 s",
     ):
         assert line in said
+
+
+def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
+    """Turns and sensors come from it; plots with heights and without are one radar; the page tells how tracks are."""
+    file, out, shown = described(tmp_path), tmp_path / "tracks.csv", []
+
+    def show(page, picture, heard, counts):
+        shown.append(
+            (picture, heard, [page._row(one, picture.agreements[one.track_id], heard) for one in picture.tracks])
+        )
+
+    monkeypatch.setattr(LivePage, "show", show)
+    assert live.main([file, "--replay", "0", "-o", str(out), "--page", "0"]) == 0
+    # few plots have no height: their sensor has not fallen silent, the antenna is the same; north ends first
+    assert re.findall(r"(\S+) has sent nothing since 2021-07-12 (\S{5})", capsys.readouterr().err) == [
+        ("north", "14:02")
+    ]
+    found = pd.read_csv(out)
+    late = found[(found.time > 1626098400 + 60) & (found.event == "update")]
+    assert late.track_id.nunique() == 3
+    for own, height in zip(sorted(late.groupby("track_id").altitude.median()), (3e3, 6e3, 1e4), strict=True):
+        assert own == pytest.approx(height, abs=100)
+    picture, heard, rows = shown[len(shown) // 2]
+    assert [(one.name, one.parts) for one in heard] == [("north", (0, 1)), ("south", (2, 3))] and len(rows) == 3
+    for row in rows:
+        status, (nis, consistent, hits) = row[8:10]
+        assert status in ("confirmed", "coasting") and consistent and 0.1 < nis < 2 and min(hits) >= 8
+    assert live.main([file, "--turns", "4,5", "--replay", "0"]) == 2
+    assert "--turns: " in capsys.readouterr().err
+
+
+def test_heights_of_lines_are_altitudes(tmp_path):
+    scene = read_radars(described(tmp_path)).scene
+    assert [sensor.name for sensor in scene.sensors[:2]] == ["north, no height", "north"]
+    slant, bearing = seen_from("north", place_of(0, np.array(0.0)))
+    azimuth = np.pi / 2 - bearing
+    csv, json = f"north,5,{slant},{azimuth},10000,4521,", '{"sensor": "north", "time": 5, "range": %f, "azimuth": %f%s}'
+    for line in (csv, json % (slant, azimuth, ', "height": 10000')):
+        plot = parse_line(line, scene)
+        lat, lon, height = geodetic(position_of(plot.values, scene.sensors[1]), scene.origin)[0]
+        assert (np.degrees(lat), np.degrees(lon), height) == pytest.approx((46.6, 8.1, 10_000.0), abs=1e-2)
+    for line in (f"north,5,{slant},{azimuth}", f"north,5,{slant},{azimuth},,4521,3c6444", json % (slant, azimuth, "")):
+        plot = parse_line(line, scene)
+        assert (plot.sensor, len(plot.values)) == ("north, no height", 2)
+
+
+def position_of(values, radar):
+    """Where slant range, azimuth and height lead to."""
+    slant, azimuth, height = values
+    ground = np.sqrt(slant**2 - (height - radar.position[2]) ** 2)
+    return [[*(radar.position[:2] + ground * np.array([np.cos(azimuth), np.sin(azimuth)])), height]]
 
 
 @pytest.mark.parametrize(

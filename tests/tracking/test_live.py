@@ -286,8 +286,8 @@ def test_what_is_heard_of_each_sensor(scene):
     tracker.take(*first[:3])
     tracker.take(*first[:3])
     one, two, _ = tracker.heard
-    assert one == (scene.sensors[0].name, first.time, 1, 2, False)
-    assert two == (scene.sensors[1].name, -math.inf, 0, 0, False)
+    assert one == (scene.sensors[0].name, first.time, 1, 2, False, (0,))
+    assert two == (scene.sensors[1].name, -math.inf, 0, 0, False, (1,))
     tracker.take("2", first.time, first.values)
     for plot in plots:
         if plot.sensor != "2":

@@ -141,7 +141,7 @@ RADAR = {
     "bearing_noise": "azimuth_noise",
 }
 LIVE = (
-    Option("file", "SCENE.npz", "scene with the sensors and the region", positional=True),
+    Option("file", "FILE", "scene.npz with the sensors and the region, or radars.toml", positional=True),
     Option("output", "FILE", "file for the tracks (.csv; default: stdout)", kinds.Output(".csv", strict=True),
            short="-o"),
     Option("state", "FILE", "keep the state in this file (.npz) every few seconds; go on from it if it is there",
@@ -195,9 +195,9 @@ def live_parser() -> Parser:
     called = command("live")
     parser = Parser(
         prog="assoc.live",
-        usage=f"{called} SCENE.npz [--tracker NAME] [options] < plots > tracks.csv\n"
-        f"       {called} SCENE.npz --udp PORT [--page PORT] [options]\n"
-        f"       {called} SCENE.npz --replay X [--page PORT] [options]",
+        usage=f"{called} FILE [--tracker NAME] [options] < plots > tracks.csv\n"
+        f"       {called} FILE --udp PORT [--page PORT] [options]\n"
+        f"       {called} FILE --replay X [--page PORT] [options]",
         description="Make tracks from radar plots as they come (lines of CSV or JSON), and write them as they change.",
         epilog=_MORE,
     )

@@ -12,9 +12,12 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import COORDINATES, coordinates
+from assoc.recordings.several import NO_HEIGHT, heights_above
 
 if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin
@@ -73,12 +76,14 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
     try:
         found: Any = json.loads(text) if text.startswith("{") else _from_csv(text, scene)
         name, time = str(found["sensor"]), float(found["time"])
-        values = found.get("values")
+        sensor, values = _sensor(name, scene), found.get("values")
         if values is None:
-            sensor = _sensor(name, scene)
             # of an unknown sensor only the name is read: the tracker reports it
-            values = [found[part] for part in sensor.components[: sensor.dim]] if sensor is not None else []
+            parts = sensor.components[: sensor.dim] if sensor is not None else ()
+            values = [found.get(part, "") if part == "height" else found[part] for part in parts]
         identity = _identity(found.get("mode3"), found.get("address"))
+        if sensor is not None and sensor.components[sensor.dim - 1] == "height":
+            name, values = _with_height(name, list(values), scene, sensor)
         return Plot(name, time, [float(value) for value in values], identity)
     except (ValueError, TypeError, LookupError, RecursionError, AttributeError, OverflowError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)
@@ -96,6 +101,18 @@ def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
         raise ValueError(f"{len(rest)} values, at most {dim}, mode3 and address")
     names = zip(("mode3", "address"), rest[dim:], strict=False)
     return {"sensor": name, "time": time, "values": rest[:dim], **dict(names)}
+
+
+def _with_height(name: str, values: list[Any], scene: Scene, sensor: Sensor) -> tuple[str, list[Any]]:
+    """Sensor and values of a plot that may have a height: above the ellipsoid where the scene has an origin."""
+    if len(values) == sensor.dim and values[-1] in ("", None):
+        values.pop()
+    if len(values) == sensor.dim - 1 and _sensor(name + NO_HEIGHT, scene) is not None:
+        return name + NO_HEIGHT, values
+    if len(values) == sensor.dim and scene.origin is not None:
+        z = np.array([values], dtype=np.float64)
+        values[-1] = float(heights_above(z, z[:, -1], sensor, scene.origin)[0])  # type: ignore[arg-type]
+    return name, values
 
 
 def _sensor(name: str, scene: Scene) -> Sensor | None:

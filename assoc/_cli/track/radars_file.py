@@ -41,6 +41,13 @@ class Radars(NamedTuple):
     identities: list[tuple[Array, ...]]
     """Codes and addresses of the scene's plots."""
 
+    @property
+    def sensor_turns(self) -> list[float]:
+        """Seconds for a turn of each sensor of the scene."""
+        from assoc.recordings.several import parts_of_radars
+
+        return [self.turns[part.number] for part in parts_of_radars(self.recordings, self.radars)]
+
 
 def read_radars(path: str) -> Radars:
     """Read a description and its files, which are found from the folder that it is in.

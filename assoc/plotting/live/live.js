@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 const canvas = byId("map"), state = byId("state"), detail = byId("detail");
 const show = { labels: true, plots: true };
 const TRAIL = 40, FADE = 4, LEADER = 30, NEAR = 18, STEP = 1.5;
-let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], counts = {}, view = null, ended = false, pending = false, chosen = null;
+let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], counts = {}, names = [], view = null, ended = false, pending = false, chosen = null;
 
 function style(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
@@ -63,19 +63,24 @@ function draw() {
     });
     g.globalAlpha = 1;
   }
-  const ink = style("--ink"), colour = style("--track"), marked = style("--chosen");
+  const ink = style("--ink"), colour = style("--track"), marked = style("--chosen"), alarm = style("--sensor");
   // the chosen one first, so that it has its label
-  for (const [id, x, y, height, vx, vy] of [...tracks].sort((one, other) => (other[0] === chosen) - (one[0] === chosen))) {
-    g.strokeStyle = g.fillStyle = id === chosen ? marked : colour; g.lineWidth = id === chosen ? 2.5 : 1.5;
+  for (const [id, x, y, height, vx, vy, , , status, quality] of [...tracks].sort((one, other) => (other[0] === chosen) - (one[0] === chosen))) {
+    g.strokeStyle = g.fillStyle = id === chosen ? marked : alarming(quality) ? alarm : colour; g.lineWidth = id === chosen ? 2.5 : 1.5;
     g.globalAlpha = 0.5; g.beginPath();
     (trails.get(id) || []).forEach(([u, v], i) => { const [a, b] = place(u, v); if (i) g.lineTo(a, b); else g.moveTo(a, b); });
     g.stroke(); g.globalAlpha = 1;
     const [a, b] = place(x, y), [c, d] = place(x + LEADER * vx, y + LEADER * vy);
+    // hollow without a detection now, dashed when lost
+    g.setLineDash(status === "lost" ? [3, 3] : []);
     g.beginPath(); g.moveTo(a, b); g.lineTo(c, d); g.stroke();
-    g.beginPath(); g.arc(a, b, 4, 0, 2 * Math.PI); g.fill();
-    if (show.labels || id === chosen) { g.fillStyle = ink; label(g, taken, height === null ? String(id) : id + "  " + Math.round(height) + " m", a, b); }
+    g.beginPath(); g.arc(a, b, 4, 0, 2 * Math.PI); if (status === "confirmed") g.fill(); else g.stroke();
+    g.setLineDash([]);
+    if (show.labels || id === chosen) { g.fillStyle = ink; label(g, taken, id + (alarming(quality) ? "!" : "") + (height === null ? "" : "  " + Math.round(height) + " m"), a, b); }
   }
 }
+
+function alarming(quality) { return quality !== null && !quality[1]; }
 
 // Write a text beside a point where none is yet, or not at all.
 function label(g, taken, text, a, b) {
@@ -85,6 +90,8 @@ function label(g, taken, text, a, b) {
     if (box[0] < 0 || box[2] > canvas.clientWidth) continue;
     if (taken.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
     taken.push(box);
+    // lines behind it do not disturb
+    g.strokeStyle = style("--wash"); g.lineWidth = 3; g.strokeText(text, x, y);
     g.fillText(text, x, y);
     return;
   }
@@ -111,6 +118,7 @@ function take(picture) {
 
 // A chip for each sensor: when it was heard last, and how many plots were taken and refused.
 function chips(heard) {
+  names = heard.map(([name]) => name);
   byId("sensors").replaceChildren(...heard.map(([name, last, count, refused, silent]) => {
     const chip = document.createElement("li");
     const ago = last === null ? "not heard yet" : silent ? "silent since " + moment(last) : Math.max(0, time - last).toFixed(1) + " s ago";
@@ -128,7 +136,9 @@ function moment(time) {
 function say(word) {
   const count = plots.length ? plots[0].length : 0;
   const odd = Object.entries(counts).filter(([, number]) => number).map(([kind, number]) => ", " + number + " " + kind).join("");
-  state.textContent = (word ? word + ": " : "") + moment(time) + ", " + tracks.length + " tracks, " + count + " plots" + odd;
+  const of = (what, some) => { const number = tracks.filter(some).length; return number ? number + " " + what : null; };
+  const lives = [of("coasting", (one) => one[8] === "coasting"), of("lost", (one) => one[8] === "lost"), of("inconsistent", (one) => alarming(one[9]))].filter(Boolean);
+  state.textContent = (word ? word + ": " : "") + moment(time) + ", " + tracks.length + " tracks" + (lives.length ? " (" + lives.join(", ") + ")" : "") + ", " + count + " plots" + odd;
 }
 
 function choose(id) { chosen = id; describe(); redraw(); }
@@ -138,12 +148,16 @@ function describe() {
   detail.hidden = chosen === null;
   if (chosen === null) return;
   if (!track) { detail.textContent = "Track " + chosen + " has ended"; return; }
-  const [id, x, y, height, vx, vy, hits, started, latitude, longitude] = track;
+  const [id, x, y, height, vx, vy, hits, started, status, quality, latitude, longitude] = track;
   const heading = (Math.atan2(vx, vy) * 180 / Math.PI + 360) % 360;
-  const rows = [["Track", id], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
+  const rows = [["Track", id], ["Status", status], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
   if (latitude !== undefined) rows.push(["Place", latitude.toFixed(5) + "\u00b0, " + longitude.toFixed(5) + "\u00b0"]);
   rows.push(["Height", height === null ? "unknown" : Math.round(height) + " m"], ["Speed", Math.hypot(vx, vy).toFixed(1) + " m/s"]);
-  rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Scans with a detection", hits], ["Since", moment(started)]);
+  rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Since", moment(started)], ["Scans with a detection", hits]);
+  if (quality) {
+    quality[2].forEach((number, s) => rows.push(["from " + names[s], number]));
+    rows.push(["NIS", quality[0] === null ? "not known yet" : quality[0] + (quality[1] ? "" : ": inconsistent")]);
+  }
   const list = document.createElement("dl");
   for (const [name, value] of rows) {
     for (const [tag, text] of [["dt", name], ["dd", value]]) list.appendChild(document.createElement(tag)).textContent = text;

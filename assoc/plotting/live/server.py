@@ -21,11 +21,12 @@ import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import coordinates
+from assoc.recordings.several import NO_HEIGHT
 from assoc.scene.scene import Scene
 
 if TYPE_CHECKING:
     from assoc.tracking import Picture, Track
-    from assoc.tracking.live.pictures import Heard
+    from assoc.tracking.live.pictures import Agreement, Heard
 
 _FOLDER = Path(__file__).parent
 _FILES = {
@@ -68,7 +69,9 @@ class LivePage:
             "title": title,
             "region": scene.region.tolist(),
             "sensors": [
-                [sensor.name or str(s), *sensor.position[:2].tolist()] for s, sensor in enumerate(scene.sensors, 1)
+                [sensor.name or str(s), *sensor.position[:2].tolist()]
+                for s, sensor in enumerate(scene.sensors, 1)
+                if not sensor.name.endswith(NO_HEIGHT)
             ],
         }
         self._first = _event("scene", first)
@@ -105,27 +108,35 @@ class LivePage:
         counts : mapping of str to int, optional
             Plots that were late, refused or lost, by reason.
         """
-        tracks = [self._row(track) for track in picture.tracks]
+        tracks = [self._row(track, picture.agreements.get(track.track_id), heard) for track in picture.tracks]
         plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
         content = {
             "time": picture.time,
             "tracks": tracks,
             "plots": plots,
             "sensors": picture.sensors.tolist(),
-            "heard": [[one.name, one.last if math.isfinite(one.last) else None, *one[2:]] for one in heard],
+            "heard": [[one.name, one.last if math.isfinite(one.last) else None, *one[2:5]] for one in heard],
             "counts": dict(counts or {}),
         }
         self._push(_event("picture", content | {"ended": picture.ended}))
 
-    def _row(self, track: Track) -> list[Any]:
-        """Id, x, y, height, vx, vy, hits, start; with an origin latitude and longitude, too."""
+    def _row(self, track: Track, agreement: Agreement | None, heard: Sequence[Heard]) -> list[Any]:
+        """Id, x, y, height, vx, vy, hits, start, status, quality; with an origin latitude and longitude, too.
+
+        Quality: NIS (or null), whether it is as expected, and the measurements of each sensor in `heard`; or null.
+        """
         x, y, height = track.position.tolist()
         earth = [] if self._origin is None else coordinates(track.position, self._origin)[0].tolist()
         if earth:
             height = earth.pop()
         known = round(height, _DIGITS) if self._heights else None
         plane = np.round([x, y, *track.velocity[:2]], _DIGITS).tolist()
-        life = track.hits, round(track.started, 3)
+        quality = None
+        if agreement is not None:
+            nis = round(agreement.nis, _DIGITS) if math.isfinite(agreement.nis) else None
+            hits = [sum(agreement.hits[part] for part in one.parts) for one in heard]
+            quality = nis, agreement.consistent, hits
+        life = track.hits, round(track.started, 3), track.status, quality
         return [track.track_id, *plane[:2], known, *plane[2:], *life, *(round(angle, 6) for angle in earth)]
 
     def _push(self, event: str) -> None:

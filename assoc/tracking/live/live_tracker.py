@@ -7,6 +7,7 @@ import os
 import time as clock
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,10 +22,12 @@ from assoc.sensors.arrays import LARGEST
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
-from assoc.tracking.live.pictures import Antenna, Heard, Picture, SoundPlot
+from assoc.tracking.live.pictures import Agreement, Antenna, Heard, Picture, SoundPlot
 from assoc.tracking.live.state import LiveSettings, LiveState
+from assoc.tracking.quality import Qualities
 from assoc.tracking.stages.checking import checked
 from assoc.tracking.stages.identity_evidence import checked_identities
+from assoc.tracking.track import Step, Track
 from assoc.tracking.tracker import Tracker
 
 JUMP = 60.0
@@ -60,6 +63,8 @@ class LiveTracker:
         Seconds for which an interval stays open for delayed plots, which then are not late.
     tell : callable (str)
         Receives the lines.
+    quality : bool
+        Whether pictures say how well tracks agree with their measurements, and which sensors feed them.
     """
 
     def __init__(
@@ -72,14 +77,16 @@ class LiveTracker:
         horizon: float = HORIZON,
         wait: float = 0.0,
         tell: Callable[[str], object] = print,
+        quality: bool = False,
     ) -> None:
         spans = positive(interval, "interval"), None if turns is None else [positive(turn, "turns") for turn in turns]
         late = positive(horizon, "horizon"), positive(wait, "wait", zero=True)
-        self.settings = LiveSettings(scene, make, *spans, *late, tell)
+        self.settings = LiveSettings(scene, make, *spans, *late, tell, quality)
         self.state = LiveState(LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors])
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
+        self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
         self.counts: Counter[str] = Counter()
         """Plots used, late plots, and those that could not be used, by reason."""
@@ -125,11 +132,14 @@ class LiveTracker:
     @property
     def heard(self) -> list[Heard]:
         """What is known of each sensor."""
-        rows = zip(self.state.antennas, self._refused, strict=True)
-        return [
-            Heard(str(self.settings.name_of(s)), antenna.last, antenna.plots, refused, antenna.silent)
-            for s, (antenna, refused) in enumerate(rows)
-        ]
+        found = []
+        for s, antenna in enumerate(self.state.antennas):
+            parts = self.settings.parts[s]
+            if s == parts[0]:
+                refused = sum(self._refused[part] for part in parts)
+                name = str(self.settings.name_of(s))
+                found.append(Heard(name, antenna.last, antenna.plots, refused, antenna.silent, parts))
+        return found
 
     def leave_out(self, kind: str, line: str, sensor: int | None = None) -> None:
         """Count a plot (of a sensor, by its index) that cannot be used; report the first of its kind."""
@@ -250,6 +260,7 @@ class LiveTracker:
     def _restart(self) -> None:
         """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
+        self._qualities.keep(())
         late = LatePlots(self.settings.make(), self.settings.horizon, first_id=self.state.tracker.next_id)
         self.state = LiveState(late, [Antenna(silent=antenna.silent) for antenna in self.state.antennas])
 
@@ -277,7 +288,8 @@ class LiveTracker:
         if self.state.antennas[s].silent:
             self.settings.tell(f"{self.settings.name_of(s)} is back at {moment(time)}")
         azimuth = 0.0 if turn is None else float(z[sensor.components.index("azimuth")])
-        self.state.antennas[s] = self.state.antennas[s].after(time, azimuth, turn)
+        for part in self.settings.parts[s]:
+            self.state.antennas[part] = self.state.antennas[part].after(time, azimuth, turn)
 
     def _step(self) -> Picture:
         """Take in the interval that ends."""
@@ -294,11 +306,15 @@ class LiveTracker:
             antenna, turn = state.antennas[s], settings.turn_of(s)
             if antenna.falls_silent(end, None if settings.turns is None else settings.turns[s]):
                 state.antennas[s] = antenna = antenna._replace(silent=True)
-                where = settings.name_of(s)
-                settings.tell(f"{where} has sent nothing since {moment(antenna.last)}: it is treated as switched off")
-            sectors[s] = antenna.sector(end, interval, turn, len(now) > 0)
+                if s == settings.parts[s][0]:
+                    settings.tell(
+                        f"{settings.name_of(s)} has sent nothing since {moment(antenna.last)}: it is treated as "
+                        "switched off"
+                    )
+            sent = any(plot.time <= end and plot.sensor in settings.parts[s] for plot in state.pending)
+            sectors[s] = antenna.sector(end, interval, turn, sent)
         state.pending = [plot for plot in state.pending if plot.time > end]
-        begin = clock.perf_counter()
+        begin, step = clock.perf_counter(), None
         try:
             step = state.tracker.step(end, z, times, sectors, identities)
             for known in zip(step.assigned, step.confirmed, times, identities, strict=True):
@@ -320,7 +336,22 @@ class LiveTracker:
         scan = Scan(0, end, tuple(z), times=tuple(times)).aligned(sensors)
         found = [positions_of_scan(settings.scene.at(end), scan, s)[0] for s in range(len(sensors))]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
-        return Picture(end, tracks, ended, np.concatenate(found), owner)
+        return Picture(end, tracks, ended, np.concatenate(found), owner, self._agreements(step, tracks))
+
+    def _agreements(self, step: Step | None, tracks: Sequence[Track]) -> dict[int, Agreement]:
+        """How well the tracks agree with their measurements after a step, None if it failed."""
+        if not self.settings.quality:
+            return {}
+        late = self.state.tracker
+        if step is not None:
+            # plots that came late feed a track, too; they are not compared with its predictions
+            self._qualities.count(step.assigned)
+            last = late.past[-1]
+            on_time = replace(step, assigned=last.assigned)
+            self._qualities.compare(late.tracker, last.before, on_time, last.measurements, last.times, late.names)
+        self._qualities.keep(track.track_id for track in late.tracks)
+        known = {track.track_id: self._qualities.of_track(track.track_id) for track in tracks}
+        return {number: Agreement(one.nis, one.consistent, tuple(one.hits.tolist())) for number, one in known.items()}
 
     def summary(self) -> str:
         """One line: plots, steps and their times, plots left out, and how many tracks kept one identity."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from assoc._types import Array
@@ -35,6 +37,15 @@ class SoundPlot(NamedTuple):
         return self.sensor, self.time, self.z.tobytes()
 
 
+class Agreement(NamedTuple):
+    """How well a track agrees with its measurements; see `assoc.tracking.quality`."""
+
+    nis: float
+    consistent: bool
+    hits: tuple[int, ...]
+    """Measurements of each sensor that it took."""
+
+
 class Picture(NamedTuple):
     """The situation at the end of a step."""
 
@@ -48,10 +59,12 @@ class Picture(NamedTuple):
     """Positions of the plots that came in since the last step, (n, 3), metres."""
     sensors: Array
     """Sensor of each plot, (n,)."""
+    agreements: Mapping[int, Agreement] = MappingProxyType({})
+    """By track id, if the tracker was made with `quality`."""
 
 
 class Heard(NamedTuple):
-    """What is known of a sensor."""
+    """What is known of a sensor; plots of one radar with heights and without count as one."""
 
     name: str
     last: float
@@ -62,6 +75,8 @@ class Heard(NamedTuple):
     """Plots that could not be used."""
     silent: bool
     """Whether it is treated as switched off."""
+    parts: tuple[int, ...] = ()
+    """Its sensors in the scene."""
 
 
 class Antenna(NamedTuple):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from assoc.errors import InvalidInputError
+from assoc.recordings.several import NO_HEIGHT
 from assoc.scene.scene import Scene
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.pictures import Antenna, PlotKey, SoundPlot
@@ -27,6 +29,7 @@ class LiveSettings:
     horizon: float
     wait: float
     tell: Callable[[str], object]
+    quality: bool = False
 
     def __post_init__(self) -> None:
         if self.interval < SHORTEST:
@@ -39,7 +42,15 @@ class LiveSettings:
 
     def name_of(self, s: int) -> object:
         """Name of a sensor, or its number from 1."""
-        return self.scene.sensors[s].name or s + 1
+        return self.scene.sensors[s].name.removesuffix(NO_HEIGHT) or s + 1
+
+    @cached_property
+    def parts(self) -> list[tuple[int, ...]]:
+        """For each sensor those that share its antenna: plots of one radar with heights and without."""
+        names = [sensor.name for sensor in self.scene.sensors]
+        stems = [name.removesuffix(NO_HEIGHT) for name in names]
+        same = range(len(names))
+        return [tuple(r for r in same if r == s or (stems[r] == stems[s] and names[r] != names[s])) for s in same]
 
     def turn_of(self, s: int) -> float | None:
         """Seconds for a turn of a sensor's antenna; None where it does not turn."""
