@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 
 _SETTINGS = (
     Option("components", "NAMES",
-           "biases to estimate: range,azimuth,elevation,time,position (default range,azimuth,elevation)", listed(text)),
+           "biases to estimate: range,azimuth,elevation,gain,time,position (default range,azimuth,elevation)",
+           listed(text)),
     Option("reference", "NAMES", "sensors taken for free of bias, by name or number from 1, with commas",
            listed(text)),
     Option("range_spread", "M", "usual size of range biases, metres (default 300)", number),
     Option("angle_spread", "DEG", "usual size of azimuth and elevation biases, degrees (default 0.3)", degrees),
+    Option("gain_spread", "M", "usual gain of ranges, metres per metre (default 0.001: 1 m in each km)", number),
     Option("time_spread", "S", "usual size of clocks' biases, seconds (default 1)", number),
     Option("position_spread", "M", "usual error of sensors' positions, metres (default 300)", number),
     COMMON["seed"],

@@ -48,7 +48,7 @@ def corrected_measurements(
     sensor : Sensor
     measured : array (n, d)
     biases : mapping of component to value
-        Metres, radians, seconds.
+        Metres, radians, seconds; of a gain, metres per metre of the stated range.
     velocities : array (n, 3), optional
         Of the targets, m/s; NaN where unknown: the clock's bias then stays.
     late : array (n,) or float
@@ -64,7 +64,8 @@ def corrected_measurements(
     carried = isinstance(sensor, PositionSensor) and sensor.platform is not None
     for i, component in enumerate(sensor.components[: sensor.dim]):
         # the offset of a position that is measured from a platform is the platform's
-        z[:, i] -= 0.0 if carried else biases.get(component, 0.0)
+        gain = biases.get("gain", 0.0) * z[:, i] if component == "range" else 0.0
+        z[:, i] -= gain + (0.0 if carried else biases.get(component, 0.0))
         if sensor.angular[i]:
             z[:, i] = wrap_angle(z[:, i])
     shift = np.broadcast_to(np.asarray(late, dtype=np.float64) + biases.get("time", 0.0), (len(z),))
@@ -110,7 +111,7 @@ def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     ----------
     scene : Scene
     biases : sequence over sensors of mappings of component to value
-        range, azimuth, elevation, and x, y, z of the stated position; metres and radians.
+        range, azimuth, elevation, gain, and x, y, z of the stated position; metres, radians, metres per metre.
 
     Returns
     -------
@@ -125,7 +126,7 @@ def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     if len(biases) != count:
         raise InvalidInputError(f"biases: expected one mapping for each of {count} sensors, got {len(biases)}")
     for s, (sensor, values) in enumerate(zip(scene.sensors, biases, strict=True)):
-        known = (*AXES, *sensor.components[: sensor.dim])
+        known = (*AXES, *sensor.components[: sensor.dim], *(["gain"] if "range" in sensor.components else []))
         for name, value in values.items():
             if name not in known or not is_number(value):
                 raise InvalidInputError(

@@ -1,7 +1,8 @@
 """Normal equations of biases, from which the targets' positions are eliminated, compiled.
 
 A measurement is z = h(p) + B b + noise, with p the target's position and b the biases; B is 1 for a component's own
-bias, H for that of the sensor's position, and -H v for that of its clock, with H = dh/dp and v the target's velocity.
+bias, the range for that of its gain, H for that of the sensor's position, and -H v for that of its clock, with
+H = dh/dp and v the target's velocity.
 Each tuple has an unknown position. Eliminating it from the least squares (Schur complement) leaves the weight
 W = R^-1 - R^-1 H (H' R^-1 H)^-1 H' R^-1 on the residuals of the tuple; the information of all targets on the biases is
 the sum of B' W B and B' W nu. Biases that another position explains as well get no information.
@@ -18,7 +19,7 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays
 from assoc.costs.symmetric import inverse
-from assoc.registration.terms import MEASURED, SITE, TermArrays
+from assoc.registration.terms import GAIN, MEASURED, SITE, TermArrays
 from assoc.sensors.codes import BEARING, POSITION
 from assoc.sensors.kernels.dispatch import linearise, wrap
 
@@ -58,9 +59,12 @@ class NormalEquations(NamedTuple):
 
 
 @inner_njit
-def _bias_column(kind: int, index: int, H: Array, v: Array, d: int, column: Array) -> None:
+def _bias_column(kind: int, index: int, H: Array, v: Array, z: Array, d: int, column: Array) -> None:
     """Write the derivative of a measurement by a bias into `column` (3,)."""
     column[:] = 0.0
+    if kind == GAIN:
+        column[0] = z[0]
+        return
     for i in range(d):
         if kind == MEASURED:
             column[i] = 1.0 if i == index else 0.0
@@ -171,7 +175,7 @@ def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, l
             s = terms.sensor[j]
             if seen[s]:
                 d = sensors.dim[s]
-                _bias_column(terms.kind[j], terms.entry[j], H[s], tuples.velocity[t], d, columns[j])
+                _bias_column(terms.kind[j], terms.entry[j], H[s], tuples.velocity[t], tuples.z[t, s], d, columns[j])
                 pull[j] = _weigh_bias(sensors.weight[s], H[s], d, columns[j], left[t, s], WB[j], Y[j])
         for j in range(n):
             s = terms.sensor[j]

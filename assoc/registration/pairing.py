@@ -115,7 +115,11 @@ def widened(scene: Scene, terms: Sequence[Term], deviations: Array) -> Scene:
             aside = float(np.linalg.norm([*(by_sensor.get(axis, 0.0) for axis in AXES[:2]), away]))
             above = float(np.linalg.norm([by_sensor.get("z", 0.0), 0.3 * aside]))
             distance = _usual_distance(scene, s)
-            lengths = {"range": aside, "azimuth": aside / distance, "elevation": above / distance}
+            lengths = {
+                "range": math.hypot(aside, by_sensor.get("gain", 0.0) * distance),
+                "azimuth": aside / distance,
+                "elevation": above / distance,
+            }
             more = [np.hypot(by_sensor.get(name, 0.0), lengths[name]) for name in sensor.components[: sensor.dim]]
         most = [1.0 if name in ANGLES else np.inf for name in sensor.components[: sensor.dim]]
         variances = np.minimum(np.array(more), most) ** 2

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from assoc._parameters import Parameters
 from assoc.errors import InvalidInputError
 
-COMPONENTS = ("range", "azimuth", "elevation", "time", "position")
+COMPONENTS = ("range", "azimuth", "elevation", "gain", "time", "position")
 """Biases that can be estimated."""
 
 
@@ -23,12 +23,13 @@ class RegistrationParameters(Parameters):
     Attributes
     ----------
     components : tuple of str
-        Of `COMPONENTS`; those that a sensor does not measure are ignored. "position" is an error of a sensor's
+        Of `COMPONENTS`; those that a sensor does not measure are ignored. "gain" is an error of ranges in proportion
+        to the range (the speed of the pulse, its extra way through the air). "position" is an error of a sensor's
         stated position; sensors that report positions are always estimated in x, y (and z).
     reference : tuple of str
         Names of sensors without bias (or their numbers from 1).
-    range_spread, angle_spread, time_spread, position_spread : float
-        Metres, radians, seconds, metres.
+    range_spread, angle_spread, gain_spread, time_spread, position_spread : float
+        Metres, radians, metres per metre, seconds, metres.
     drift : float
         Only online: change of biases in an hour, as a share of their spread.
     max_tuples : int
@@ -41,6 +42,7 @@ class RegistrationParameters(Parameters):
     reference: tuple[str, ...] = ()
     range_spread: float = 300.0
     angle_spread: float = math.radians(0.3)
+    gain_spread: float = 0.001
     time_spread: float = 1.0
     position_spread: float = 300.0
     drift: float = 0.1
@@ -57,14 +59,14 @@ class RegistrationParameters(Parameters):
         for component in self.components:
             if component not in COMPONENTS:
                 raise InvalidInputError(f"components: unknown {component!r}; known: {', '.join(COMPONENTS)}")
-        self._number("range_spread", "angle_spread", "time_spread", "position_spread", above=0.0)
+        self._number("range_spread", "angle_spread", "gain_spread", "time_spread", "position_spread", above=0.0)
         self._number("drift", least=0.0)
         self._whole("max_tuples")
         self._whole("seed", least=0)
 
     def spread(self, component: str) -> float:
-        """Standard deviation of the biases of a component: range, azimuth, elevation, time, x, y or z."""
-        named = {"range": self.range_spread, "time": self.time_spread}
+        """Standard deviation of the biases of a component: range, gain, azimuth, elevation, time, x, y or z."""
+        named = {"range": self.range_spread, "gain": self.gain_spread, "time": self.time_spread}
         if component in ("azimuth", "elevation"):
             return self.angle_spread
         return named.get(component, self.position_spread)

@@ -16,8 +16,8 @@ from assoc.sensors.base import ANGLES
 from assoc.sensors.codes import CODES
 
 AXES = ("x", "y", "z")
-MEASURED, SITE, TIME = 0, 1, 2
-"""Kinds of terms in kernels: a measured component, the position along an axis, the clock."""
+MEASURED, SITE, TIME, GAIN = 0, 1, 2, 3
+"""Kinds of terms in kernels: a measured component, the position along an axis, the clock, the scale of ranges."""
 
 
 class Term(NamedTuple):
@@ -26,22 +26,22 @@ class Term(NamedTuple):
     sensor: int
     """Number of the sensor, from 0."""
     component: str
-    """range, azimuth, elevation, time, or x, y, z."""
+    """range, gain, azimuth, elevation, time, or x, y, z."""
 
     @property
     def unit(self) -> str:
-        """m, rad or s."""
-        return "rad" if self.component in ANGLES else "s" if self.component == "time" else "m"
+        """m, rad, s, or m/m of a gain."""
+        return "rad" if self.component in ANGLES else {"time": "s", "gain": "m/m"}.get(self.component, "m")
 
     @property
     def shown_unit(self) -> str:
-        """m, deg or s, for people."""
-        return "deg" if self.component in ANGLES else self.unit
+        """m, deg, s or m/km, for people."""
+        return "deg" if self.component in ANGLES else "m/km" if self.component == "gain" else self.unit
 
     @property
     def scale(self) -> float:
         """Factor from `unit` to `shown_unit`."""
-        return math.degrees(1.0) if self.component in ANGLES else 1.0
+        return math.degrees(1.0) if self.component in ANGLES else 1e3 if self.component == "gain" else 1.0
 
 
 def label_of(sensors: Sequence[Sensor], number: int) -> str:
@@ -83,6 +83,8 @@ def _components(sensor: Sensor, wanted: Sequence[str]) -> list[str]:
         found = list(AXES[: sensor.dim])
     else:
         found = [name for name in sensor.components[:3] if name in wanted]
+        if "gain" in wanted and "range" in sensor.components:
+            found.append("gain")
         if "position" in wanted:
             found += AXES if isinstance(sensor, Radar3D) else AXES[:2]
     # bearings have no information on motion; a platform's own motion would have to be known by the same clock
@@ -97,7 +99,7 @@ class TermArrays(NamedTuple):
     sensor: Array
     """int64 (n,)."""
     kind: Array
-    """MEASURED, PLACE or TIME, int64 (n,)."""
+    """MEASURED, SITE, TIME or GAIN, int64 (n,)."""
     entry: Array
     """Component of the measurement, or axis, int64 (n,)."""
 
@@ -108,6 +110,9 @@ def term_arrays(terms: Sequence[Term], sensors: Sequence[Sensor]) -> TermArrays:
     for term in terms:
         if term.component == "time":
             kind.append(TIME)
+            index.append(0)
+        elif term.component == "gain":
+            kind.append(GAIN)
             index.append(0)
         elif term.component in AXES:
             kind.append(SITE)

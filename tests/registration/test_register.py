@@ -431,3 +431,20 @@ def test_where_all_is_at_sea_level_heights_take_no_part():
     region = [[-15e3, 15e3], [-15e3, 15e3], [0.0, 1.0]]
     found = register(Scene([radar, ais], np.arange(40.0), scans, region), reference=["AIS"])
     assert found.biases[0] == pytest.approx(50.0, abs=4 * found.deviations[0]) and found.deviations[0] < 6.0
+
+
+@pytest.mark.parametrize("gain", [2e-3, -1e-3])
+def test_gain_of_ranges(gain):
+    truth = [{"range": 120.0, "gain": gain}, {"azimuth": 0.002}, {"range": -80.0}]
+    scene = with_biases(scene_of(radars(3), seed=4), truth)
+    found = register(scene, components=("range", "gain", "azimuth"))
+    off = found.biases - truth_of(found, truth)
+    assert (np.abs(off) < 4.5 * found.deviations).all()
+    mine = [term.component == "gain" for term in found.terms]
+    assert found.deviations[mine].max() < 5e-4 and found.to_frame()["unit"][np.flatnonzero(mine)[0]] == "m/km"
+    # without the gain ranges stay wrong
+    left = found.correct(scene).measurements[0][0][:, 0] - scene_of(radars(3), seed=4).measurements[0][0][:, 0]
+    short = (
+        register(scene).correct(scene).measurements[0][0][:, 0] - scene_of(radars(3), seed=4).measurements[0][0][:, 0]
+    )
+    assert np.abs(left).max() < 0.5 * np.abs(short).max()
