@@ -22,6 +22,7 @@ from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.doubles import Doubles
 from assoc.tracking.state import Nursery, TrackerState
 from assoc.tracking.track_batch import one_state
 
@@ -99,6 +100,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         "filter_rng": np.array("" if state.rng is None else json.dumps(state.rng)),
         **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
         **{f"lost.{name}": value for name, value in state.lost.arrays().items()},
+        **{f"doubles.{name}": value for name, value in state.doubles._asdict().items()},
         **settings.method.arrays(state.own),
     }
     if state.registration is not None:
@@ -133,7 +135,8 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     good = turns.shape == model.turns.shape and ((turns >= 0) & (turns <= 1 + 1e-6)).all()
     saved.require(good, "turns", f"{len(model.turns)} shares of a turn")
     state = model._replace(
-        tracks=tracks, lost=lost, turns=turns, time=None if math.isnan(time) else time, scan=scan, pace=pace,
+        tracks=tracks, lost=lost, doubles=_doubles(model.doubles, saved.part("doubles.")), turns=turns,
+        time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
         registration=None if model.registration is None else model.registration.restored(saved),
@@ -151,6 +154,15 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
     saved.require(good, "unseen", "how often each sensor has missed each track")
     return state._replace(nursery=Nursery(inner, Unseen(ids, misses)))
+
+
+def _doubles(model: Doubles, saved: Saved) -> Doubles:
+    """Pairs of tracks in these arrays, checked."""
+    ids, counts = saved["ids"], saved["counts"]
+    saved.require(ids.shape == (len(ids), 2) and (ids >= 1).all(), "ids", "two track ids in each row")
+    good = counts.shape == (len(ids), *model.counts.shape[1:]) and np.isfinite(counts).all() and (counts >= 0).all()
+    saved.require(good, "counts", f"numbers >= 0 of the shape {(len(ids), *model.counts.shape[1:])}")
+    return Doubles(ids, counts)
 
 
 def _estimates(model: Estimates, saved: Saved) -> Estimates:

@@ -15,6 +15,7 @@ from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import Estimates
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.stages.doubles import Doubles
 from assoc.tracking.stages.identity_evidence import Identities
 from assoc.tracking.track_batch import TrackBatch, empty_batch
 
@@ -30,6 +31,8 @@ class TrackerState(NamedTuple):
     """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
     lost: TrackBatch
     """Confirmed tracks that ended not long ago; see `assoc.tracking.stages.taking_up`."""
+    doubles: Doubles
+    """Pairs of tracks that may have one target; see `assoc.tracking.stages.merging`."""
     time: float | None = None
     """Time of the last scan, seconds; None before the first."""
     scan: int = 0
@@ -71,6 +74,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         np.ones(count),
         settings.method.begun(settings, tracks),
         empty_batch(settings.filter),
+        Doubles.none(count),
         registration=settings.registration,
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,

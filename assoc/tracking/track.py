@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -136,6 +136,9 @@ class Step(Decision):
         hypothesis trackers the scan that left the window, if any.
     ended : int64 array
         Confirmed tracks deleted in this step.
+    merged : int64 array (K, 2)
+        Confirmed tracks that were found to have the target of an older one, and that one; see
+        `assoc.tracking.stages.merging`. They are in `ended`, too.
     late, refused : int
         Measurements older than the last scan that were used, and those too old for that; see
         `assoc.tracking.LatePlots`.
@@ -143,6 +146,7 @@ class Step(Decision):
 
     final: tuple[Decision, ...] = ()
     ended: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    merged: Array = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     late: int = 0
     refused: int = 0
 
@@ -170,3 +174,11 @@ def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: A
     """Make a decision from track ids and the ids of confirmed tracks."""
     ids = tuple(np.asarray(array, dtype=np.int64) for array in assigned)
     return Decision(scan, time, ids, tuple(np.isin(array, confirmed_ids) & (array > 0) for array in ids))
+
+
+def renamed(step: Step, ids: Array, names: Array) -> Step:
+    """The step with these names (K,) in place of ids (K,)."""
+    name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
+    assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
+    final = tuple(replace(one, assigned=assigned) if one.scan == step.scan else one for one in step.final)
+    return replace(step, assigned=assigned, final=final)

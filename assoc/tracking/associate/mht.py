@@ -134,7 +134,9 @@ class TrackTrees(DeferringMethod):
             tracks = tracks.with_confirmed(tracks.confirmed | same_tree(tracks.track_id.copy(), new))
         now = own.window.decision(0, scan, tracks, np.flatnonzero(own.chosen))
         final: tuple[Decision, ...] = ()
-        stay = ~to_delete(progress, tracks)
+        gone = to_delete(progress, tracks)
+        # else the tree would go on by some branch that takes another target's measurement in time
+        stay = ~(gone | same_tree(tracks.track_id.copy(), gone & own.chosen & tracks.confirmed))
         if len(own.window.times) == self.depth:
             kept, speakers = self._decided(tracks, own, scan)
             final = (own.window.decision(self.depth - 1, scan, tracks, speakers),)

@@ -146,9 +146,10 @@ class ClusteredHypotheses(DeferringMethod):
             tracks, own = _kept(tracks, own, _agreeing(tracks, own))
             final = (own.window.decision(self.depth - 1, scan, tracks, own.best),)
             own = own._replace(window=own.window.closed())
-        # a track is deleted if all its branches are to be deleted
-        ids = tracks.track_id
-        gone = ~np.isin(ids, ids[~to_delete(progress, tracks)])
+        # a track is deleted if all its branches are to be deleted, or that of the best hypothesis
+        ids, late = tracks.track_id, to_delete(progress, tracks)
+        best = own.best[(late & tracks.confirmed)[own.best]]
+        gone = ~np.isin(ids, ids[~late]) | np.isin(ids, ids[best])
         tracks, own = _without(tracks, own, gone)
         tracks, own = _kept(tracks, own, _split(tracks, own))
         ended = np.setdiff1d(known, tracks.track_id)

@@ -9,7 +9,6 @@ new starts are matched by the assignment problem of these log likelihood ratios.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from assoc.problem import AssignmentProblem
 from assoc.tracking.births.initiation import velocity_components
 from assoc.tracking.progress import Progress
 from assoc.tracking.stages.life_cycle import OVERLOOKED
-from assoc.tracking.track import Step
+from assoc.tracking.track import renamed
 from assoc.tracking.track_batch import TrackBatch
 
 # ends are kept for this share of a target's mean lifetime
@@ -43,7 +42,7 @@ def take_up(progress: Progress) -> Progress:
         if len(start):
             ids, names = new.track_id[start], old.track_id[end]
             progress = progress._replace(state=method.renamed(progress.state, ids, names))
-            lost, step = lost[~np.isin(lost.track_id, names)], _renamed(step, ids, names)
+            lost, step = lost[~np.isin(lost.track_id, names)], renamed(step, ids, names)
     ended = known[np.isin(known.track_id, step.ended)]
     # of several branches the best
     ended = ended[np.lexsort((-ended.score, ended.track_id))]
@@ -103,11 +102,3 @@ def _matched(progress: Progress, new: TrackBatch, old: TrackBatch) -> tuple[Arra
 def _square(off: Array, spread: Array) -> Array:
     """Squared Mahalanobis distances, (K,)."""
     return np.asarray((off * np.linalg.solve(spread, off[:, :, None])[:, :, 0]).sum(axis=1))
-
-
-def _renamed(step: Step, ids: Array, names: Array) -> Step:
-    """The step with these names (K,) in place of ids (K,)."""
-    name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
-    assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
-    final = tuple(replace(one, assigned=assigned) if one.scan == step.scan else one for one in step.final)
-    return replace(step, assigned=assigned, final=final)
