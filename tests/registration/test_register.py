@@ -368,7 +368,7 @@ def test_biases_that_are_none_are_refused():
     scene = scene_of(radars(2), 1, 2)
     for biases, match in (
         ([{}], "biases: expected one mapping for each of 2 sensors, got 1"),
-        ([{}, {"rnge": 100.0}], "biases of sensor 1: .* range, azimuth, elevation, got 'rnge': 100.0"),
+        ([{}, {"rnge": 100.0}], "biases of sensor 1: .* range, azimuth, elevation, gain, got 'rnge': 100.0"),
         ([{"time": 1.0}, {}], "biases of sensor 0"),
         ([{"range": "100"}, {}], "biases of sensor 0"),
         ([{}, None], "biases"),
