@@ -3,7 +3,7 @@
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from functools import cache
 from typing import Any, NamedTuple
 from unittest import mock
@@ -25,6 +25,7 @@ from assoc.solvers.tabu import moves
 
 SOLVERS = ("aco", "genetic", "tabu")
 WHOLE, ALONE = "all parts", 'refinement="none"'
+_UNDIVED, _LOCAL = "no dives in the linear program", 'refinement="local"'
 # iterations
 _NEVER = 1_000_000_000
 
@@ -46,11 +47,6 @@ class Part(NamedTuple):
     base: str = WHOLE
 
 
-def _unchanged(self: Any, owner: Any, weight: float, *_: Any) -> float:
-    """Cluster search that finds nothing."""
-    return weight
-
-
 def _never(*_: Any) -> bool:
     return False
 
@@ -60,18 +56,21 @@ def _uncut(packing: Packing, duals: Any, *_: Any) -> Root:
     return plain_root(packing, duals)
 
 
-_searched = diving.search_shortly
-
-
-def _forgetful(*arguments: Any) -> Any:
-    """A search at the end of a dive that knows nothing of pairs from those before."""
-    for known in arguments[-1]:
-        known[:] = 0
-    return _searched(*arguments)
-
-
 def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextManager[Any]]:
     return lambda: mock.patch.object(owner, name, new)
+
+
+_no_dives = _replaced(Component, "dives", property(_never))
+_no_clusters = _replaced(ClusterSearch, "improve", lambda self, packing, owner, weight, *_: weight)
+_no_rematching = _replaced(component, "improve_dimensionwise", lambda *_: 0.0)
+
+
+@contextmanager
+def _both(*contexts: Callable[[], AbstractContextManager[Any]]) -> Iterator[None]:
+    with ExitStack() as stack:
+        for context in contexts:
+            stack.enter_context(context())
+        yield
 
 
 @contextmanager
@@ -186,17 +185,14 @@ OWN = (
 """Parts that one of the three has and the others have not."""
 
 SHARED = (
-    Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
+    Part(_UNDIVED, SOLVERS, without=_no_dives),
     Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
-    Part("nothing kept of pairs from dive to dive", SOLVERS, without=_replaced(diving, "search_shortly", _forgetful)),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Team, "_branch", lambda self: None)),
-    Part(
-        "no cluster search",
-        SOLVERS,
-        without=_replaced(ClusterSearch, "improve", lambda self, packing, owner, weight, *_: weight),
-    ),
-    Part("no dimensionwise search", SOLVERS, without=_replaced(component, "improve_dimensionwise", lambda *_: 0.0)),
-    Part('refinement="local"', SOLVERS, {"refinement": "local"}),
+    Part("no cluster search", SOLVERS, without=_no_clusters),
+    Part("no dimensionwise search", SOLVERS, without=_no_rematching),
+    Part("no dives, no cluster search", SOLVERS, without=lambda: _both(_no_dives, _no_clusters), base=_UNDIVED),
+    Part(_LOCAL, SOLVERS, {"refinement": "local"}),
+    Part("local, no dimensionwise search", SOLVERS, {"refinement": "local"}, _no_rematching, _LOCAL),
     Part(ALONE, SOLVERS, {"refinement": "none"}),
 )
 """What all three have."""

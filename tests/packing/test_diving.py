@@ -183,17 +183,6 @@ def test_the_core_is_what_the_program_with_cuts_would_take():
     assert least[0] < -1.0 and least[1] > -1e-6
 
 
-def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
-    diver, rng = plain, np.random.default_rng(0)
-    known, tried = diver._lessons, []
-    for share in (1.0, 1.0, 0.6, 0.6):
-        diver.share = share
-        diver.dive(np.ones(priced.packing.num_columns), 4.0, rng, np.inf, np.inf)
-        tried.append(int(known.tried.sum()))
-    # a pair tried often enough by one search is not tried by another
-    assert 0 < tried[0] <= tried[1] <= tried[-1] and known.tried.max() <= 2
-
-
 def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
     one = component(open_problem(), "full")
     assert one.packing.num_rows < 30 and not one.dives
@@ -308,7 +297,7 @@ def test_the_rest_is_covered_as_well_as_can_be(priced):
         columns = np.logical_and.reduce([_left(core, j) for j in fixed])
         best = _milp(core, columns, fixed)
         at._cutoff = min(cutoff, best - 1e-6) if cutoff < 0.0 else cutoff
-        found, done = at.completed(Limits(1e-9, np.inf, 10_000, np.inf), diver._lessons)
+        found, done = at.completed(Limits(1e-9, np.inf, 10_000, np.inf))
         assert done and at.fixed.tolist() == fixed
         if cutoff < 0.0:
             assert found.tolist() == fixed

@@ -9,7 +9,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
-from assoc.packing.branching.short_search import Part, no_lessons, search_shortly
+from assoc.packing.branching.short_search import Part, search_shortly
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
@@ -72,7 +72,7 @@ def test_what_is_found_is_the_best_of_its_part():
             linear.back()
             linear.solve(columns=part.columns, slack=part.slack)
             best = best_of(packing, part)
-            found, done = search_shortly(packing, linear, part, np.inf, NO_LIMITS, no_lessons(packing))
+            found, done = search_shortly(packing, linear, part, np.inf, NO_LIMITS)
             assert done
             if best == np.inf:
                 assert not found.size
@@ -83,7 +83,7 @@ def test_what_is_found_is_the_best_of_its_part():
             rows = rows[rows >= 0]
             assert np.unique(rows).size == rows.size and np.isin(np.flatnonzero(~packing.slack), rows).all()
             assert packing.weights[found].sum() == pytest.approx(best, abs=1e-8)
-            found, done = search_shortly(packing, linear, part, best - 1e-6, NO_LIMITS, no_lessons(packing))
+            found, done = search_shortly(packing, linear, part, best - 1e-6, NO_LIMITS)
             assert done and not found.size
     assert feasible > 25
 
@@ -98,7 +98,7 @@ def test_it_searches_what_is_left_alone(monkeypatch):
         linear = begun(packing)
         part = part_of(packing, rng, 0.9, 2)
         linear.solve(columns=part.columns, slack=part.slack)
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS, no_lessons(packing))
+        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
         arrays, program = seen.pop()
         covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
         assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
@@ -115,7 +115,7 @@ def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
         relaxed = linear.solve(columns=part.columns, slack=part.slack)
         if relaxed.status != OPTIMAL:
             continue
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS, no_lessons(packing))
+        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
         root = roots.pop()
         begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         fixed = float(packing.weights[part.fixed].sum())
@@ -124,42 +124,12 @@ def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
     assert warm > 10
 
 
-def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():
-    """By the packing's row numbers, not those of the remainder."""
-    rng, learnt = np.random.default_rng(7), 0
-    for packing in packings(10, 43):
-        linear, lessons = begun(packing), no_lessons(packing)
-        search_shortly(packing, linear, everything(packing), np.inf, NO_LIMITS, lessons)
-        gain, tried = lessons.gain.copy(), lessons.tried.copy()
-        if not tried.any():
-            continue
-        # a search without nodes leaves all as it was
-        part = part_of(packing, rng, 1.0, 2)
-        linear.back()
-        linear.solve(columns=part.columns, slack=part.slack)
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS._replace(nodes=0), lessons)
-        assert (lessons.gain == gain).all() and (lessons.tried == tried).all()
-        # pairs of removed rows stay unchanged; others are updated at the packing's row numbers
-        fresh = no_lessons(packing)
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS, fresh)
-        _, first, second = np.nonzero(fresh.tried)
-        gone = np.unique(packing.cols[part.fixed])
-        assert not np.isin(first, gone).any() and not np.isin(second, gone).any()
-        together = np.zeros((packing.num_rows, packing.num_rows), dtype=bool)
-        for one in packing.cols:
-            rows = one[one >= 0]
-            together[np.ix_(rows, rows)] = True
-        assert together[first, second].all()
-        learnt += first.size
-    assert learnt
-
-
 def test_a_search_of_few_nodes_says_that_it_did_not_end():
     ended = []
     for packing in packings(8, 44):
         linear = begun(packing)
         for nodes in (1, 100_000):
-            limits, lessons = NO_LIMITS._replace(nodes=nodes), no_lessons(packing)
-            ended.append(search_shortly(packing, linear, everything(packing), np.inf, limits, lessons)[1])
+            limits = NO_LIMITS._replace(nodes=nodes)
+            ended.append(search_shortly(packing, linear, everything(packing), np.inf, limits)[1])
         assert ended[-1]
     assert not all(ended)

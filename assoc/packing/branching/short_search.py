@@ -39,34 +39,13 @@ class Part(NamedTuple):
     fixed: NDArray[np.int64]
 
 
-class Lessons(NamedTuple):
-    """Pseudo-costs of pairs of rows, shared by the short searches of a packing.
-
-    Attributes
-    ----------
-    gain, tried : float32 and uint8 arrays, shape (2, R, R)
-        As in pairs.py (`Trials`); valid in every program of the packing.
-    """
-
-    gain: NDArray[np.float32]
-    tried: NDArray[np.uint8]
-
-
-def no_lessons(packing: Packing) -> Lessons:
-    """No pair has been tried."""
-    shape = (2, packing.num_rows, packing.num_rows)
-    return Lessons(np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
-
-
 def short_memory(packing: Packing, rows: float) -> float:
     """Most bytes that such a search takes in a program of ``rows`` rows."""
-    # open nodes, and the pseudo-costs of pairs with a copy
-    nodes = 60.0 * packing.num_columns
-    return 20.0 * packing.num_rows**2 + nodes + work_memory(rows, packing.num_columns, packing.num_sensors)
+    return 60.0 * packing.num_columns + work_memory(rows, packing.num_columns, packing.num_sensors)
 
 
 def search_shortly(
-    packing: Packing, linear: LinearProgram, part: Part, cutoff: float, limits: Limits, lessons: Lessons
+    packing: Packing, linear: LinearProgram, part: Part, cutoff: float, limits: Limits
 ) -> tuple[NDArray[np.int64], bool]:
     """Search the part for which a program was just solved.
 
@@ -79,8 +58,6 @@ def search_shortly(
     cutoff : float
         Only solutions of less weight are searched for.
     limits : Limits
-    lessons : Lessons
-        Those of the packing; updated.
 
     Returns
     -------
@@ -93,14 +70,10 @@ def search_shortly(
     if rest is None:
         return nothing, True
     work = new_work(_arrays(packing, rest), rest.program, rest.slack)
-    rows = rest.rows[rest.rows < packing.num_rows]
-    pairs = np.ix_(np.arange(2), rows, rows)
-    work.trials.gain[:], work.trials.tried[:] = lessons.gain[pairs], lessons.tried[pairs]
     no_sets = np.zeros((0, packing.num_rows), dtype=np.bool_)
     nodes = OpenNodes(Root(rest.program, rest.slack, rest.variable, rest.duals, no_sets))
     below = cutoff - float(packing.weights[part.fixed].sum())
     left, _, count, _ = search_depth_first(work, nodes.arrays, 1, below, limits)
-    lessons.gain[pairs], lessons.tried[pairs] = work.trials.gain, work.trials.tried
     found = nothing if count < 0 else np.concatenate([part.fixed, rest.columns[work.found[:count]]])
     return found, left == 0
 

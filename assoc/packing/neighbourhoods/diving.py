@@ -11,7 +11,7 @@ choices before it and the potential of the remaining columns. The first choices 
 at a time. The last ones cause most of a dive's loss: the remaining rows fit together badly, without any single choice
 at fault. So the dive stops while a share of the rows is open, or before choices that raise the bound beyond the best
 cover, and branch and bound (branching/short_search.py) covers the rest as a separate problem. The share grows when
-these searches end early, and shrinks when they do not finish. Their pseudo-costs of pairs are kept from dive to dive.
+these searches end early, and shrinks when they do not finish.
 
 References
 ----------
@@ -30,7 +30,7 @@ from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import MOST_ROWS, root_with_cuts
-from assoc.packing.branching.short_search import Lessons, Part, no_lessons, search_shortly, short_memory
+from assoc.packing.branching.short_search import Part, search_shortly, short_memory
 from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import basis_of
@@ -95,7 +95,6 @@ class Diver:
         self._program = LinearProgram.extended(self._core, root.program, root.slack, basis)
         self._relaxed = self._program.solve(deadline=deadline)
         self._program.mark()
-        self._lessons = no_lessons(self._core)
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
@@ -156,7 +155,7 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-        found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline), self._lessons)
+        found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         own_all(self._packing.arrays.cols, self._core.origin[found], owner)
@@ -242,7 +241,7 @@ class _Descent:
         """The fixed columns."""
         return np.array(self._fixed, dtype=np.int64)
 
-    def completed(self, limits: Limits, lessons: Lessons) -> tuple[NDArray[np.int64], bool]:
+    def completed(self, limits: Limits) -> tuple[NDArray[np.int64], bool]:
         """Search for a cover lighter than the cutoff with the fixed columns; if none is found, return only these.
 
         Also returns whether the search came to its end.
@@ -251,5 +250,5 @@ class _Descent:
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
         slack = self._packing.slack & ~self._covered
         part = Part(columns, slack, self.fixed)
-        found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits, lessons)
+        found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits)
         return (found if found.size else self.fixed), done
