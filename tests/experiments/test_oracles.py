@@ -11,26 +11,15 @@ from assoc.problem import AssignmentProblem
 from experiments.common.checking import InfeasibleAnswerError, check_answer
 from tests import oracles
 from tests.reliability.exact import exact_marginals
-
-BLACKMAN_POPOLI = (
-    "011:10.2 021:4.7 022:5.5 101:6.8 102:5.2 110:6.8 120:10.9 111:18 112:14.8 121:17 122:9.9 "
-    "201:13.2 202:10.6 210:4.5 220:11.1 212:14.1 221:9 222:16.7"
-)
+from tests.solvers.test_against_brute_force import blackman_popoli
 
 
-@pytest.fixture
-def blackman_popoli() -> AssignmentProblem:
-    """Tables 7.4-7.6 of Blackman & Popoli: three sensors with two measurements each, cost = -score."""
-    rows = [entry.split(":") for entry in BLACKMAN_POPOLI.split()]
-    return AssignmentProblem([[int(i) for i in key] for key, _ in rows], [-float(v) for _, v in rows], [2, 2, 2])
-
-
-def test_blackman_popoli_ranking(blackman_popoli: AssignmentProblem) -> None:
-    ranked = oracles.all_solutions(blackman_popoli)
+def test_blackman_popoli_ranking() -> None:
+    ranked = oracles.all_solutions(blackman_popoli())
     best = [-34.7, -31.7, -31.1, -29.1, -28.6, -28.0, -27.6, -26.9]
     assert [s.cost for s in ranked[:8]] == pytest.approx(best)
     assert ranked[0].tuples == ((1, 1, 1), (2, 2, 2))
-    assert oracles.brute_force(blackman_popoli) == pytest.approx(-34.7)
+    assert oracles.brute_force(blackman_popoli()) == pytest.approx(-34.7)
 
 
 def test_axial_enumeration_is_all_permutations() -> None:
@@ -91,8 +80,8 @@ def test_oracles_agree_and_answers_check() -> None:
     assert 0 < infeasible < 50
 
 
-def test_marginals_are_those_of_the_enumeration(blackman_popoli: AssignmentProblem) -> None:
-    for problem in (blackman_popoli, *oracles.small_problems(20, seed=4, dummy=True)):
+def test_marginals_are_those_of_the_enumeration() -> None:
+    for problem in (blackman_popoli(), *oracles.small_problems(20, seed=4, dummy=True)):
         solutions = oracles.all_solutions(problem)
         weights = [math.exp(solutions[0].cost - one.cost) for one in solutions]
         for key, found in exact_marginals(problem).items():
