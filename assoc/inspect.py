@@ -38,7 +38,7 @@ def _inspect(words: list[str]) -> None:
         found = read_radars(given["file"])
         for line in _lines(found):
             print_lines(line)
-        wrong = doubts(found)
+        wrong = suspicious(found)
         print_lines("nothing looks wrong" if not wrong else "looks wrong:")
         for line in wrong:
             print_lines(f"  {printable(line)}")
@@ -89,7 +89,7 @@ def _lines(found: Radars) -> list[str]:
     return lines
 
 
-def doubts(found: Radars) -> list[str]:
+def suspicious(found: Radars) -> list[str]:
     """What looks wrong, a line each; units are warned of when the files are read."""
     import numpy as np
 

@@ -22,7 +22,7 @@ _ENDLESS = 1 << 60
 _SHARE = 0.9
 
 
-def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
+def require(needed: float, what: str, advice: str, *, here: bool = True) -> None:
     """Refuse work that would take more memory than there is.
 
     Parameters
@@ -33,7 +33,7 @@ def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
         What the memory is for, naming the argument that causes it; the message begins with it.
     advice : str
         What to change.
-    own : bool
+    here : bool
         Whether this process takes the memory, so that the limit of its address space applies.
 
     Raises
@@ -43,7 +43,7 @@ def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
     """
     if needed <= _SMALL:
         return
-    free = available(own)
+    free = available(here)
     if not needed <= free:
         raise LimitExceededError(
             f"{what} would take about {in_words(needed)} of memory, {in_words(free)} are available; {advice}"
@@ -62,9 +62,9 @@ def at_most(count: int, each: float) -> int:
     return min(count, int(max(1.0, min(available() / each, 2.0**31))))
 
 
-def available(own: bool = True) -> float:
+def available(here: bool = True) -> float:
     """Bytes that this process (or others that it starts) may still take; infinite where the system gives no figures."""
-    return _SHARE * max(min(_of_machine(), _of_group(), _of_address_space() if own else math.inf), 0.0)
+    return _SHARE * max(min(_of_machine(), _of_group(), _of_address_space() if here else math.inf), 0.0)
 
 
 def in_words(count: float) -> str:

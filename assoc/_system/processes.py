@@ -62,7 +62,7 @@ def parallel_map(
     if jobs <= 1:
         yield from map(task, items)
         return
-    memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
+    memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", here=False)
     content = _packed(task)
     workers: list[subprocess.Popen[bytes]] = []
     idle: queue.SimpleQueue[subprocess.Popen[bytes]] = queue.SimpleQueue()

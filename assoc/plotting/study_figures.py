@@ -192,8 +192,8 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if place < _MOST_CURVES:
                 label = setting_title(row, names, several)
-                look = {"color": colour(place), "linestyle": DASHES[place % len(DASHES)]}
-                style = {**look, "linewidth": 1.6, "zorder": 3, "label": label}
+                line = {"color": colour(place), "linestyle": DASHES[place % len(DASHES)]}
+                style = {**line, "linewidth": 1.6, "zorder": 3, "label": label}
             draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
             ax.set_xscale("log")

@@ -51,7 +51,7 @@ def read_autoferry(
 ) -> Scene:
     """Read a scenario as a scene: x east, y north, seconds from the first frame, sensors on the moving ferry.
 
-    A scan is a frame, in which its sensor alone looks. Detections of lidar and radar in a frame that are near one
+    A scan is a frame, in which only its sensor measures. Detections of lidar and radar in a frame that are near one
     another are one target's, and are replaced by their mean.
 
     Parameters
@@ -88,7 +88,7 @@ def read_autoferry(
     number = {SENSORS[name][0]: s for s, name in enumerate(given)}
     placed = [_sensor(name, {**SENSORS[name][1], **changes}, platform) for name, changes in given.items()]
     last = np.full(len(placed), -math.inf)
-    times, scans, looks, ids, places = [], [], [], [], []
+    times, scans, sectors, ids, places = [], [], [], [], []
     for k in order:
         time, code, _, z = frames[k]
         s = number.get(code)
@@ -98,7 +98,7 @@ def read_autoferry(
         found = z if placed[s].dim == 1 else merged(z[placed[s].in_view(z)], extent)
         times.append(time - start)
         scans.append([found if r == s else np.zeros((0, sensor.dim)) for r, sensor in enumerate(placed)])
-        looks.append([[-math.pi, math.pi if r == s else -math.pi] for r in range(len(placed))])
+        sectors.append([[-math.pi, math.pi if r == s else -math.pi] for r in range(len(placed))])
         if boats is not None:
             there = [_boat(truth, k, boat) for boat in boats[k]]
             ids.append(np.array([i for i, _ in there], dtype=np.int64))
@@ -110,7 +110,7 @@ def read_autoferry(
     )
     return Scene(
         placed, np.array(times), scans, region, None if boats is None else Truth(ids, places),
-        os.path.basename(detections), sectors=np.array(looks),
+        os.path.basename(detections), sectors=np.array(sectors),
     )  # fmt: skip
 
 

@@ -65,7 +65,7 @@ def read_plots(
     -------
     Recording
         In the order of time. Its notes count late rows (sorted in), rows left out (repeated ones, those of zeros, which
-        are fillers, and those without a time, range or bearing), codes that are none, and midnights passed.
+        are fillers, and those without a time, range or bearing), invalid codes, and midnights passed.
 
     Raises
     ------
@@ -263,7 +263,7 @@ class _Table:
                 "repeated rows left out": len(order) - len(keep),
                 "rows of zeros left out": self.fillers,
                 "rows without time, range or bearing left out": self.blank,
-                "codes that are none": self.unread,
+                "invalid codes": self.unread,
                 "midnights passed": self.midnights,
             },
             name=self.file.name,

@@ -83,23 +83,9 @@ class Problem:
         return normal_equations(sensors, tuples, term_arrays(self.terms, self.sensors), limits)
 
 
-def estimate(problem: Problem, epochs: Sequence[Epoch], start: Estimate | None = None) -> Estimate:
-    """Find the biases.
-
-    Parameters
-    ----------
-    problem : Problem
-    epochs : sequence of Epoch
-    start : Estimate, optional
-        The estimate so far; without it biases are zero, with their spreads as standard deviations.
-
-    Returns
-    -------
-    Estimate
-    """
-    n = len(problem.terms)
-    biases = np.zeros(n) if start is None else start.biases
-    covariance = np.diag(problem.spreads**2) if start is None else start.covariance
+def estimate(problem: Problem, epochs: Sequence[Epoch]) -> Estimate:
+    """Find the biases, from zero and with their spreads as standard deviations."""
+    biases, covariance = np.zeros(len(problem.terms)), np.diag(problem.spreads**2)
     sample = _sample(epochs)
     first, found = np.sqrt(np.diagonal(covariance)), None
     for share in SHARES:

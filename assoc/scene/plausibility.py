@@ -15,7 +15,7 @@ from assoc._types import Array
 from assoc.sensors import PositionSensor, Sensor
 from assoc.sensors.base import ANGLES
 
-# with fewer measurements of a sensor only what cannot be is told
+# with fewer measurements of a sensor only impossible values are reported
 _ENOUGH = 10
 # a measurement is off by less than so many standard deviations
 _FAR = 6.0

@@ -70,7 +70,7 @@ class Scan:
         """The scan as sensors would measure it that stand as these do (`Sensor.at`) at the scan's time.
 
         Angles and positions are then in the axes of the scene's frame. Where measurements have times of their own,
-        `paths` tells from where they were made.
+        `paths` gives the positions from which they were made.
         """
         if all(sensor.platform is None for sensor in sensors):
             return self

@@ -14,11 +14,11 @@ from assoc.sensors.radar import Radar3D
 MARGIN = 5.0
 
 
-def on_circle(center: Array, radius: float, count: int, height: float = 0.0) -> Array:
-    """Positions (count, 3), metres, at equal angles on a horizontal circle, the first north (+y)."""
+def on_circle(center: Array, radius: float, count: int) -> Array:
+    """Positions (count, 3), metres, at equal angles on a circle on the ground, the first north (+y)."""
     angle = math.pi / 2 + 2 * math.pi * np.arange(count) / count
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
-    return np.stack([x, y, np.full(count, height)], axis=1) + 0.0
+    return np.stack([x, y, np.zeros(count)], axis=1) + 0.0
 
 
 def azimuth_interval(position: Array, region: Array) -> tuple[float, float]:

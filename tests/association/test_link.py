@@ -65,6 +65,6 @@ def test_bad_input(frames, options, words):
 
 
 def test_pairs_beyond_the_memory_are_refused(monkeypatch):
-    monkeypatch.setattr("assoc._system.memory.available", lambda own=True: 1e7)
+    monkeypatch.setattr("assoc._system.memory.available", lambda here=True: 1e7)
     with pytest.raises(LimitExceededError, match="pairs within search_range would take about"):
         assoc.link(np.zeros((3, 1000, 2)), 1.0)

@@ -124,7 +124,7 @@ def test_the_guard_names_the_number_and_what_to_change():
 def test_without_a_number_the_guard_follows_the_memory(monkeypatch):
     crowd = gated_scene(3, 100, [3000, 3000, 1000])
     assert build_problem(crowd, 0).num_tuples > 100
-    monkeypatch.setattr(memory, "available", lambda own=True: 30_000.0)
+    monkeypatch.setattr(memory, "available", lambda here=True: 30_000.0)
     with pytest.raises(LimitExceededError, match=r"candidate tuples \(\d+ MB\), more than max_tuples = 100;"):
         build_problem(crowd, 0)
 

@@ -242,7 +242,7 @@ def test_octal_codes(tmp_path):
     assert read_plots(written(tmp_path, head.format("squawk", ""))).identities.tolist() == [0]
     assert read_plots(written(tmp_path, head.format("squawk", "902")), units={"mode3": "dec"}).identities[0] == 902
     for told in ("7780", "10000", "-1", "7.5"):
-        assert read_plots(written(tmp_path, head.format("squawk", told))).notes["codes that are none"] == 1
+        assert read_plots(written(tmp_path, head.format("squawk", told))).notes["invalid codes"] == 1
     with pytest.raises(InvalidInputError, match="expected dec or oct for the mode3"):
         read_plots(written(tmp_path, head.format("mode3", 1)), units={"mode3": "hex"})
 
@@ -305,4 +305,4 @@ def test_blank_cells_and_bad_codes_are_counted(tmp_path):
     recording = read_plots(written(tmp_path, "time,range,bearing,squawk,altitude\n" + rows))
     assert recording.times.tolist() == [1, 5, 6, 7] and recording.identities.tolist() == [0o4521, 0, 0, 0]
     summary = recording.summary()
-    assert "rows without time, range or bearing left out: 4" in summary and "codes that are none: 3" in summary
+    assert "rows without time, range or bearing left out: 4" in summary and "invalid codes: 3" in summary

@@ -44,7 +44,7 @@ def little(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
     def let(count: float) -> None:
         monkeypatch.setattr(memory, "_SMALL", 0)
-        monkeypatch.setattr(memory, "available", lambda own=True: count)
+        monkeypatch.setattr(memory, "available", lambda here=True: count)
 
     return let
 
@@ -58,7 +58,7 @@ def test_an_address_space_limit_counts() -> None:
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))\n"
         "from assoc._system import memory\n"
-        "assert 0 < memory.available() < 2 << 30 < memory.available(own=False)\n"
+        "assert 0 < memory.available() < 2 << 30 < memory.available(here=False)\n"
         "memory.require(1 << 28, 'small', '')\n"
         "memory.require(1.95e9, 'tuples = 3', 'take fewer')\n"
     )

@@ -71,12 +71,11 @@ class OpenNodes:
         slack: NDArray[np.bool_],
         variable: NDArray[np.int32],
         duals: Floats,
-        bound: float = -np.inf,
     ) -> None:
-        """Replace all nodes by one: its columns, the rows that may stay uncovered, its basis, multipliers and bound."""
+        """Replace all nodes by one: its columns, the rows that may stay uncovered, its basis and multipliers."""
         arrays = self.arrays
         arrays.arena[: columns.size] = columns
-        arrays.first[0], arrays.size[0], arrays.bound[0] = 0, columns.size, bound
+        arrays.first[0], arrays.size[0], arrays.bound[0] = 0, columns.size, -np.inf
         arrays.slack[0], arrays.variable[0], arrays.duals[0] = slack, variable, duals
         self.count = 1
 

@@ -18,11 +18,11 @@ _CYCLES = 60
 _BUDGET = 900_000
 
 
-def add_pheromone(views: Sequence[dict[str, Any]], scans: Sequence[ScanAssociation], budget: int = _BUDGET) -> None:
+def add_pheromone(views: Sequence[dict[str, Any]], scans: Sequence[ScanAssociation]) -> None:
     """Attach what is shown of the ants to the views of scans, of fewer cycles where the budget asks for it."""
     most = _CYCLES
     shown = [_view(scan.pheromone, most) for scan in scans]
-    while most > 2 and sum(len(json.dumps(view, separators=(",", ":"))) for view in shown) > budget:
+    while most > 2 and sum(len(json.dumps(view, separators=(",", ":"))) for view in shown) > _BUDGET:
         most //= 2
         shown = [_view(scan.pheromone, most) for scan in scans]
     for view, one in zip(views, shown, strict=True):

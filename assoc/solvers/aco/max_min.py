@@ -38,10 +38,10 @@ class Colony:
         self,
         component: Component,
         parameters: AcoParameters,
-        tell: Callable[[Component, Colony], object],
+        report: Callable[[Component, Colony], object],
     ) -> None:
         self.parameters = parameters
-        self._tell = tell
+        self._report = report
         self.pheromone = np.ones(component.packing.num_columns)
         self.slack_pheromone = np.ones(component.packing.num_rows)
         # an unchosen tuple keeps a chance of about 1 / (2 n) against all n rivals of a row together
@@ -83,7 +83,7 @@ class Colony:
             self.slack_pheromone[:] = 1.0
             self.recent, self.least = None, np.inf
         self.known = component.weight
-        self._tell(component, self)
+        self._report(component, self)
 
     def _deposit(self, cols: NDArray[np.int32], owner: NDArray[np.int32], share: float) -> None:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)
