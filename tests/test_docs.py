@@ -8,9 +8,11 @@ import shlex
 import shutil
 import tomllib
 from dataclasses import fields
+from functools import reduce
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 
@@ -124,6 +126,42 @@ def test_what_the_api_pages_describe_can_be_imported(target):
     assert getattr(import_module(module), name).__doc__
 
 
+def used(page: str) -> set[str]:
+    """Names of the package on a page: those in its text, and those that its code imports."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    names = set(re.findall(r"`(assoc(?:\.\w+)+)", text))
+    for block in re.findall(r"```(?:python|\{code-cell\})\n(.*?)```", text, re.DOTALL):
+        for node in ast.walk(ast.parse(re.sub(r"^:.*$", "", block, flags=re.MULTILINE))):
+            if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("assoc."):
+                names |= {f"{node.module}.{one.name}" for one in node.names}
+    return {name for name in names if "._" not in name}
+
+
+@pytest.mark.parametrize("page", [name for name in NAMES if used(name)])
+def test_what_the_pages_use_is_on_the_api_pages(page):
+    described = [value_of(target) for target in targets() if can_import(target)]
+    for name in filter(can_import, sorted(used(page))):
+        value, owner = value_of(name), value_of(name.rpartition(".")[0])
+        if isinstance(value, type | FunctionType):
+            assert value in described or owner in described, f"{page}: {name} is on no page of docs/api"
+
+
+def can_import(name: str) -> bool:
+    """Whether the extra that a name needs is installed."""
+    extra = {"assoc.plotting": "matplotlib", "assoc.integrations.stonesoup": "stonesoup"}
+    return all(find_spec(needed) for start, needed in extra.items() if f"{name}.".startswith(f"{start}."))
+
+
+def value_of(name: str) -> object:
+    """The object of a dotted name.
+
+    Raises AttributeError: There is none.
+    """
+    parts = name.split(".")
+    cut = next(n for n in range(len(parts), 0, -1) if find_spec_of(parts[:n]))
+    return reduce(getattr, parts[cut:], import_module(".".join(parts[:cut])))
+
+
 def defaults() -> list[tuple[str, str, str]]:
     """Solver, parameter and default as docs/solvers.md gives them."""
     text = (ROOT / "docs" / "solvers.md").read_text(encoding="utf-8")
@@ -149,15 +187,8 @@ def test_the_page_of_solvers_gives_defaults():
 @pytest.mark.parametrize("page", NAMES)
 def test_names_on_the_pages_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")
-    for name in set(re.findall(r"`(assoc(?:\.\w+)+)", text)):
-        parts = name.split(".")
-        if "stonesoup" in parts or "plotting" in parts:
-            continue  # extras, and the pages of the API are tested above
-        cut = next(n for n in range(len(parts), 0, -1) if find_spec_of(parts[:n]))
-        value = import_module(".".join(parts[:cut]))
-        for part in parts[cut:]:
-            assert hasattr(value, part), f"{page}: {name} does not exist"
-            value = getattr(value, part)
+    for name in filter(can_import, set(re.findall(r"`(assoc(?:\.\w+)+)", text))):
+        value_of(name)
 
 
 def find_spec_of(parts: list[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Tables of measured trackers: docs/tracking.md, and biased radars for docs/registration.md."""
+"""Tables of measured trackers: docs/tracking_measured.md, and biased radars for docs/registration.md."""
 
 from experiments.common.claims import Claim
 from experiments.common.results import Results, number, table

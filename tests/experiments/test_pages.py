@@ -13,7 +13,7 @@ from experiments.common.results import RESULTS, Results, number
 from experiments.pages import prose
 from experiments.pages.__main__ import FOLDER, TABLES, main
 
-PAGES = ("filters.md", "recordings.md", "sweeps.md", "solvers.md")
+PAGES = ("filters.md", "recordings.md", "sweeps.md", "solvers_measured.md")
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NAMES = {*programs()}

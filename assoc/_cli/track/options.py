@@ -162,7 +162,7 @@ _MORE = "\n".join(
         "trackers:",
         *(f"  {name:<19}  {purpose}" for name, purpose in TRACKERS.items()),
         "",
-        "further options (docs/tracking.md):",
+        "further options (docs/tracking_reference.md):",
         "  track life cycle   --confirmation --false-probability --missed-probability --m --n "
         "--deletion --deletion-time --deletion-count --deletion-drop --lifetime",
         "  track initiation   --speed --rest --birth-rate --widest",
