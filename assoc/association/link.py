@@ -23,9 +23,13 @@ _BYTES = 400.0  # of each candidate pair while its problem is built and solved
 class Links(NamedTuple):
     """Particles that ``assoc.link`` followed.
 
-    ids: For each frame an integer array of shape (M,): the particle of each point, from 0 in order of appearance.
-    solution: Of the assignment problem whose tuples are (point, its next point), both counted from 1 over all frames.
-        Its costs are squared distances less the squared search range.
+    Attributes
+    ----------
+    ids : list of int arrays (M,)
+        For each frame the particle of each point, from 0 in order of appearance.
+    solution : Solution
+        Of the assignment problem whose tuples are (point, its next point), both counted from 1 over all frames. Its
+        costs are squared distances less the squared search range.
     """
 
     ids: list[Array]
