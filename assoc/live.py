@@ -173,7 +173,7 @@ def _take_plots(
     lines: Lines | None, scene: Scene, tracker: LiveTracker, given: Given, show: Callable[[list[Picture]], None]
 ) -> None:
     """Pass the plots of the lines (of the scene if there are none) to the tracker, and show its pictures."""
-    from assoc._cli.track.plot_lines import parse_line, replayed
+    from assoc._cli.track.plot_lines import OwnPosition, parse_line, replayed
 
     if lines is None:
         for plot in replayed(scene, given["replay"]):
@@ -185,7 +185,9 @@ def _take_plots(
         except InvalidInputError as error:
             tracker.leave_out("lines not understood", f"line left out: {error}")
             continue
-        if found is not None:
+        if isinstance(found, OwnPosition):
+            tracker.take_own_position(*found)
+        elif found is not None:
             show(tracker.take(*(found[:3] if given["identity"] == "ignore" else found)))
 
 

@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError, warn
 from assoc.sensors.arrays import finite_array
 
 # a step is taken for a jump if it is faster than this (m/s) and so many times as fast as nine in ten steps
-_FAST, _FASTER = 100.0, 10.0
+FAST, FASTER = 100.0, 10.0
 
 
 @doors
@@ -56,16 +56,10 @@ class Platform:
         put(self, "times", times)
         put(self, "positions", finite_array(self.positions, "platform: positions", (len(times), 3)))
         if self.headings is not None:
-            headings = finite_array(self.headings, "platform: headings", times.shape)
-            if np.abs(headings).max() > 2 * math.pi * (1 + 1e-9):
-                raise InvalidInputError(
-                    f"platform: headings go up to {np.abs(headings).max():.4g}: degrees? radians from +x towards +y, "
-                    "within +-2 pi, are expected"
-                )
-            put(self, "headings", headings)
+            put(self, "headings", checked_headings(finite_array(self.headings, "platform: headings", times.shape)))
         speeds = np.linalg.norm(np.diff(self.positions, axis=0), axis=1) / np.diff(times)
         k = int(np.argmax(speeds)) if len(speeds) else 0
-        if len(speeds) > 1 and speeds[k] > max(_FAST, _FASTER * float(np.quantile(np.delete(speeds, k), 0.9))):
+        if len(speeds) > 1 and speeds[k] > max(FAST, FASTER * float(np.quantile(np.delete(speeds, k), 0.9))):
             warn(f"platform: jumps at {times[k]:g} s, with {speeds[k]:.4g} m/s to its next position")
 
     def poses(self, times: Array) -> tuple[Array, Array]:
@@ -120,6 +114,16 @@ class Platform:
 
     def __repr__(self) -> str:
         return f"Platform({len(self.times)} positions, {self.times[0]:g} to {self.times[-1]:g} s)"
+
+
+def checked_headings(headings: Array) -> Array:
+    """Return headings (n,) in radians; refuse those that look like degrees."""
+    most = float(np.abs(headings).max())
+    if not most <= 2 * math.pi * (1 + 1e-9):
+        raise InvalidInputError(
+            f"platform: headings go up to {most:.4g}: degrees? radians from +x towards +y, within +-2 pi, are expected"
+        )
+    return headings
 
 
 def turned(vectors: Array, angles: Array) -> Array:

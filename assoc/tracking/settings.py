@@ -96,10 +96,13 @@ class TrackerSettings:
 
     def at(self, time: float) -> TrackerSettings:
         """The settings with the sensors as they stand at a time, seconds; themselves if no platform carries any."""
-        place = self.place.at(time)
+        return self.placed(self.place.at(time))
+
+    def placed(self, place: Scene) -> TrackerSettings:
+        """The settings with the sensors of another scene; themselves if it is the same."""
         if place is self.place:
             return self
-        return replace(self, place=place, nursery=None if self.nursery is None else self.nursery.at(time))
+        return replace(self, place=place, nursery=None if self.nursery is None else self.nursery.placed(place))
 
     @cached_property
     def angles_alone(self) -> bool:

@@ -282,6 +282,24 @@ def test_lines_with_identities(scene_file):
             parse_line(json.dumps(plain | more), scene)
 
 
+def test_lines_with_own_positions(scene_file, monkeypatch, capsys):
+    scene = Scene.load(scene_file)
+    full = ("radar 1", 2.5, [10.0, -20.0, 3.0], 0.5)
+    assert parse_line("platform,radar 1,2.5,10,-20,3,0.5", scene) == full
+    assert parse_line("platform, radar 1, 2.5, 10, -20, 3", scene) == (*full[:3], None)
+    line = {"platform": "radar 1", "time": 2.5, "position": [10, -20, 3], "heading": 0.5}
+    assert parse_line(json.dumps(line), scene) == full
+    for bad in ("platform,1,2.5,10,-20", "platform,1,2.5,10,-20,3,0.5,9", "platform,1,2.5,x,1,2", '{"platform": 1}',
+                json.dumps(line | {"position": [1, 2]}), json.dumps(line | {"heading": "north"})):  # fmt: skip
+        with pytest.raises(InvalidInputError, match="line left out|expected") as caught:
+            parse_line(bad, scene)
+        assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"platform,radar 1,2.5,10,-20,3,0.5\n")))
+    assert live.main([str(scene_file)]) == 0
+    told = capsys.readouterr().err
+    assert "own position for 'radar 1' left out: the sensor is on no platform" in told
+
+
 def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
     recording = crossing(2, begin=1.0)
     place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])

@@ -179,6 +179,21 @@ def test_a_file_of_a_tracker_that_does_not_adapt_is_refused(tmp_path):
         TRACKERS["mht"].for_scene(scene, adapt=True).restore(tmp_path / "state.npz")
 
 
+@pytest.mark.parametrize(("field", "value"), [
+    ("settings", None), ("clutter.places.1", np.zeros((4, 2))), ("clutter.clocks.0", np.zeros(1)),
+])  # fmt: skip
+def test_the_map_of_another_sensor_is_refused(field, value, tmp_path):
+    """Whole, of a tracker with other sensors; or in the file of this one."""
+    tracker, path = tracked(scene_of(radars(), 6, scans=6), radars()), tmp_path / "map.npz"
+    before = str(tracker.health)
+    other = tracker if value is not None else tracked(scene_of(radars(90.0), 6, scans=6), radars(90.0))
+    arrays = dict(file_arrays(other.settings, other.state)) | ({} if value is None else {field: value})
+    save_npz(path, FORMAT, VERSION, arrays)
+    with pytest.raises(InvalidInputError, match=field.rstrip(".01")) as caught:
+        tracker.restore(path)
+    assert "\n" not in str(caught.value) and str(tracker.health) == before
+
+
 def with_returns(scene, count, seed):
     """The scene with plots of each radar from one patch of 3 x 3 km in every scan."""
     rng, low = np.random.default_rng(seed), np.array([14e3, -17e3, 0.0])

@@ -9,7 +9,9 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.recordings import Recording, clustering_time_window, radar_of
-from assoc.tracking import TRACKERS, IdentityParameters
+from assoc.sensors import PositionSensor, Radar2D
+from assoc.tracking import TRACKERS, IdentityParameters, Initiation
+from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.plots import track_plots
 from assoc.tracking.stages.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
 from tests.sizes import few_or_all, sample
@@ -114,6 +116,30 @@ def test_one_wrong_code_does_not_break_a_track(name):
     # garbled plots may be left to no track, or begin one; the others are all of one
     usual = [k for k in range(5, len(tracks)) if k not in (12, 30)]
     assert len(np.unique(tracks[usual])) == 1 and tracks[usual][0] in own
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_wrong_ids_of_ships_break_no_track(name):
+    """A radar, and reports of position (AIS) of which some have the other ship's id, or a stranger's."""
+    rng, view = np.random.default_rng(5), [[-2e4, 2e4], [-2e4, 2e4]]
+    sensors = [
+        Radar2D(position=[0, 0, 0], noise=[30, 4e-3], field_of_view=[[0, 2e4], [-np.pi, np.pi]], false_alarm_rate=1),
+        PositionSensor(position=[0, 0, 0], noise=[10, 10], field_of_view=view, false_alarm_rate=0.1),
+    ]
+    tracker = TRACKERS[name](sensors, two_speeds(1.0, 2), region=[*view, [0, 1]], initiation=Initiation(speed=8.0),
+                             identity=IdentityParameters())  # fmt: skip
+    ids = []
+    for k in range(30):
+        ships = np.array([[5e3 + 30.0 * k, 4e3, 0], [5.5e3 + 30.0 * k, 5e3, 0]])
+        measured = [one.measure(ships) + rng.normal(0.0, one.noise, (2, 2)) for one in sensors]
+        address = {14: (0xB, 0xA), 20: (0xC, 0xB), 24: (0xA, 0xA)}.get(k, (0xA, 0xB))
+        codes = [np.zeros((2, 2), dtype=int), np.column_stack([[0, 0], address])]
+        tracker.step(4.0 * k, measured, identities=codes)
+        shown = [track for track in tracker.tracks if track.reported]
+        if k >= 8:
+            ids.append([min(shown, key=lambda t: np.linalg.norm(t.position - ship)).track_id for ship in ships])
+            assert len(shown) == 2
+    assert len({tuple(pair) for pair in ids}) == 1 and len({*ids[0]}) == 2
 
 
 def test_a_code_that_is_changed_in_flight_does_not_break_a_track():

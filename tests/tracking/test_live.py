@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from assoc.errors import InvalidInputError
 from assoc.metrics import tracks_of_one_identity
 from assoc.recordings import Window
 from assoc.scene import Scene
-from assoc.simulation import simulate
+from assoc.sensors import Platform, Radar3D
+from assoc.simulation import observe, simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.plots import track_plots
@@ -363,3 +365,100 @@ def test_a_saved_state_is_checked(scene, tmp_path):
         np.savez(tmp_path / "bad.npz", **{**arrays, field: value})
         with pytest.raises(InvalidInputError, match="bad.npz: "):
             live(scene)[0].restore(tmp_path / "bad.npz")
+
+
+def at_sea():
+    """A radar on a ship that turns, and its scene; the tracker's scene knows where the ship was at the start alone."""
+    times = np.arange(0.0, 41.0)
+    heading = 0.3 + 0.03 * times
+    way = np.cumsum(15.0 * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1), axis=0)
+    ship = Platform(times, way, heading)
+    view = [[0, 2e4], [-np.pi, np.pi], [-0.2, 1.5]]
+    on_board = Radar3D(
+        position=[5, 0, 15], noise=[20, 2e-3, 2e-3], field_of_view=view, name="ship", platform=ship,
+        detection_probability=0.95, false_alarm_rate=0.5,
+    )  # fmt: skip
+    places = np.array([[6e3, 2e3, 800.0], [-5e3, 4e3, 1500.0], [2e3, -7e3, 400.0]])
+    velocities = np.array([[-120.0, 40, 0], [90.0, 60, 0], [20.0, 140, 0]])
+    region = np.array([[-1.5e4, 1.5e4], [-1.5e4, 1.5e4], [0, 3e3]])
+    scans = np.arange(2.0, 40.0, 2.0)
+    paths = [places + t * velocities for t in scans]
+    scene = observe([on_board], scans, [np.arange(3)] * len(scans), paths, np.random.default_rng(2), region=region)
+    start = Platform(times[:1], way[:1], heading[:1])
+    return scene, replace(scene, sensors=[replace(on_board, platform=start)], times=scans - scans[0], truth=None), ship
+
+
+def own_positions(ship, until=math.inf):
+    rows = zip(ship.times.tolist(), ship.positions.tolist(), ship.headings.tolist(), strict=True)
+    return [row for row in rows if row[0] <= until]
+
+
+def test_own_positions_of_a_ship(tmp_path):
+    """Tracks are those of a tracker that knew the ship's way before, also after a restart; a stale position goes on."""
+    scene, told_scene, ship = at_sea()
+    known, _ = live(scene, turns=None)
+    there = fed(known, replayed(scene, 0.0))[-1]
+    assert max(found([there], scene)) < 60.0
+
+    def streamed(tracker, plots, messages):
+        pictures, messages = [], list(messages)
+        for plot in plots:
+            while messages and messages[0][0] <= plot.time + 1.0:
+                tracker.take_own_position("ship", *messages.pop(0))
+            pictures += tracker.take(*plot)
+        return pictures
+
+    plots = list(replayed(scene, 0.0))
+    half = len(plots) // 2
+    first, told = live(told_scene, turns=None)
+    streamed(first, plots[:half], own_positions(ship))
+    first.save(tmp_path / "live.npz")
+    second, _ = live(told_scene, turns=None)
+    second.restore(tmp_path / "live.npz")
+    streamed(second, plots[half:], own_positions(ship))
+    last = second.finish()[-1]
+    assert told == []
+    for a, b in zip(last.tracks, there.tracks, strict=True):
+        np.testing.assert_allclose(a.position, b.position, atol=1e-6)
+    np.testing.assert_allclose(last.plots, there.plots, atol=1e-6)
+    # four seconds old at the end
+    late, told = live(told_scene, turns=None)
+    streamed(late, plots, own_positions(ship, 34.0))
+    assert max(found([late.finish()[-1]], scene)) < 100.0 and told == []
+    # none at all: the ship stands where the scene has it; or only at first
+    for until in (-1.0, 3.0):
+        late, told = live(told_scene, turns=None)
+        streamed(late, plots, own_positions(ship, until))
+        late.finish()
+        silent = ["ship has had no own position since 3 s: it goes on as then"] if until > 0 else []
+        assert told == silent and late.counts["steps failed"] == 0
+
+
+def test_own_positions_that_cannot_be_are_left_out():
+    _, scene, ship = at_sea()
+    for bad, line in (
+        ((10.0, [9e3, 0, 0], 0.5), "jumps, with"),
+        ((10.0, [0.0, 0, 0], 45.0), "45: degrees"),
+        ((10.0, [0.0, 0, 0], None), "has no heading"),
+        ((4.0, [0.0, 0, 0], 0.5), "is not newer than that of 9 s"),
+        ((10.0, [0.0, math.nan, 0], 0.5), "position"),
+        ((math.inf, [0.0, 0, 0], 0.5), "expected seconds"),
+    ):
+        tracker, told = live(scene, turns=None)
+        for row in own_positions(ship, 9.0):
+            tracker.take_own_position("ship", *row)
+        tracker.take_own_position("ship", *bad)
+        (path,) = tracker.state.own.paths.values()
+        assert len(told) == 1 and line in told[0] and path.poses[-1].time == 9.0
+        assert tracker.counts["own positions"] == 1
+    # what the next position confirms was none; and a clock that goes back starts anew
+    tracker.take_own_position("ship", 10.0, [9e3, 0, 0], 0.5)
+    tracker.take_own_position("ship", 11.0, [9e3, 10, 0], 0.5)
+    (path,) = tracker.state.own.paths.values()
+    assert [pose.time for pose in path.poses] == [10.0, 11.0]
+    tracker.take_own_position("ship", -100.0, [0.0, 0, 0], 0.5)
+    assert [pose.time for pose in tracker.state.own.paths[0].poses] == [-100.0]
+    tracker, told = live(replace(scene, sensors=[replace(scene.sensors[0], platform=None)]), turns=None)
+    tracker.take_own_position("ship", 1.0, [0.0, 0, 0], 0.5)
+    tracker.take_own_position("boat", 1.0, [0.0, 0, 0], 0.5)
+    assert told == ["own position for 'ship' left out: the sensor is on no platform; further ones are only counted"]

@@ -54,12 +54,25 @@ class Plot(NamedTuple):
     """Mode 3/A code and ICAO address, 0 where it is missing."""
 
 
-def parse_line(line: str, scene: Scene) -> Plot | None:
+class OwnPosition(NamedTuple):
+    """Where a platform is, as read from a line."""
+
+    sensor: str
+    """Any that it carries."""
+    time: float
+    position: list[float]
+    heading: float | None = None
+
+
+def parse_line(line: str, scene: Scene) -> Plot | OwnPosition | None:
     """Read a line of CSV or JSON; None for an empty line, a comment or the header.
 
     CSV: sensor, time, the components of the measurement, then optionally mode3 and address. JSON: an object with
     sensor, time, and either values (an array) or the components by name; optionally mode3 and address.
     Metres, seconds, radians; a code is a whole number, an address has hexadecimal digits (in JSON it may be a number).
+
+    The own position of a platform: CSV "platform", a sensor that it carries, time, x, y, z, and optionally the heading;
+    JSON an object with platform (the sensor), time, position (an array) and optionally heading.
 
     Raises
     ------
@@ -75,6 +88,11 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
         return None
     try:
         found: Any = json.loads(text) if text.startswith("{") else _from_csv(text, scene)
+        if "platform" in found:
+            x, y, z = (float(value) for value in found["position"])
+            heading = found.get("heading")
+            heading = None if heading in (None, "") else float(heading)
+            return OwnPosition(str(found["platform"]), float(found["time"]), [x, y, z], heading)
         name, time = str(found["sensor"]), float(found["time"])
         sensor, values = _sensor(name, scene), found.get("values")
         if values is None:
@@ -92,8 +110,13 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
 
 
 def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
-    """Sensor, time, values, and identity."""
+    """Sensor, time, values, and identity; or a platform's own position."""
     name, time, *rest = (part.strip() for part in text.split(","))
+    if name == "platform" and _sensor(name, scene) is None:
+        when, *values = rest
+        if len(values) not in (3, 4):
+            raise ValueError(f"{len(values)} values of a platform's own position, expected x, y, z and a heading")
+        return {"platform": time, "time": when, "position": values[:3], "heading": "".join(values[3:])}
     sensor = _sensor(name, scene)
     # the number of values of an unknown sensor is unknown: the tracker reports the sensor
     dim = len(rest) if sensor is None else sensor.dim

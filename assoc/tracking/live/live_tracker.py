@@ -22,6 +22,7 @@ from assoc.sensors.arrays import LARGEST
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
+from assoc.tracking.live.own_positions import OwnPositions
 from assoc.tracking.live.pictures import Agreement, Antenna, Heard, Picture, SoundPlot
 from assoc.tracking.live.state import LiveSettings, LiveState
 from assoc.tracking.quality import Qualities
@@ -82,7 +83,9 @@ class LiveTracker:
         spans = positive(interval, "interval"), None if turns is None else [positive(turn, "turns") for turn in turns]
         late = positive(horizon, "horizon"), positive(wait, "wait", zero=True)
         self.settings = LiveSettings(scene, make, *spans, *late, tell, quality)
-        self.state = LiveState(LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors])
+        self.state = LiveState(
+            LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors], OwnPositions(scene)
+        )
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
@@ -211,6 +214,37 @@ class LiveTracker:
             return []
         return self._timed(plot)
 
+    def take_own_position(
+        self, sensor: object, time: float, position: Sequence[float], heading: float | None = None
+    ) -> None:
+        """Take in where a platform is: the sensors that it carries stand there, and between two of them in between.
+
+        A position that the platform cannot have reached is left out, unless the next one confirms it.
+
+        Parameters
+        ----------
+        sensor : str or int
+            Any sensor that the platform carries, by its name, or number from 1.
+        time : float
+            Seconds; later than the last one's.
+        position : sequence of float
+            x, y, z in the scene's frame, metres.
+        heading : float, optional
+            Azimuth of the forward direction, radians from +x towards +y; needed where the scene's platform has
+            headings, and not used elsewhere.
+        """
+        s = self.sensor(sensor)
+        carrier = None if s is None else self.settings.scene.sensors[s].platform
+        if s is None or carrier is None:
+            what = "unknown" if s is None else "on no platform"
+            self.leave_out("own positions", f"own position for {str(sensor)[:40]!r} left out: the sensor is {what}", s)
+            return
+        try:
+            self.state.own.take(carrier, time, position, heading)
+        except AssocError as error:
+            where = self.settings.name_of(s)
+            self.leave_out("own positions", f"own position of {where} at {moment(time)} left out: it {error}", s)
+
     def _timed(self, plot: SoundPlot) -> list[Picture]:
         """Process a sound plot, unless its time is doubted or too old."""
         time, state, settings = plot.time, self.state, self.settings
@@ -262,7 +296,8 @@ class LiveTracker:
         self._kept.settle(set(), math.inf)
         self._qualities.keep(())
         late = LatePlots(self.settings.make(), self.settings.horizon, first_id=self.state.tracker.next_id)
-        self.state = LiveState(late, [Antenna(silent=antenna.silent) for antenna in self.state.antennas])
+        antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
+        self.state = LiveState(late, antennas, self.state.own)
 
     def _drop_ahead(self) -> None:
         for plot in self.state.ahead:
@@ -292,9 +327,15 @@ class LiveTracker:
             self.state.antennas[part] = self.state.antennas[part].after(time, azimuth, turn)
 
     def _step(self) -> Picture:
-        """Take in the interval that ends."""
+        """Take in the interval that ends, with sensors where their platforms are."""
+        with self.state.under_way(self.settings) as place:
+            return self._step_at(place)
+
+    def _step_at(self, place: Scene) -> Picture:
         settings, state, end = self.settings, self.state, self.state.end
-        sensors, interval = settings.scene.sensors, settings.interval
+        for s, last in state.own.silent(settings.scene, end):
+            settings.tell(f"{settings.name_of(s)} has had no own position since {moment(last)}: it goes on as then")
+        sensors, interval = place.sensors, settings.interval
         state.end += interval
         sectors = np.zeros((len(sensors), 2))
         z, times, identities = [], [], []
@@ -312,7 +353,8 @@ class LiveTracker:
                         "switched off"
                     )
             sent = any(plot.time <= end and plot.sensor in settings.parts[s] for plot in state.pending)
-            sectors[s] = antenna.sector(end, interval, turn, sent)
+            heading = 0.0 if sensor.platform is None else float(sensor.platform.poses(np.array([end]))[1][0])
+            sectors[s] = np.add(antenna.sector(end, interval, turn, sent), heading)
         state.pending = [plot for plot in state.pending if plot.time > end]
         begin, step = clock.perf_counter(), None
         try:
@@ -334,7 +376,7 @@ class LiveTracker:
         ids = {track.track_id for track in tracks}
         ended, self.confirmed = sorted(self.confirmed - ids), ids
         scan = Scan(0, end, tuple(z), times=tuple(times)).aligned(sensors)
-        found = [positions_of_scan(settings.scene.at(end), scan, s)[0] for s in range(len(sensors))]
+        found = [positions_of_scan(place.at(end), scan, s)[0] for s in range(len(sensors))]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
         return Picture(end, tracks, ended, np.concatenate(found), owner, self._agreements(step, tracks))
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.recordings.several import NO_HEIGHT
 from assoc.scene.scene import Scene
 from assoc.tracking.live.late_plots import LatePlots
+from assoc.tracking.live.own_positions import OwnPositions
 from assoc.tracking.live.pictures import Antenna, PlotKey, SoundPlot
 from assoc.tracking.tracker import Tracker
 
@@ -64,6 +66,8 @@ class LiveState:
 
     tracker: LatePlots
     antennas: list[Antenna]
+    own: OwnPositions
+    """Positions that the sensors' platforms have sent."""
     end: float = math.nan
     """End of the open interval, seconds."""
     newest: float = -math.inf
@@ -76,3 +80,16 @@ class LiveState:
     """Consecutive plots that were too old."""
     recent: dict[PlotKey, None] = field(default_factory=dict)
     """Plots so recent that a repetition must be recognised."""
+
+    @contextmanager
+    def under_way(self, settings: LiveSettings) -> Iterator[Scene]:
+        """The sensors with their platforms until the open interval ends; those of the tracker, too, for so long."""
+        tracker, scene = self.tracker.tracker, settings.scene
+        place = self.own.place(scene, self.end - settings.horizon - 2.0 * settings.interval, self.end)
+        plain = tracker.settings
+        if place is not scene:
+            tracker.settings = plain.placed(place)
+        try:
+            yield place
+        finally:
+            tracker.settings = plain

@@ -10,7 +10,6 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,9 @@ import numpy as np
 from assoc._files.npz import Field, load_npz, save_npz
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import Sensor
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.live.late_plots import LatePlots
+from assoc.tracking.live.own_positions import OwnPositions
 from assoc.tracking.live.pictures import Antenna, SoundPlot
 from assoc.tracking.live.state import LiveSettings, LiveState
 
@@ -34,6 +33,7 @@ _FIELDS = {
     "live.antennas": Field("float", 2),
     "live.scans": Field("float", 1),
     "live.sectors": Field("float", 3),
+    "live.own": Field("float", 2, required=False),  # platform, time, x, y, z, heading
     "live.plots": Field("float", 2),  # scan (-1: it waits), sensor, time, code, address, values
 }
 _BEFORE_VALUES = 5
@@ -67,6 +67,7 @@ def save(
         "live.confirmed": np.array(sorted(confirmed), dtype=np.int64),
         "live.antennas": np.array([(a.last, a.plots, a.phase.real, a.phase.imag, a.silent) for a in state.antennas]),
         "live.scans": np.array([one.time for one in past]),
+        "live.own": state.own.rows(),
         "live.sectors": np.array([one.sectors for one in past]).reshape(-1, len(inner.sensors), 2),
         "live.plots": np.array(plots).reshape(-1, _BEFORE_VALUES + width),
     }
@@ -89,24 +90,19 @@ def restore(path: str | os.PathLike[str], settings: LiveSettings) -> tuple[LiveS
         raise InvalidInputError(f"{path}: was saved with {found['live.settings']}, not {_described(settings)}")
     try:
         late = LatePlots(inner, settings.horizon, first_id=int(found["live.next_id"]))
-        return _filled(settings.scene.sensors, late, found)
+        return _filled(settings, late, found)
     except (ValueError, TypeError, IndexError, OverflowError) as error:
         raise InvalidInputError(f"{path}: is damaged ({error})") from None
 
 
 def _filled(
-    sensors: Sequence[Sensor], late: LatePlots, found: dict[str, Array]
+    settings: LiveSettings, late: LatePlots, found: dict[str, Array]
 ) -> tuple[LiveState, set[int], Counter[str]]:
-    plots = found["live.plots"]
+    sensors, plots = settings.scene.sensors, found["live.plots"]
     if not np.isfinite(plots[:, :_BEFORE_VALUES]).all():
         raise ValueError("a plot has no sensor or time")
     late.names = dict(found["live.names"].tolist())
     scan, sensor = plots[:, 0].astype(int), plots[:, 1].astype(int)
-    by_sensor = [(sensor == s, _BEFORE_VALUES + one.dim) for s, one in enumerate(sensors)]
-    for k, (time, sectors) in enumerate(zip(found["live.scans"], found["live.sectors"], strict=True)):
-        rows = [plots[(scan == k) & of_sensor, :end] for of_sensor, end in by_sensor]
-        stamps, codes = [part[:, 2] for part in rows], [part[:, 3:5].astype(np.int64) for part in rows]
-        late.step(float(time), [part[:, _BEFORE_VALUES:] for part in rows], stamps, sectors, codes)
     kept = [
         SoundPlot(s, float(row[2]), row[_BEFORE_VALUES : _BEFORE_VALUES + sensors[s].dim], row[3:5].astype(np.int64))
         for row, s in zip(plots, sensor.tolist(), strict=True)
@@ -115,7 +111,15 @@ def _filled(
     antennas = [Antenna(last, int(n), complex(re, im), bool(silent)) for _, (last, n, re, im, silent) in known]
     end, newest = found["live.clock"].tolist()
     pending = [plot for plot, k in zip(kept, scan.tolist(), strict=True) if k < 0]
-    state = LiveState(late, antennas, end, newest, pending, recent={plot.key: None for plot in kept})
+    own = OwnPositions(settings.scene)
+    own.restore(found.get("live.own", np.zeros((0, 6))))
+    state = LiveState(late, antennas, own, end, newest, pending, recent={plot.key: None for plot in kept})
+    by_sensor = [(sensor == s, _BEFORE_VALUES + one.dim) for s, one in enumerate(sensors)]
+    with state.under_way(settings):
+        for k, (time, sectors) in enumerate(zip(found["live.scans"], found["live.sectors"], strict=True)):
+            rows = [plots[(scan == k) & of_sensor, :last] for of_sensor, last in by_sensor]
+            stamps, codes = [part[:, 2] for part in rows], [part[:, 3:5].astype(np.int64) for part in rows]
+            late.step(float(time), [part[:, _BEFORE_VALUES:] for part in rows], stamps, sectors, codes)
     counts = Counter({str(kind): int(count) for kind, count in json.loads(str(found["live.counts"])).items()})
     return state, {*found["live.confirmed"].tolist()}, counts
 
