@@ -2,60 +2,50 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 import assoc
+from assoc._system import memory
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.components.splitting import split_components
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
-from assoc.solvers.exact.reduction import Reduction
-from assoc.solvers.exact.search import _complete
-
-
-def wide_gates(targets, seed, noise=0.6):
-    """Three lists of points in the plane; tuples of points near each other, at the cost of equation 5."""
-    rng = np.random.default_rng(seed)
-    points = rng.random((targets, 2)) * np.sqrt(targets)
-    lists = [points[rng.random(targets) < 0.95] for _ in range(3)]
-    lists = [z + rng.normal(size=z.shape) * noise for z in lists]
-    trees = [cKDTree(z) for z in lists]
-    near = {(s, t): trees[s].query_ball_tree(trees[t], 2.3 * noise) for s, t in [(0, 1), (0, 2), (1, 2)]}
-    tuples = [(i + 1, j + 1, 0) for i, js in enumerate(near[0, 1]) for j in js]
-    tuples += [(i + 1, 0, k + 1) for i, ks in enumerate(near[0, 2]) for k in ks]
-    tuples += [(0, j + 1, k + 1) for j, ks in enumerate(near[1, 2]) for k in ks]
-    tuples += [
-        (i + 1, j + 1, k + 1)
-        for i, js in enumerate(near[0, 1])
-        for j in js
-        for k in set(near[0, 2][i]) & set(near[1, 2][j])
-    ]
-    rows = np.array(tuples)
-    there = rows > 0
-    z = np.stack([lists[s][rows[:, s] - 1] for s in range(3)], axis=1) * there[..., None]
-    count = there.sum(axis=1)
-    mean = z.sum(axis=1) / count[:, None]
-    spread = (((z - mean[:, None]) * there[..., None]) ** 2).sum(axis=(1, 2)) / (2.0 * noise**2)
-    costs = spread - 0.742 * count + 3.0 * (3 - count) - np.log(2.0 * np.pi * noise**2 / count)
-    return assoc.AssignmentProblem(rows, costs, [len(z) for z in lists])
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_what_reduced_costs_decide_is_completed_to_a_good_solution(seed):
-    problem = wide_gates(700, seed)
-    packing = prepare(problem).packing
-    components = Reduction(packing, Run(0)).reduce()
-    largest = max(components, key=lambda one: one.packing.num_rows)
-    assert largest.packing.num_rows > 300
-    largest.take_over(dual_bound(largest.packing))
-    before = largest.weight - largest.bound
-    _complete(largest, Run(0))
-    assert largest.weight - largest.bound < 0.5 * before
-    owner = largest.best
-    assert largest.weight == pytest.approx(largest.weight_of(owner)) and largest.is_complete(owner)
+from assoc.solvers.exact.regions import close_by_regions
+from assoc.solvers.exact.search import search_to_the_end
+from experiments.common.instances.synthetic import wide_gates
 
 
 def test_a_scene_that_is_one_component_is_proved():
-    problem = wide_gates(400, 2)
+    problem = wide_gates(200, 2)
     assert max(map(len, problem.components())) > 0.9 * problem.num_tuples
     answer, other = assoc.assign(problem), assoc.assign(problem, "milp")
     assert answer.status == "optimal" and answer.cost == pytest.approx(other.cost, rel=1e-8)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_large_component_is_proved_without_its_linear_program(seed, monkeypatch):
+    """Its inverses would take 600 MB."""
+    monkeypatch.setattr(memory, "fits", lambda needed: needed < 20e6)
+    answer = assoc.assign(wide_gates(1200, seed), nodes=200)
+    assert answer.status == "optimal"
+
+
+@pytest.mark.parametrize("unit", [0.0, 1.0])
+def test_regions_bound_and_cover(unit):
+    """From rough multipliers and greedy covers, by searches that are cut short: bounds hold, covers are complete."""
+    closed = 0
+    for seed in range(25):
+        problem = wide_gates(60, seed, 0.5)
+        costs = np.floor(problem.costs * 8.0) if unit else problem.costs
+        packing = prepare(assoc.AssignmentProblem(problem.tuples, costs, problem.sizes)).packing
+        assert packing.granularity == unit
+        multipliers = dual_bound(packing, levels=2 + seed % 5)
+        parts = split_components(packing, multipliers, packing.origin.astype(np.int64))
+        component = max(parts, key=lambda one: one.packing.num_rows)
+        component.offer_greedy()
+        optimum = search_to_the_end(component.packing, 10**6, 0, Run(0)).lower_bound
+        close_by_regions(component, lambda part, nodes=seed % 4: search_to_the_end(part, nodes, 0, Run(0)))
+        assert component.is_complete(component.best)
+        assert component.weight == pytest.approx(component.weight_of(component.best), abs=1e-9)
+        assert component.lower_bound <= optimum + 1e-6 <= component.weight + 2e-6
+        closed += component.closed
+    assert closed >= 10

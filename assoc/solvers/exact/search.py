@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from functools import partial
 
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.bounds.matched import matched
@@ -17,10 +15,11 @@ from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_component
 from assoc.packing.components.turns import Turns
-from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
+from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
+from assoc.solvers.exact.regions import close_by_regions
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
@@ -41,8 +40,6 @@ _HARD = 500
 _DENSE = 15
 # columns per row up to which a component is nearly decided: branching goes first
 _THIN = 4
-# share of a component's rows up to which they are worth a search of their own
-_SHARE = 0.7
 
 
 @dataclass(slots=True, kw_only=True)
@@ -173,7 +170,7 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
         if task.branch_shortly():
             done.append(task)
         else:
-            left.extend(_Task(part, searches) for part in _sharpen(task.component, run))
+            left.extend(_Task(part, searches) for part in _sharpen(task.component, searches))
     tasks = done + left
     searches.record(tasks)
     searches.take(tasks)
@@ -208,50 +205,29 @@ def _match(component: Component) -> bool:
     return component.closed
 
 
-def _complete(component: Component, run: Run) -> None:
-    """Offer what the reduced costs decide, completed by the best choice for the rows that they leave open.
-
-    In large scenes half of the rows are so clearly decided that what is open falls into small parts.
-    """
-    packing = component.packing
-    if packing.num_rows < _LARGE or packing.is_axial:
-        return
-    decided = _decided(component)
-    # row -1, a sensor that missed, is never covered
-    free = ~np.append(Cover.of(packing, decided).owner >= 0, False)[packing.cols].any(axis=1)
-    rest = packing.restrict(free & (component.reduced <= component.weight - component.bound))
-    if 0 < rest.num_rows < _SHARE * packing.num_rows:
-        found = search_to_the_end(rest, _SHORT * rest.num_components, 0, run.part(run.rng, run.time_limit))
-        cover = Cover.of(packing, np.concatenate([decided, rest.origin[found.columns]]))
-        component.offer(cover.owner, cover.weight)
-
-
-def _decided(component: Component) -> NDArray[np.int32]:
-    """Columns that are the cheapest of all their rows, with a margin above the median of the rows."""
-    packing = component.packing
-    start = packing.row_ptr[:-1]
-    row = np.repeat(np.arange(packing.num_rows), np.diff(packing.row_ptr))
-    cost = component.reduced[packing.row_cols]
-    cheapest = cost <= np.minimum.reduceat(cost, start)[row]
-    second = np.minimum(np.minimum.reduceat(np.where(cheapest, np.inf, cost), start), -component.duals)
-    margin = np.where(np.add.reduceat(cheapest, start) > 1, 0.0, second - np.minimum.reduceat(cost, start))
-    clear = cheapest & (margin > max(float(np.median(margin)), 0.0))[row]
-    count = np.bincount(packing.row_cols[clear], minlength=packing.num_columns)
-    return np.flatnonzero(count == np.count_nonzero(packing.cols >= 0, axis=1)).astype(np.int32)
-
-
-def _sharpen(component: Component, run: Run) -> list[Component]:
+def _sharpen(component: Component, searches: _Searches) -> list[Component]:
     """Repeat the dual ascent, with enough time at every temperature, on a component that the reduction left open."""
+    run = searches.run
     if run.should_stop():
         # one pass over a million columns takes longer than a short time limit
         return [component]
     component.take_over(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():
-        _complete(component, run)
+        packing = component.packing
+        if packing.num_rows >= _LARGE and not packing.is_axial and component.best is not None:
+            close_by_regions(component, partial(_search_shortly, searches))
         parts = split_component(component)
         if parts:
             return [smaller for part in parts for smaller in _with_program(part, run)]
     return _with_program(component, run)
+
+
+def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
+    """Search a packing of small components, each for a moment."""
+    run, nodes = searches.run, min(_SHORT * packing.num_components, searches.nodes_left)
+    found = search_to_the_end(packing, nodes, 0, run.part(run.rng, run.time_limit))
+    searches.iterations += found.iterations
+    return found
 
 
 def _with_program(component: Component, run: Run) -> list[Component]:

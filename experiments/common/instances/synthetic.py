@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from assoc.problem import AssignmentProblem
 
@@ -101,3 +102,33 @@ def planted(sensors: int, seed: int, targets: int | None = None) -> tuple[Assign
     costs += np.where(np.isin(keys, planted_keys), 0.0, rng.uniform(0.5, 20.0, len(keys)))
     optimum = float(sum(u.sum() for u in multipliers))
     return AssignmentProblem(tuples.astype(np.int32), costs, sizes), optimum
+
+
+def wide_gates(targets: int, seed: int, noise: float = 0.6) -> AssignmentProblem:
+    """Three lists of points in the plane; tuples of points near each other, at the cost of the likelihood ratio.
+
+    With a noise of 0.5 and more, in units of the targets' mean distance, one component has nearly all tuples.
+    """
+    rng = np.random.default_rng(seed)
+    points = rng.random((targets, 2)) * np.sqrt(targets)
+    lists = [points[rng.random(targets) < 0.95] for _ in range(3)]
+    lists = [z + rng.normal(size=z.shape) * noise for z in lists]
+    trees = [cKDTree(z) for z in lists]
+    near = {(s, t): trees[s].query_ball_tree(trees[t], 2.3 * noise) for s, t in [(0, 1), (0, 2), (1, 2)]}
+    tuples = [(i + 1, j + 1, 0) for i, js in enumerate(near[0, 1]) for j in js]
+    tuples += [(i + 1, 0, k + 1) for i, ks in enumerate(near[0, 2]) for k in ks]
+    tuples += [(0, j + 1, k + 1) for j, ks in enumerate(near[1, 2]) for k in ks]
+    tuples += [
+        (i + 1, j + 1, k + 1)
+        for i, js in enumerate(near[0, 1])
+        for j in js
+        for k in set(near[0, 2][i]) & set(near[1, 2][j])
+    ]
+    rows = np.array(tuples)
+    there = rows > 0
+    z = np.stack([lists[s][rows[:, s] - 1] for s in range(3)], axis=1) * there[..., None]
+    count = there.sum(axis=1)
+    mean = z.sum(axis=1) / count[:, None]
+    spread = (((z - mean[:, None]) * there[..., None]) ** 2).sum(axis=(1, 2)) / (2.0 * noise**2)
+    costs = spread - 0.742 * count + 3.0 * (3 - count) - np.log(2.0 * np.pi * noise**2 / count)
+    return AssignmentProblem(rows, costs, [len(z) for z in lists])

@@ -1,0 +1,140 @@
+"""Large components whose gap comes from a few places: search these regions alone, then the little that they leave.
+
+Good multipliers u leave most rows decided. What the best cover costs above the bound comes from the others: A, the rows
+of their columns. For any set A of rows with slack, every solution weighs at least
+
+    sum_{r not in A} u_r  +  min sum_{j that touch A} (w_j - sum_{r of j not in A} u_r) x_j
+
+where the minimum is over packings of the rows of A. It falls into independent regions, which are solved exactly. An
+answer whose columns stay inside A replaces that part of the cover, and its region has no gap left; where columns reach
+out of A, A grows. In the end the gap is what the rows outside of A cost. Columns that cost more than that are dropped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._types import Floats
+from assoc.packing.components.component import Component
+from assoc.packing.kernels.rounding import margin
+from assoc.packing.neighbourhoods.cover import Cover, own_all
+from assoc.packing.packing import Packing, assemble
+from assoc.packing.run import Outcome
+
+# share of the gap that rows outside of the first regions may cost
+_OUTSIDE = 0.02
+# share of the rows above which regions are not worth a search, and share of the columns for what they leave
+_MOST = 0.5
+_LEFT = 0.7
+# rounds of growth: a region grows by a column or two in each
+_ROUNDS = 40
+
+Solve = Callable[[Packing], Outcome]
+
+
+class _Searched(NamedTuple):
+    """What regions have shown.
+
+    Attributes
+    ----------
+    bound : float
+        A lower bound on solutions lighter than the best cover.
+    extra : float array, shape (N,)
+        What a solution with this column weighs more than the bound, at least.
+    reaching : int array
+        Columns of the answers that have rows outside of all regions; empty if regions could not be closed.
+    """
+
+    bound: float
+    extra: Floats
+    reaching: NDArray[np.int32]
+
+
+def close_by_regions(component: Component, solve: Solve) -> None:
+    """Improve the cover and the bound of a component, whose rows all have slack, by searches of regions."""
+    packing = component.packing
+    inside = _costly(component)
+    for _ in range(_ROUNDS):
+        _complete(component, inside)
+        if np.count_nonzero(inside) > _MOST * packing.num_rows:
+            return
+        weight = component.weight
+        searched = _search(component, inside, solve)
+        component.proven = max(component.proven, min(searched.bound, weight))
+        if component.closed or not searched.reaching.size:
+            break
+        inside[packing.cols[searched.reaching]] = True
+    if component.closed:
+        return
+    cutoff = component.weight - (component.tolerance if packing.granularity else 0.0)
+    keep = searched.bound + searched.extra <= cutoff
+    keep[component.best_columns()] = True
+    rest = packing.restrict(keep)
+    if rest.num_columns <= _LEFT * packing.num_columns:
+        found = solve(rest)
+        cover = Cover.of(packing, rest.origin[found.columns])
+        component.offer(cover.owner, cover.weight)
+        component.proven = max(component.proven, min(found.lower_bound, cutoff))
+
+
+def _costly(component: Component) -> NDArray[np.bool_]:
+    """The rows that cost most of the gap, shape (R + 1,); the last is no row, a sensor that missed."""
+    best = component.best
+    assert best is not None
+    cost = np.where(best >= 0, component.reduced[best], -component.duals)
+    order = np.argsort(cost)
+    # all rows of a column name its reduced cost
+    outside = np.cumsum(cost[order]) <= _OUTSIDE * component.packing.num_sensors * (component.weight - component.bound)
+    inside = np.zeros(cost.size + 1, dtype=np.bool_)
+    inside[order[~outside]] = True
+    return inside
+
+
+def _complete(component: Component, inside: NDArray[np.bool_]) -> None:
+    """Add all rows of the best cover's columns that have rows inside."""
+    assert component.best is not None
+    chosen = component.best[inside[:-1]]
+    inside[component.packing.cols[chosen[chosen >= 0]]] = True
+    inside[-1] = False
+
+
+def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _Searched:
+    """Solve all regions; where an answer stays inside, it replaces that part of the best cover."""
+    packing, duals, best = component.packing, component.duals, component.best_columns()
+    touching = inside[packing.cols].any(axis=1) & (component.reduced <= component.weight - component.bound)
+    touching[best] |= inside[packing.cols[best]].any(axis=1)
+    places = np.flatnonzero(touching).astype(np.int32)
+    cols = packing.cols[places]
+    own = inside[cols]
+    weights = packing.weights[places] - np.where(own, 0.0, np.append(duals, 0.0)[cols]).sum(axis=1)
+    useful = (weights < 0.0) | np.isin(places, best)
+    regions = assemble(np.where(own, cols, np.int32(-1))[useful], weights[useful], packing.arrays.slack, places[useful])
+    found = solve(regions)
+    region = np.searchsorted(regions.col_start, found.columns, side="right") - 1
+    gained = -np.add.reduceat(duals[regions.row_origin], regions.row_start[:-1])
+    np.add.at(gained, region, regions.weights[found.columns])
+    # a column that is not useful costs its weight on top of an answer without it, any other at most its own region
+    extra = component.reduced.copy()
+    extra[places] = weights
+    extra[regions.origin] = component.reduced[regions.origin] - np.repeat(gained, np.diff(regions.col_start))
+    rounding = 2.0 * margin(float(np.abs(duals).sum()), packing.num_sensors)
+    bound = component.bound - math.fsum(duals[inside[:-1]]) + found.lower_bound - rounding
+
+    chosen = regions.origin[found.columns]
+    reaches = ((packing.cols[chosen] >= 0) & ~inside[packing.cols[chosen]]).any(axis=1)
+    settled = np.ones(regions.num_components, dtype=np.bool_)
+    settled[region[reaches]] = False
+    assert component.best is not None
+    owner = component.best.copy()
+    owner[regions.row_origin[np.repeat(settled, np.diff(regions.row_start))]] = -1
+    own_all(packing.arrays.cols, chosen[settled[region]], owner)
+    component.offer(owner, component.weight_of(owner))
+    # regions that are too hard would only become harder
+    left = float(regions.weights[found.columns].sum()) - found.lower_bound
+    hard = left > _OUTSIDE * (component.weight - component.bound)
+    return _Searched(bound, extra, chosen[reaches & (not hard)])
