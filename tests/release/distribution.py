@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.release.build import Built, WrongError, build, installed, run
+from tests.release.kernels import OF_RADARS, RADARS
 from tests.release.requirements import ROOT
 from tests.reliability.cold_cache import without_times
 
@@ -152,6 +153,7 @@ _USUAL = (
     ("solve", "scene.npz", "--kbest", "3", "--scans", "0:10", "--json", "kbest.json"),
     ("solve", "crowd.npz", "--json", "crowd.json"),
     ("track", "scene.npz", "-o", "tracks.csv"),
+    *OF_RADARS,
     ("sweep", "scene.npz", "--solver", "aco", "--grid", "ants=2,3", "--scans", "0:2", "-o", "study"),
 )
 _COMPILING = (*_USUAL[:1], *_USUAL[2:4])
@@ -161,6 +163,7 @@ _COMPILING = (*_USUAL[:1], *_USUAL[2:4])
 def compiled(python: Path, place: Path, programs: tuple[tuple[str, ...], ...], **more: str) -> int:
     """Run programs in a new folder with an empty cache; how many kernels they and their processes compiled."""
     place.mkdir()
+    (place / "radars.toml").write_text(RADARS)
     for program, *words in programs:
         command = [python, "-W", "error", "-c", COUNTED, f"assoc.{program}", *words]
         # what is missing must be compiled and counted, not interpreted
@@ -179,8 +182,9 @@ def check_kernels(python: Path, folder: Path) -> None:
     print(f"compiled: {count}", flush=True)
     if count:
         raise WrongError((place / "compiled.txt").read_text())
-    made = {path.name for path in place.iterdir()} - {"cache", "compiled.txt"}
-    written = {word for _, *words in _USUAL for word in words if word.endswith((".npz", ".json", ".csv"))} | {"study"}
+    made = {path.name for path in place.iterdir()} - {"cache", "compiled.txt", "radars.toml"}
+    endings = (".npz", ".json", ".csv", ".kml")
+    written = {word for _, *words in _USUAL for word in words if word.endswith(endings)} | {"study"}
     if made != written:
         raise WrongError(f"the programs leave {sorted(made)}")
     for name, settings in (("generic", {"NUMBA_CPU_NAME": "generic"}), ("other-numba", {})):

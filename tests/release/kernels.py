@@ -2,7 +2,7 @@
 
     python tests/release/kernels.py FOLDER      (a part of make dist; takes some minutes)
 
-compiles what the usual road calls (simulate, solve, kbest, marginals, track, sweep with default settings) with the
+compiles what the usual road calls (simulate, solve, kbest, marginals, track, live, sweep, by default settings) with the
 ``assoc`` that this Python imports, into an empty cache. A second process goes the same road, must compile nothing, and
 tells which of the files it read: those are the kernels called from Python, and they alone are copied to FOLDER. What a
 kernel calls itself is a part of its code. FOLDER has the folders of the package, with numba's own files in them.
@@ -34,6 +34,28 @@ _TRACKERS = ("multi-sensor", "static", "mht", "mht-hypothesis", "nearest-neighbo
 _FILTERS = ("imm-cv", "ekf", "modified-ekf", "ukf", "imm")
 _PLOT_FILTERS = ("ekf", "ukf")
 
+RADARS = """
+[[radar]]
+name = "north"
+file = "north.csv"
+place = [47.5, 8.0, 0.0]
+noise = [150.0, 0.1]
+
+[[radar]]
+name = "south"
+file = "south.csv"
+place = [46.8, 8.6, 0.0]
+noise = [150.0, 0.1]
+"""
+"""A radars.toml of the plots that `OF_RADARS` simulates."""
+_RADAR = ("simulate", "rotating-radar", "--duration", "90", "--range-step", "0.25")
+OF_RADARS = (
+    (*_RADAR, "--latitude", "47.5", "--longitude", "8", "-o", "north.csv"),
+    (*_RADAR, "--latitude", "46.8", "--longitude", "8.6", "-o", "south.csv"),
+    ("track", "radars.toml", "--map", "map.kml", "-o", "radars.csv"),
+    ("live", "radars.toml", "--replay", "0", "--page", "0", "--state", "live.npz", "-o", "live.csv"),
+)
+
 
 def usual_road() -> Iterator[tuple[str, ...]]:
     """The programs' command lines, in the order in which each finds the files it reads."""
@@ -55,6 +77,10 @@ def usual_road() -> Iterator[tuple[str, ...]]:
         yield ("track", "plots.csv", "--filter", choice, "-o", f"plots-{choice}.csv")
     for tracker in ("nearest-neighbour", "mht-hypothesis"):
         yield ("track", "plots.csv", "--tracker", tracker, "-o", f"plots-{tracker}.csv")
+    yield from OF_RADARS
+    yield ("simulate", "rotating-radars", "--duration", "60", "-o", "turning.npz")
+    yield ("track", "turning.npz", "-o", "turning.csv")
+    yield ("live", "turning.npz", "--turns", "4,5,5.5", "--replay", "0", "-o", "turning-live.csv")
     yield ("sweep", "radars.npz", "--solver", "aco", "exact", "--grid", "aco.ants=2,3", "--scans", "0:2", "-o", "study")
 
 
@@ -70,6 +96,7 @@ def go() -> None:
 
     from numba.core import event
 
+    Path("radars.toml").write_text(RADARS)
     read: set[str] = set()
 
     def note(what: str, arguments: Any) -> None:
