@@ -130,6 +130,17 @@ def read_problem(path: str) -> Problem:
     return Problem(sizes, dummies, costs)
 
 
+def read_solution(text: str) -> tuple[list[tuple[int, ...]], str | None]:
+    """Return the chosen tuples of a solution in text form, and the cost that it claims."""
+    lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines or lines[0] != ["assoc-solution", "1"]:
+        raise ValueError("the first line must be 'assoc-solution 1'")
+    claims = [word for line in lines if line[0] == "cost" for word in line[1:] or [""]]
+    if len(claims) > 1:
+        raise ValueError("expected at most one line 'cost C'")
+    return [tuple(map(_whole, line)) for line in lines[1:] if line[0] != "cost"], claims[0] if claims else None
+
+
 def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = None) -> int:
     """Return the cost of a choice of tuples; refuse it if it is not a solution, or its cost is not the claimed one."""
     used: set[Row] = set()
@@ -265,14 +276,7 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
 def check(problem: Problem, text: str) -> list[str]:
     """Return the claims that hold, in lines; raise `RefusedError` if one does not."""
     if not text.lstrip().startswith("{"):
-        lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
-        if not lines or lines[0] != ["assoc-solution", "1"]:
-            raise ValueError("the first line must be 'assoc-solution 1'")
-        claims = [word for line in lines if line[0] == "cost" for word in line[1:] or [""]]
-        chosen = [tuple(map(_whole, line)) for line in lines[1:] if line[0] != "cost"]
-        if len(claims) > 1:
-            raise ValueError("expected at most one line 'cost C'")
-        return [f"feasible, cost {shown(cost_of(problem, chosen, *claims))}"]
+        return [f"feasible, cost {shown(cost_of(problem, *read_solution(text)))}"]
     proof = json.loads(text, parse_float=str, parse_int=str)
     if proof.get("format") != "assoc-proof" or proof.get("version") != "1":
         raise ValueError("expected the format 'assoc-proof', version 1")

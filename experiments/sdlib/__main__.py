@@ -8,7 +8,7 @@
 
 ``run`` compares our solvers with each other and with the peers that are installed, or runs a command, once for each
 instance, with the paths of an instance (plain text) and of the solution that it must write. Each has one core and so
-many seconds of CPU time; solutions are judged by verify.py. docs/benchmark_set.md describes the set and the files.
+many seconds of CPU time; solutions are judged by assoc/check.py. docs/benchmark_set.md describes the set and the files.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Any solver as a command: started once for each instance, watched while it runs, judged by verify.py."""
+"""Any solver as a command: started once for each instance, watched while it runs, judged by assoc/check.py."""
 
 import lzma
 import os
@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from assoc import check
 from experiments.benchmarks.run import one_core
-from experiments.sdlib import store, verify
+from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 
 # seconds from one look at a running command to the next; wall time at the most: a multiple of CPU time, and more
@@ -34,16 +35,16 @@ def run_command(picked: list[Instance], command: str, seconds: float) -> Iterato
         for one in picked:
             path.write_bytes(lzma.open(store.instance_file(one.name)).read())
             solution.unlink(missing_ok=True)
-            instance = verify.read_instance(str(path))
+            problem = check.read_problem(str(path))
             words = [word.format(instance=path, solution=solution) for word in shlex.split(command)]
             row: dict[str, Any] = {"instance": one.name, "solver": "command"}
-            row |= _watched(words, solution, seconds, instance)
+            row |= _watched(words, solution, seconds, problem)
             best = known.get(one.name, {}).get("value")
             row["excess"] = None if best is None or row["cost"] is None else float(row["cost"]) - float(best)
             yield row
 
 
-def _watched(words: list[str], solution: Path, seconds: float, instance: tuple[Any, Any, Any]) -> dict[str, Any]:
+def _watched(words: list[str], solution: Path, seconds: float, problem: check.Problem) -> dict[str, Any]:
     trace: list[list[Any]] = []
     seen, used, started = 0, 0.0, time.perf_counter()
     with one_core():
@@ -61,7 +62,7 @@ def _watched(words: list[str], solution: Path, seconds: float, instance: tuple[A
         changed = solution.stat().st_mtime_ns if solution.exists() else 0
         if changed != seen:
             seen = changed
-            cost, _ = _judge(solution, instance)
+            cost, _ = _judge(solution, problem)
             if cost is not None and (not trace or float(cost) < trace[-1][1]):
                 trace.append([round(used, 3), float(cost), None])
         if code is not None or used >= seconds or wall >= _PATIENT * seconds + _START:
@@ -70,18 +71,19 @@ def _watched(words: list[str], solution: Path, seconds: float, instance: tuple[A
     if code is None:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    cost, fault = _judge(solution, instance)
+    cost, fault = _judge(solution, problem)
     row = {"trace": trace, "seconds": round(used, 3), "exit": code, "cost": cost, "proved": False}
     return row if fault is None else {**row, "fault": fault}
 
 
-def _judge(solution: Path, instance: tuple[Any, Any, Any]) -> tuple[str | None, str | None]:
+def _judge(solution: Path, problem: check.Problem) -> tuple[str | None, str | None]:
     """The cost of what a command left behind, or what is wrong with it."""
     try:
-        return verify.decimal(verify.cost_of(*instance, verify.read_solution(str(solution))[0])), None
+        chosen, _ = check.read_solution(check.read_text(str(solution)))
+        return store.decimal(check.cost_of(problem, chosen)), None
     except FileNotFoundError:
         return None, "no solution was written"
-    except (OSError, ValueError, verify.NoSolutionError) as error:
+    except (OSError, ValueError, check.RefusedError) as error:
         return None, str(error)
 
 

@@ -1,4 +1,4 @@
-"""A comparison of solvers on the set: each alone on one core, for so much CPU time, judged by verify.py.
+"""A comparison of solvers on the set: each alone on one core, for so much CPU time, judged by assoc/check.py.
 
 Every run is a process of its own, forked from one in which all kernels are compiled: it begins with the problem read,
 and its time is CPU time, so that other programs on the machine hardly matter. What it finds it writes down at once;
@@ -16,11 +16,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from assoc import check
 from assoc.errors import AssocError
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks.run import one_core
 from experiments.benchmarks.run import warm_up as compile_kernels
-from experiments.sdlib import store, verify
+from experiments.sdlib import store
 from experiments.sdlib.contestants import CONTESTANTS, OURS, Log, is_installed, takes, warm_up
 from experiments.sdlib.instances import Instance
 
@@ -54,12 +55,12 @@ def contest(picked: list[Instance], names: list[str], seconds: float) -> Iterato
     known = store.table()
     for one in picked:
         problem = store.load(one.name)
-        instance = verify.read_instance(str(store.instance_file(one.name)))
+        exact = check.read_problem(str(store.instance_file(one.name)))
         for name in present:
             row: Row = {"instance": one.name, "solver": name}
             if takes(name, problem):
                 found = _run(name, problem, seconds, float(known[one.name]["value"]))
-                yield row | judged(found, instance, seconds)
+                yield row | judged(found, exact, seconds)
             else:
                 yield row | {"fault": "cannot take it"}
 
@@ -115,15 +116,15 @@ def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: flo
             write({"seconds": round(log.elapsed(), 4), "fault": f"{type(error).__name__}: {error}"[:100]})
 
 
-def judged(found: Row, instance: tuple[Any, Any, Any], seconds: float) -> Row:
-    """Replace the tuples by what the verifier says of them; leave out what came after the time."""
+def judged(found: Row, problem: check.Problem, seconds: float) -> Row:
+    """Replace the tuples by their exact cost, or by why they are no solution; leave out what came after the time."""
     tuples = found.pop("tuples", None)
     row: Row = {"cost": None, "proved": False, **found}
     row["trace"] = _thinned([point for point in found["trace"] if point[0] <= 1.05 * seconds])
     if tuples:
         try:
-            row["cost"] = verify.decimal(verify.cost_of(*instance, [tuple(one) for one in tuples]))
-        except verify.NoSolutionError as error:
+            row["cost"] = store.decimal(check.cost_of(problem, [tuple(one) for one in tuples]))
+        except check.RefusedError as error:
             row |= {"fault": f"no solution: {error}", "proved": False, "trace": []}
     return row
 

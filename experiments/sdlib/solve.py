@@ -13,7 +13,7 @@ from assoc.problem import AssignmentProblem
 from assoc.proofs.write import write_proof
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
-from experiments.sdlib import store, verify
+from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 
 
@@ -56,15 +56,13 @@ def solve(one: Instance, known: dict[str, Any] | None, solver: str, seconds: flo
 
 
 def exact_cost(problem: AssignmentProblem, solution: Solution) -> str:
-    """Return the cost of a solution as `verify` adds it up."""
+    """Return the cost of a solution as `assoc.check` adds it up."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "problem.txt"
         problem.save(path)
-        return verify.decimal(verify.cost_of(*verify.read_instance(str(path)), _tuples(solution)))
-
-
-def _tuples(solution: Solution) -> list[tuple[int, ...]]:
-    return [tuple(one) for one in solution.tuples.tolist()]
+        return store.decimal(
+            check.cost_of(check.read_problem(str(path)), [tuple(one) for one in solution.tuples.tolist()])
+        )
 
 
 def _prove(name: str, problem: AssignmentProblem, solution: Solution, seconds: float) -> float:
@@ -77,23 +75,22 @@ def _prove(name: str, problem: AssignmentProblem, solution: Solution, seconds: f
 
 
 def check_row(name: str, row: dict[str, Any]) -> str | None:
-    """Check a row of the table by the verifier and, if it says optimal, by the checker of proofs; what is wrong."""
+    """Check the solution of a row of the table and, if it says optimal, the proof; what is wrong."""
     try:
         if store.digest(name) != row["digest"]:
             return "is not the instance that the table is about"
-        instance = verify.read_instance(str(store.instance_file(name)))
-        chosen, _ = verify.read_solution(str(store.solution_file(name)))
-        cost = verify.cost_of(*instance, chosen)
-        if verify.decimal(cost) != row["value"]:
-            return f"costs {verify.decimal(cost)}, the table says {row['value']}"
+        problem = check.read_problem(str(store.instance_file(name)))
+        chosen, _ = check.read_solution(store.solution_file(name).read_text())
+        cost = store.decimal(check.cost_of(problem, chosen))
+        if cost != row["value"]:
+            return f"costs {cost}, the table says {row['value']}"
         if row["status"] != "optimal":
             return None
-        problem = check.read_problem(str(store.instance_file(name)))
         with lzma.open(store.proof_file(name)) as file:
             proof = file.read().decode()
         said = check.check(problem, proof)[-1]
         if "(gap 0.000000000)" not in said:
             return f"what is {said}"
-    except (OSError, ValueError, verify.NoSolutionError, check.RefusedError) as error:
+    except (OSError, ValueError, check.RefusedError) as error:
         return str(error)
     return None

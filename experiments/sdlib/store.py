@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from assoc._files.output import write_atomically, write_json
+from assoc.check import DECIMALS
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
@@ -44,6 +45,12 @@ def solution_text(solution: Solution, cost: str) -> str:
     """Write down a solution."""
     lines = ["assoc-solution 1", f"cost {cost}", *(" ".join(map(str, one)) for one in solution.tuples.tolist())]
     return "\n".join(lines) + "\n"
+
+
+def decimal(cost: int) -> str:
+    """Write a cost of `assoc.check`, whole multiples of 1e-60, as a decimal."""
+    whole, rest = divmod(abs(cost), 10**DECIMALS)
+    return ("-" if cost < 0 else "") + f"{whole}.{rest:0{DECIMALS}}".rstrip("0").rstrip(".")
 
 
 def pack(path: Path, text: str) -> None:

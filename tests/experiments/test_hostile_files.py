@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from assoc import check
-from experiments.sdlib import verify
 
 GOOD = "assoc-problem 1\nsizes 1 2\ndummies yes\ntuples 4\n-3.5 1 1\n0.0 1 0\n0.0 0 1\n0.0 0 2\n"
 PROOF = {
@@ -25,11 +24,10 @@ HEAD = "assoc-problem 1\nsizes 2 2\ndummies yes\ntuples "
 BYTES = 1_500_000_000
 
 
-def run(program: str, *words: object) -> subprocess.CompletedProcess[str]:
-    """Run one of the two files alone, with 1.5 GB of memory at the most."""
-    path = {"check": check.__file__, "verify": verify.__file__}[program]
+def run(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run the file alone, with 1.5 GB of memory at the most."""
     return subprocess.run(
-        [sys.executable, "-I", "-S", path, *map(str, words)],
+        [sys.executable, "-I", "-S", check.__file__, *map(str, words)],
         capture_output=True,
         text=True,
         timeout=120,
@@ -65,17 +63,15 @@ INSTANCES = {
 }
 
 
-@pytest.mark.parametrize("program", ["check", "verify"])
 @pytest.mark.parametrize("how", INSTANCES)
-def test_hostile_instances(program, how, tmp_path):
+def test_hostile_instances(how, tmp_path):
     (tmp_path / "i.txt").write_bytes(INSTANCES[how])
     (tmp_path / "s.txt").write_text("assoc-solution 1\n1 1\n0 2\n")
-    _refused(run(program, tmp_path / "i.txt", tmp_path / "s.txt"), "i.txt")
+    _refused(run(tmp_path / "i.txt", tmp_path / "s.txt"), "i.txt")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("program", ["check", "verify"])
-def test_packed_files_that_are_cut_or_unpack_to_too_much(program, tmp_path):
+def test_packed_files_that_are_cut_or_unpack_to_too_much(tmp_path):
     (tmp_path / "s.txt").write_text("assoc-solution 1\n1 1\n0 2\n")
     whole = lzma.compress(GOOD.encode())
     for name, content in {
@@ -85,7 +81,7 @@ def test_packed_files_that_are_cut_or_unpack_to_too_much(program, tmp_path):
     }.items():
         (tmp_path / f"{name}.txt.xz").write_bytes(content)
         assert len(content) < 100_000
-        _refused(run(program, tmp_path / f"{name}.txt.xz", tmp_path / "s.txt"), name)
+        _refused(run(tmp_path / f"{name}.txt.xz", tmp_path / "s.txt"), name)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +110,7 @@ def test_hostile_proofs(content, tmp_path):
     digest = check.read_problem(str(tmp_path / "i.txt")).digest
     content = content.replace('"format": "assoc-proof"', f'"format": "assoc-proof", "problem": "{digest}"')
     (tmp_path / "p.json").write_text(content)
-    _refused(run("check", tmp_path / "i.txt", tmp_path / "p.json"), "p.json")
+    _refused(run(tmp_path / "i.txt", tmp_path / "p.json"), "p.json")
 
 
 @pytest.mark.slow
@@ -129,7 +125,7 @@ def test_a_tree_without_end_is_refused(tmp_path):
     for nodes, words in ((shared, "children of its own"), (chain, "deeper than")):
         proof = {**PROOF, "problem": digest, "trees": [{**tree, "nodes": nodes}]}
         (tmp_path / "p.json").write_text(json.dumps(proof))
-        done = run("check", tmp_path / "i.txt", tmp_path / "p.json")
+        done = run(tmp_path / "i.txt", tmp_path / "p.json")
         _refused(done, "p.json")
         assert words in done.stderr
 

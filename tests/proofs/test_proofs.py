@@ -314,6 +314,7 @@ def test_a_proof_for_a_problem_with_another_cost_is_refused(valid):
         ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\n1e400 1 1\n", ""),
         ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\nnan 1 1\n", "decimal number"),
         ("assoc-problem 1\nsizes 999999999\ndummies yes\ntuples 0\n", "measurements"),
+        ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\n-1 1 0\n", "without dummies"),
     ],
 )
 def test_problems_that_cannot_be_read(tmp_path, text, reason):
@@ -367,6 +368,25 @@ def test_costs_above_the_digits_of_sixty_and_no_measurements(tmp_path):
         empty.save(tmp_path / "problem.txt")
         done = run_alone(tmp_path, "problem.txt", "proof.json")
         assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("lines", "code", "words"),
+    [
+        ("cost -4.5\n1 1\n0 2\n", 0, "feasible, cost -4.500000000"),
+        ("1 1\n", 1, "does not use measurement 2 of sensor 2"),
+        ("1 1\n0 1\n0 2\n", 1, "uses measurement 1 of sensor 2 twice"),
+        ("1 2\n0 1\n", 1, "which is not in the problem"),
+        ("cost -4.6\n1 1\n0 2\n", 1, "costs -4.500000000, not -4.6"),
+    ],
+)
+def test_solutions_are_judged(tmp_path, lines, code, words):
+    assoc.AssignmentProblem([[1, 1], [0, 1]], [-4.5, 0.0], [1, 2]).save(tmp_path / "p.txt")
+    (tmp_path / "s.txt").write_text(f"assoc-solution 1\n{lines}")
+    done = run_alone(tmp_path, "p.txt", "s.txt")
+    assert done.returncode == code and words in done.stdout + done.stderr
+    (tmp_path / "s.txt").write_text(lines)
+    assert "the first line must be 'assoc-solution 1'" in run_alone(tmp_path, "p.txt", "s.txt").stderr
 
 
 def test_a_second_claim_of_cost_is_refused(tmp_path):
