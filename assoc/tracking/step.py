@@ -31,6 +31,7 @@ from assoc.tracking.stages.checking import checked_measurements, checked_time
 from assoc.tracking.stages.identity_evidence import checked_identities
 from assoc.tracking.stages.looks import count_out_of_view, keep_pace
 from assoc.tracking.stages.merging import merge
+from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.taking_up import take_up
 from assoc.tracking.state import TrackerState, rng_of
 from assoc.tracking.track import Step
@@ -55,7 +56,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([end_ghosts, grow_nursery] if nursing else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
-        *([] if nursing else [take_up, merge]),
+        *([] if nursing else [take_up, merge, name_parents]),
         report,
     ]
 

@@ -47,6 +47,8 @@ class Track(Shown):
         Scans in a row in which sensors looked and none detected it.
     hidden : float
         Seconds since the last detection for which no sensor could see it.
+    parent : int
+        Track that it parted from, where one target became two; 0 for none.
     """
 
     track_id: int
@@ -63,6 +65,7 @@ class Track(Shown):
     existence: float
     missed: int = 0
     hidden: float = 0.0
+    parent: int = 0
 
     @property
     def status(self) -> Status:

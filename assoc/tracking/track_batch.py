@@ -21,13 +21,15 @@ MASK = (1 << HISTORY) - 1
 
 SCORE, BEST, STARTED, LAST, EXISTS, HIDDEN = 0, 1, 2, 3, 4, 5
 """Columns of the numbers of a batch."""
-ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
+ID, SURE, BITS, MISSED, HITS, PARENT = 0, 1, 2, 3, 4, 5
 """Columns of the counts of a batch."""
 
 _NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST, "existence": EXISTS,
             "hidden": HIDDEN}  # fmt: skip
-_COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
-_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence", "missed", "hidden")
+_COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS,
+           "parent": PARENT}  # fmt: skip
+_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence", "missed", "hidden",
+               "parent")  # fmt: skip
 
 
 def _column(table: str, number: int, what: str) -> Any:
@@ -47,8 +49,8 @@ class TrackBatch:
     numbers : array (T, 6)
         Score, best score, start (s), last detection (s), log odds of existence, seconds since the last detection out of
         view.
-    counts : int64 array (T, 5)
-        Track id, confirmed, detections, missed, hits.
+    counts : int64 array (T, 6)
+        Track id, confirmed, detections, missed, hits, parent.
     """
 
     __slots__ = ("counts", "numbers", "states")
@@ -66,6 +68,7 @@ class TrackBatch:
     detections = _column("counts", BITS, "One bit a scan, the last one lowest: whether it was detected; int64 (T,).")
     missed = _column("counts", MISSED, "Scans in a row without a detection, int64 (T,).")
     hits = _column("counts", HITS, "Scans with a detection, int64 (T,).")
+    parent = _column("counts", PARENT, "Id of the track that each parted from, 0 for none, int64 (T,).")
 
     @property
     def confirmed(self) -> Array:
@@ -83,7 +86,7 @@ class TrackBatch:
     def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> TrackBatch:
         """New tracks, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
-        numbers, counts = np.zeros((count, 6)), np.zeros((count, 5), dtype=np.int64)
+        numbers, counts = np.zeros((count, 6)), np.zeros((count, 6), dtype=np.int64)
         numbers[:, SCORE] = numbers[:, BEST] = numbers[:, EXISTS] = score
         numbers[:, STARTED] = numbers[:, LAST] = when
         counts[:, ID] = track_id
@@ -165,6 +168,14 @@ class TrackBatch:
         counts = self.counts.copy()
         for i, name in zip(ids.tolist(), names.tolist(), strict=True):
             counts[self.track_id == i, ID] = name
+            counts[self.parent == i, PARENT] = name
+        return TrackBatch(self.states, self.numbers, counts)
+
+    def with_parents(self, ids: Array, parents: Array) -> TrackBatch:
+        """The same tracks, those with ids (K,) parted from the tracks `parents` (K,)."""
+        counts = self.counts.copy()
+        for i, parent in zip(ids.tolist(), parents.tolist(), strict=True):
+            counts[self.track_id == i, PARENT] = parent
         return TrackBatch(self.states, self.numbers, counts)
 
     def confirm(self, life_cycle: LifeCycle) -> TrackBatch:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
     "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude", "status",
+    "parent",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
 
@@ -97,7 +98,7 @@ class TrackTable(Shown):
             speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
             altitude = altitude if altitudes is None else altitudes.get(track.track_id, math.nan)
             where = *track.position.tolist(), *track.velocity.tolist()
-            more = *sigma.tolist(), track.existence, speed, heading, altitude, track.status
+            more = *sigma.tolist(), track.existence, speed, heading, altitude, track.status, track.parent
             self._rows.append((track.track_id, track.time, *where, *life, *more))
             quality: dict[str, Any] = {}
             if qualities is not None:
@@ -126,6 +127,7 @@ class TrackTable(Shown):
             "confirmed": "bool",
             "hits": "int64",
             "status": "str",
+            "parent": "int64",
         }
         frame = frame.astype(kinds)
         if self.origin is not None:

@@ -323,7 +323,7 @@ def test_speed_heading_and_altitude(tmp_path, capsys):
     assert track.main([str(tmp_path / "plots.csv"), "-o", str(out), "--rotation", "10", *NOISE]) == 0
     capsys.readouterr()
     table = pd.read_csv(out)
-    assert list(table.columns[-8:-2]) == ["speed", "heading", "altitude", "status", "nis", "consistent"]
+    assert list(table.columns[-8:-2]) == ["heading", "altitude", "status", "parent", "nis", "consistent"]
     last = table.iloc[-1]
     # northward at 250 m/s, at flight level 300
     assert last.speed == pytest.approx(np.hypot(last.vx, last.vy)) and last.speed == pytest.approx(250, rel=0.1)

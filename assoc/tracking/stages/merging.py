@@ -89,6 +89,7 @@ def _merged(progress: Progress, tracks: TrackBatch, pairs: Array) -> Progress:
     # the one that gets the older name; what had that name ends, and so does a track under its own name
     kept = np.where(size[pairs[:, 1]] < size[pairs[:, 0]], stays, goes)
     state = method.renamed(progress.state, goes, kept)
+    state = state._replace(tracks=state.tracks.with_parents(stays, tracks.parent[pairs[:, 0]]))
     step = renamed(step, goes, stays)
     ended = np.sort(np.concatenate([step.ended, goes]))
     merged = np.stack([goes, stays], axis=1)

@@ -9,6 +9,7 @@ new starts are matched by the assignment problem of these log likelihood ratios.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,18 +37,26 @@ def take_up(progress: Progress) -> Progress:
     new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, known.track_id[known.confirmed])]
     # those that are probably gone; log odds
     coasting = tracks[tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0)]
-    if len(new) and len(lost) + len(coasting):
-        old = TrackBatch.concatenate([lost, coasting])
-        start, end = _matched(progress, new, old)
+    # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
+    left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
+    if len(new) and len(lost) + len(coasting) + len(left):
+        old = TrackBatch.concatenate([lost, coasting, left])
+        start, end = _matched(progress, new, old, len(left))
         if len(start):
             ids, names = new.track_id[start], old.track_id[end]
-            progress = progress._replace(state=method.renamed(progress.state, ids, names))
+            state = method.renamed(progress.state, ids, names)
+            tracks = state.tracks.with_parents(names, old.parent[end])
+            progress = progress._replace(state=state._replace(tracks=tracks))
             lost, step = lost[~np.isin(lost.track_id, names)], renamed(step, ids, names)
-    ended = known[np.isin(known.track_id, step.ended)]
-    # of several branches the best
-    ended = ended[np.lexsort((-ended.score, ended.track_id))]
-    ended = ended[np.unique(ended.track_id, return_index=True)[1]]
+            step = replace(step, ended=np.setdiff1d(step.ended, names[np.isin(names, left.track_id)]))
+    ended = _best(known[np.isin(known.track_id, step.ended)])
     return progress.with_state(lost=TrackBatch.concatenate([lost, ended]))._replace(step=step)
+
+
+def _best(branches: TrackBatch) -> TrackBatch:
+    """Of each track the branch with the best score."""
+    branches = branches[np.lexsort((-branches.score, branches.track_id))]
+    return branches[np.unique(branches.track_id, return_index=True)[1]]
 
 
 def _predicted(progress: Progress) -> TrackBatch:
@@ -60,13 +69,15 @@ def _predicted(progress: Progress) -> TrackBatch:
     return lost[recent & settings.births.narrow(places_of(settings.filter, lost.states)[1])]
 
 
-def _matched(progress: Progress, new: TrackBatch, old: TrackBatch) -> tuple[Array, Array]:
-    """Rows of new tracks and of the old ones that they continue."""
+def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) -> tuple[Array, Array]:
+    """Rows of new tracks and of the old ones that they continue; the last `left` of these may be of the same time."""
     settings = progress.settings
     motion, region = settings.filter.motion, settings.place.region
     place, velocity = np.array(motion.position), velocity_components(motion)
     both = np.concatenate([place, velocity])
-    start, end = np.nonzero(new.started[:, None] > old.last_detection[None, :])
+    after = new.started[:, None] > old.last_detection[None, :]
+    after[:, len(old) - left :] = True
+    start, end = np.nonzero(after)
     off = new.states.mean[start][:, both] - old.states.mean[end][:, both]
     spread = (new.states.covariance[start] + old.states.covariance[end])[:, both[:, None], both]
     # where a track was lost its target may have manoeuvred more than the filter expects
