@@ -12,6 +12,7 @@ from assoc.filters.imm import InteractingMultipleModel, Mixture, transition_from
 from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
 from assoc.filters.measurement import FunctionMeasurement, LinearMeasurement, Measurement
 from assoc.filters.modified_ekf import ModifiedEKF
+from assoc.filters.motion.correlated import Jerk, Singer
 from assoc.filters.motion.models import (
     ConstantAcceleration,
     ConstantVelocity,
@@ -47,6 +48,7 @@ __all__ = [
     "Gaussian",
     "History",
     "InteractingMultipleModel",
+    "Jerk",
     "KalmanFilter",
     "LinearMeasurement",
     "LinearMotion",
@@ -55,6 +57,7 @@ __all__ = [
     "ModifiedEKF",
     "Motion",
     "Padded",
+    "Singer",
     "UnitRates",
     "UnmannedAircraft",
     "UnscentedKalmanFilter",

@@ -1,4 +1,4 @@
-"""The modified EKF for a radar that measures range, azimuth and elevation."""
+"""The modified EKF for a radar that measures range, azimuth and, if it can, elevation."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 from assoc.sensors.base import wrap_angle
-from assoc.sensors.codes import RADAR3D
+from assoc.sensors.codes import RADAR2D, RADAR3D
+
+# of radars, how many quantities they measure
+_DIMENSIONS = {RADAR3D: 3, RADAR2D: 2}
 
 
 class ModifiedEKF(GaussianFilter):
     """The modified EKF of Park and Lee: the residual debiased, its covariance widened by the curvature.
 
     It linearises the position that a measurement points at instead of the measurement itself. What matters
-    is r sigma_azimuth^2 / sigma_range: above about 0.25 an ordinary EKF becomes overconfident.
+    is r sigma_azimuth^2 / sigma_range: above about 0.25 an ordinary EKF becomes overconfident. Sensors are `Radar3D`,
+    and `Radar2D` without heights, where the terms of the elevation fall away; a missed measurement is a prediction
+    without a correction, as with any filter.
 
     Parameters
     ----------
@@ -45,10 +50,12 @@ class ModifiedEKF(GaussianFilter):
         o = super().observe(sensor)
         # remembered again below, once it has passed
         self._seen = (None, None)
-        if o.code != RADAR3D:
-            raise InvalidInputError(f"sensor must be a Radar3D for a modified EKF, got {type(sensor).__name__}")
-        if o.dim != 3:
-            raise InvalidInputError("sensor: a modified EKF takes no range rate; use ExtendedKalmanFilter")
+        if o.code not in _DIMENSIONS:
+            raise InvalidInputError(
+                f"sensor must be a Radar3D or Radar2D for a modified EKF, got {type(sensor).__name__}"
+            )
+        if o.dim != _DIMENSIONS[o.code]:
+            raise InvalidInputError("sensor: a modified EKF takes no range rate or height; use ExtendedKalmanFilter")
         if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
         self._seen = (sensor, o)
@@ -58,18 +65,21 @@ class ModifiedEKF(GaussianFilter):
         """`log_likelihood` and `distances` of debiased residuals, (B, M) each."""
         o = self.observe(sensor)
         z = finite(measurements, "measurements", 2)
-        if z.shape[1] != 3:
-            raise InvalidInputError(f"measurements must have shape (M, 3), got {z.shape}")
+        if z.shape[1] != o.dim:
+            raise InvalidInputError(f"measurements must have shape (M, {o.dim}), got {z.shape}")
         h, covariance = self.expected(state, sensor)
         v = z[None] - h[:, None]
         v[..., 1] = wrap_angle(v[..., 1])
-        r, e = h[:, 0, None], h[:, 2, None]
-        t, p = v[..., 1].copy(), v[..., 2].copy()
-        st, sp = o.covariance[0, 1, 1], o.covariance[0, 2, 2]
+        r, t, st = h[:, 0, None], v[..., 1].copy(), o.covariance[0, 1, 1]
+        p, sp = (v[..., 2].copy(), o.covariance[0, 2, 2]) if o.dim == 3 else (0.0, 0.0)
         if self.kind == SIMPLIFIED:
             v[..., 0] -= 0.5 * r * (t**2 + p**2 - st - sp)
-        else:
-            v[..., 0] -= 0.5 * r * (np.cos(e) ** 2 * (t**2 - st) + p**2 - sp)
+            return scores(v, covariance)
+        ground = np.hypot(*(state.mean[:, self.motion.position[:2]] - sensor.position[:2]).T)
+        c2 = (ground[:, None] / r) ** 2
+        v[..., 0] -= 0.5 * r * (c2 * (t**2 - st) + p**2 - sp)
+        if o.dim == 3:
+            e = h[:, 2, None]
             v[..., 1] -= np.tan(e) * t * p
             v[..., 2] += 0.5 * np.sin(e) * np.cos(e) * (t**2 - st)
         return scores(v, covariance)

@@ -14,6 +14,7 @@ from assoc.filters import (
     KalmanFilter,
     LinearMeasurement,
     LinearMotion,
+    Singer,
     UnscentedKalmanFilter,
 )
 from assoc.sensors import Radar3D
@@ -164,3 +165,16 @@ def test_stone_soup(kind):
         state = ours.update(ours.predict(state, 1.0), z, seen).state
         mean = np.asarray(theirs.state_vector, dtype=float).ravel()
         same(state, mean, np.asarray(theirs.covar, dtype=float))
+
+
+def test_singers_model_is_that_of_stone_soup():
+    from stonesoup.models.transition.linear import Singer as Peer
+
+    sigma, seconds = 3.0, 20.0
+    ours = Singer(sigma, seconds, dimensions=2)
+    theirs = Peer(noise_diff_coeff=2 * sigma**2 / seconds, damping_coeff=1 / seconds)
+    for dt in (0.5, 4.0, 30.0):
+        step = datetime.timedelta(seconds=dt)
+        F, Q = (one[0][::2, ::2] for one in ours.matrices(dt))
+        np.testing.assert_allclose(F, theirs.matrix(time_interval=step), rtol=1e-8, atol=1e-12)
+        np.testing.assert_allclose(Q, theirs.covar(time_interval=step), rtol=1e-6)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad_vec, solve_ivp
+from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 from assoc.errors import InvalidInputError
@@ -16,10 +17,12 @@ from assoc.filters import (
     FuzzyAdaptiveEKF,
     Gaussian,
     InteractingMultipleModel,
+    Jerk,
     KalmanFilter,
     LinearMeasurement,
     ModifiedEKF,
     Padded,
+    Singer,
     UnmannedAircraft,
     UnscentedKalmanFilter,
     bounds,
@@ -287,6 +290,25 @@ def test_continuous_noise_adds_up_over_steps(model):
     F, Q = (one[0] for one in motion.matrices(0.4))
     both = F @ Q @ F.T + Q
     np.testing.assert_allclose(motion.matrices(0.8)[1][0], both, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize(("model", "order"), [(Singer, 2), (Jerk, 3)])
+def test_correlated_motion_is_its_stochastic_differential_equation(model, order):
+    """F and Q by their definitions, at steps from a thousandth of the correlation time to a hundred of it."""
+    motion, n = model(3.0, 20.0, 2), order + 1
+    A = np.eye(n, k=1)
+    A[-1, -1] = -1.0 / 20.0
+    for dt in (0.02, 4.0, 90.0):
+        F, Q = (one[0][::2, ::2] for one in motion.matrices(dt))
+        np.testing.assert_allclose(F, expm(A * dt), rtol=1e-9, atol=1e-12)
+        spread = quad_vec(lambda t: np.outer(expm(A * t)[:, -1], expm(A * t)[:, -1]), 0.0, dt, epsrel=1e-10)[0]
+        np.testing.assert_allclose(Q, 2.0 * 9.0 / 20.0 * spread, rtol=1e-7)
+    # in the long run the last derivative has the standard deviation that is given
+    F, Q = (one[0] for one in motion.matrices(2000.0))
+    assert Q[-1, -1] == pytest.approx(9.0) and F[-1, -1] == pytest.approx(0.0, abs=1e-12)
+    assert motion.matrices(0.0)[0][0] == pytest.approx(np.eye(2 * n)) and not motion.matrices(0.0)[1].any()
+    with pytest.raises(InvalidInputError, match="correlation_time"):
+        model(3.0, 0.0)
 
 
 def test_discrete_noise_is_the_papers():

@@ -14,6 +14,7 @@ from assoc.filters.kernels.gaussian import (
     LOG_TURN,
     PLAIN,
     STATUSES,
+    elevation_of,
     linearise_at,
     modify,
     unpack,
@@ -72,7 +73,7 @@ def expect(mean: Array, P: Array, models: Array, d: int) -> tuple[Array, Array]:
                 S[b, a, e] = total
         if kind != PLAIN:
             v[:] = 0.0
-            modify(kind, h[0], h[2], v, noise, S[b, 1, 1], S[b, 2, 2], R)
+            modify(kind, h[0], elevation_of(h, H), v, noise, S[b, 1, 1], S[b, d - 1, d - 1], R)
         for a in range(d):
             for e in range(d):
                 S[b, a, e] += R[a, e]

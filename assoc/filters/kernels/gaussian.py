@@ -231,15 +231,26 @@ def correct_mean(mean: Array, work: Array, v: Array, new_mean: Array) -> None:
 
 
 @inner_njit
+def elevation_of(h: Array, H: Array) -> float:
+    """Elevation of an expected radar measurement h; its size where only range and azimuth are measured."""
+    if len(h) == 3:
+        return float(h[2])
+    # the azimuth's derivatives H[1] are as long as 1 / ground range
+    return math.acos(min(1.0, 1.0 / (h[0] * math.hypot(H[1, 0], H[1, 1]))))
+
+
+@inner_njit
 def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: float, out: Array) -> None:
-    """Debias a radar residual v (range, azimuth, elevation) in place and write its covariance into out.
+    """Debias a radar residual v (range, azimuth and, of three, elevation) in place, write its covariance into out.
 
     Park and Lee's filter with the corrected terms; equations 2.29 and 2.32 if simplified. r and e are the
     predicted range and elevation, bt and bp the prior variances of azimuth and elevation.
     """
-    t, p, st, sp = v[1], v[2], R[1, 1], R[2, 2]
-    for a in range(3):
-        for b in range(3):
+    d = len(v)
+    t, st = v[1], R[1, 1]
+    p, sp = (v[2], R[2, 2]) if d == 3 else (0.0, 0.0)
+    for a in range(d):
+        for b in range(d):
             out[a, b] = R[a, b]
     if kind == SIMPLIFIED:
         v[0] -= 0.5 * r * (t * t + p * p - st - sp)
@@ -249,10 +260,11 @@ def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: flo
     tan = sin / cos
     c2 = cos * cos
     v[0] -= 0.5 * r * (c2 * (t * t - st) + p * p - sp)
-    v[1] -= tan * t * p
-    v[2] += 0.5 * sin * cos * (t * t - st)
     out[0, 0] += r * r * (0.5 * (st * st * c2 * c2 + sp * sp) + c2 * c2 * st * bt + sp * bp)
-    out[1, 1] += tan * tan * (st * sp + st * bp + sp * bt)
+    if d == 3:
+        v[1] -= tan * t * p
+        v[2] += 0.5 * sin * cos * (t * t - st)
+        out[1, 1] += tan * tan * (st * sp + st * bp + sp * bt)
 
 
 @inner_njit
@@ -321,8 +333,9 @@ def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_
                     for q in range(c):
                         cov = P[b, columns[p], columns[q]]
                         bt += linear[H, 1, p] * linear[H, 1, q] * cov
-                        bp += linear[H, 2, p] * linear[H, 2, q] * cov
-                modify(kind, h[0], h[2], v[b], noise, bt, bp, linear[R])
+                        if d == 3:
+                            bp += linear[H, 2, p] * linear[H, 2, q] * cov
+                modify(kind, h[0], elevation_of(h, linear[H]), v[b], noise, bt, bp, linear[R])
         for a in range(d):
             if not math.isfinite(v[b, a]):
                 return BAD_MEAN + STATUSES * b

@@ -132,7 +132,8 @@ class LinearMotion(Motion):
         return self.matrices(dt)[1]
 
 
-def _axes(dimensions: int) -> tuple[int, ...]:
+def dimensions_of(dimensions: int) -> tuple[int, ...]:
+    """Components of the position in so many dimensions."""
     if dimensions not in (2, 3):
         raise InvalidInputError(f"dimensions must be 2 or 3, got {dimensions!r}")
     return tuple(range(dimensions))
@@ -184,7 +185,7 @@ class ConstantVelocity(LinearMotion):
         self.kind = kind
         if kind not in ("discrete", "continuous"):
             raise InvalidInputError(f"kind must be 'discrete' or 'continuous', got {kind!r}")
-        axes, unit, order = _axes(dimensions), np.eye(dimensions), self.order
+        axes, unit, order = dimensions_of(dimensions), np.eye(dimensions), self.order
         super().__init__(
             lambda dt: np.kron(polynomial(order, dt), unit),
             lambda dt: np.kron(polynomial_noise(order, dt, self.sigma, kind), unit),
