@@ -144,26 +144,32 @@ def _is_asterix(file: str) -> bool:
 def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     """Track the radars of a description."""
     from assoc._cli.track.radars_file import read_radars
-    from assoc.tracking import track_scene
+    from assoc.tracking import smoothed, track_scene
+    from assoc.tracking.smoothing import check_smoothable
 
     given.check_use((*OF_SCENES, *OF_PLOTS), input="radars")
     if given["origin"] is not None:
         raise InvalidInputError(f"--origin: {file} says where the radars stand")
     given["filter"] = given["filter"] or "imm-cv"
     settings |= given.some(("registration",))
+    if given["smooth"]:
+        check_smoothable(corrects="registration" in settings)
     found = read_radars(file)
     scene, scans = found.scene, range(found.scene.num_scans)
     known = None if given["identity"] == "ignore" else found.identities
     tracker = make_tracker(
         given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, min(found.turns)
     )
-    (tracks, _), count = _watched(
+    (tracks, decisions), count = _watched(
         given,
         tracker,
         scans,
         lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
         lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=known),
     )
+    if given["smooth"]:
+        names, tracks = tracks.targets, smoothed(tracker, scene, decisions)
+        tracks.targets = names
     tracked = scene if count == scene.num_scans else scene.part(0, count)
     return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
@@ -181,7 +187,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     if given["cutoff"] is not None and scene.truth is None:
         raise InvalidInputError(f"--cutoff: {file} has no truth with which tracks are compared")
     if given["smooth"]:
-        check_smoothable(scene, corrects="registration" in settings)
+        check_smoothable(corrects="registration" in settings)
     if given["origin"] is not None:
         scene = replace(scene, origin=given["origin"])
     elif given["map"] and scene.origin is None:
@@ -225,7 +231,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         tracker,
         windows,
         lambda window: (window.times[-1], [len(window)]),
-        lambda scans: track_plots(tracker, recording, scans, confirmed=not given["all"]),
+        lambda scans: track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"]),
     )
     done.table.origin = given["origin"]
     if given["identity"] == "ignore":

@@ -11,8 +11,10 @@ from assoc._system.interrupts import end_is_asked
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
 from assoc.recordings import Recording, Window
+from assoc.scene.scene import Scene
 from assoc.tracking.quality import Qualities
-from assoc.tracking.track import Step
+from assoc.tracking.smoothing import smoothed
+from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
@@ -95,6 +97,7 @@ def track_plots(
     windows: Iterable[Window],
     *,
     confirmed: bool = True,
+    smooth: bool = False,
 ) -> PlotTracks:
     """Run a tracker of one radar over the windows of a recording.
 
@@ -107,8 +110,12 @@ def track_plots(
         Of this recording.
     confirmed : bool
         Whether only confirmed tracks are listed.
+    smooth : bool
+        Whether the table has the finished tracks instead, see `assoc.tracking.smoothed`; needs a new tracker.
     """
     table = TrackTable()
+    scans: list[tuple[list[Array], list[Array]]] = []
+    decisions: list[Decision] = []
     ends: list[float] = []
     takers: list[Array] = [np.zeros(0, dtype=np.int64)]
     sure: list[Array] = [np.zeros(0, dtype=np.bool_)]
@@ -136,8 +143,14 @@ def track_plots(
         ends.append(float(step.time))
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
         stamps = np.clip(window.times, -np.inf if before.time is None else before.time, step.time)
-        qualities.after(tracker, before, step, measured(tracker, window), [stamps[row] for row in own])
+        scans.append((measured(tracker, window), [stamps[row] for row in own]))
+        decisions += step.final
+        qualities.after(tracker, before, step, *scans[-1])
         table.add(listed, tracker.filter.motion.position, altitudes, qualities)
+    if smooth and done:
+        plots, times = zip(*scans, strict=True)
+        scene = Scene(tracker.sensors, ends, plots, tracker.settings.place.region, measurement_times=times)
+        table = smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=altitudes)
     tracks = np.concatenate(takers)
     aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
     rates = kept = None

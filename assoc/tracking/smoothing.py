@@ -7,7 +7,7 @@ backward recursion of Rauch, Tung and Striebel. The IMM's mixtures are smoothed 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,9 @@ from assoc.tracking.tracker import Tracker
 
 
 @door
-def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> TrackTable:
+def smoothed(
+    tracker: Tracker, scene: Scene, decisions: Sequence[Decision], *, altitudes: Mapping[int, float] | None = None
+) -> TrackTable:
     """Smooth the confirmed tracks of a scene.
 
     Parameters
@@ -36,20 +38,22 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     scene : Scene
     decisions : sequence of Decision
         The final decisions of all scans, see `assoc.tracking.track_scene`.
+    altitudes : mapping of track id to metres, optional
+        See `TrackTable.add`.
 
     Returns
     -------
     TrackTable
-        One row for each track and scan, from its first detection to its last, scans that missed it included.
-        Existence is 1; there is no score (NaN).
+        One row for each track and scan, from its first detection to its last, scans that missed it included; where
+        measurements have times of their own, one for each of its measurements and missed scans. Existence is 1; there
+        is no score (NaN).
 
     Raises
     ------
     InvalidInputError
-        Measurements have times of their own, the tracker corrects biases of sensors, or the decisions belong to
-        other scans.
+        The tracker corrects biases of sensors, or the decisions belong to other scans.
     """
-    check_smoothable(scene, corrects=tracker.settings.registration is not None)
+    check_smoothable(corrects=tracker.settings.registration is not None)
     for decision in decisions:
         scan = scene.scan(decision.scan)
         if decision.time != scan.time or [len(ids) for ids in decision.assigned] != scan.sizes.tolist():
@@ -65,7 +69,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
                 taken[s] = m + 1
     table = TrackTable(scene.origin)
     for track_id, found in rows.items():
-        table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position)
+        table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position, altitudes)
     table.name_targets(scene)
     return table
 
@@ -73,40 +77,48 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
 def _track(tracker: Tracker, scene: Scene, track_id: int, found: dict[int, Array]) -> list[Track]:
     """One track smoothed, by its measurements of each scan."""
     filter, first, last = tracker.filter, min(found), max(found)
-    smoother = FixedLagSmoother(filter, max(last - first, 1))
+    nothing, seen = np.zeros(len(scene.sensors), dtype=np.int32), 0
+    smoother = FixedLagSmoother(filter, int(sum(map(np.count_nonzero, found.values()))) + last - first + 1)
     window, times, hits = None, [], []
     for k in range(first, last + 1):
         scan = scene.scan(k).aligned(scene.sensors)
-        standing = scene.at(scan.time)
-        if window is None:
-            window = _begun(tracker, smoother, standing, scan, found[k])
-        else:
-            window = smoother.predict(window, scan.time - times[-1])
-            for s, m in enumerate(found.get(k, np.zeros(len(scene.sensors), dtype=np.int32)).tolist()):
-                if m:
-                    window, _ = smoother.update(window, scan.measurements[s][m - 1 : m], standing.sensors[s])
-        times.append(scan.time)
-        hits.append(k in found)
+        seen += k in found
+        for time, taken in _moments(scan, found.get(k, nothing)):
+            standing = scene.at(time)
+            if window is None:
+                window = _begun(tracker, smoother, standing, scan, taken)
+            else:
+                window = smoother.predict(window, max(time - times[-1], 0.0))
+                for s, m in enumerate(taken.tolist()):
+                    if m:
+                        window, _ = smoother.update(window, scan.measurements[s][m - 1 : m], standing.sensors[s])
+            times.append(time)
+            hits.append((seen, k in found))
     assert window is not None
     states = window.smoothed()
     position, velocity = list(filter.motion.position), velocity_components(filter.motion)
-    tracks = []
-    for k, (time, state) in enumerate(zip(times, states, strict=True)):
+    tracks, detected = [], times[0]
+    for time, (count, hit), state in zip(times, hits, states, strict=True):
         place, speed = np.zeros(3), np.zeros(3)
         place[: len(position)], speed[: len(velocity)] = state.mean[0, position], state.mean[0, velocity]
-        seen = int(np.count_nonzero(hits[: k + 1]))
-        detected = times[max(i for i in range(k + 1) if hits[i])]
+        detected = time if hit else detected
         known = track_id, time, state.mean[0], state.covariance[0], place, speed
-        tracks.append(Track(*known, True, np.nan, seen, times[0], detected, 1.0))
+        tracks.append(Track(*known, True, np.nan, count, times[0], detected, 1.0))
     return tracks
 
 
-def check_smoothable(scene: Scene, *, corrects: bool) -> None:
-    """Refuse scenes that `smoothed` cannot take, or a tracker that corrects measurements."""
+def _moments(scan: Scan, taken: Array) -> list[tuple[float, Array]]:
+    """When a track's measurements of a scan (S,) were made, and which then; the scan's time where it has none."""
+    if scan.times is None or not taken.any():
+        return [(scan.time, taken)]
+    stamps = np.array([scan.times[s][m - 1] if m else np.nan for s, m in enumerate(taken.tolist())])
+    return [(float(time), np.where(stamps == time, taken, 0)) for time in np.unique(stamps[taken > 0])]
+
+
+def check_smoothable(*, corrects: bool) -> None:
+    """Refuse a tracker that corrects measurements."""
     if corrects:
         raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
-    if not all(scene.scan(k).at_once for k in range(scene.num_scans)):
-        raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
 
 
 def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:

@@ -124,10 +124,8 @@ def test_smoothed_tracks(scene_file, tmp_path):
 def test_what_a_scene_does_not_allow_is_refused_before_it_is_tracked(scene_file, tmp_path, capsys):
     scene = Scene.load(scene_file)
     replace(scene, truth=None).save(tmp_path / "blind.npz")
-    simulate("rotating-radars", 0, aircraft=2, duration=12.0).save(tmp_path / "turning.npz")
     for file, option, message in (
         ("blind.npz", ["--cutoff", "100"], "blind.npz has no truth with which tracks are compared"),
-        ("turning.npz", ["--smooth"], "measurements with times of their own cannot be smoothed yet"),
         (scene_file, ["--smooth", "--registration", "online"], "the tracker corrects measurements"),
     ):
         assert track.main([str(tmp_path / file), *option, "-o", str(tmp_path / "tracks.csv")]) == 2

@@ -7,23 +7,29 @@ import pytest
 
 from assoc import InvalidInputError, filters, simulation
 from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
+from assoc.recordings import clustering_time_window, radar_of
 from assoc.scene import Scene
 from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoothed, track_scene
+from assoc.tracking.plots import track_plots
 from tests.tracking import plain
 
 
 @pytest.mark.slow
-def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements():
+@pytest.mark.parametrize("own_times", [False, True])
+def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements(own_times):
     rng, sensor = np.random.default_rng(3), plain.sensor()
     times = np.array([0.0, 1.0, 2.5, 3.0, 5.0])
     path = np.array([300.0, 400.0, 200.0]) + times[:, None] * np.array([20.0, -10.0, 5.0])
     z = [path[k : k + 1] + rng.normal(0, 10, (1, 3)) for k in range(5)]
     z[2] = np.zeros((0, 3))
-    scene = Scene(sensors=[sensor], times=times, measurements=[[one] for one in z], region=plain.REGION)
+    # one scan a measurement either way; with times of their own the scan ends half a second later
+    stamps = [[np.full(len(one), time)] for one, time in zip(z, times, strict=True)] if own_times else None
+    scans = times + 0.5 * (own_times & (times != 2.5))
+    scene = Scene([sensor], scans, [[one] for one in z], plain.REGION, measurement_times=stamps)
     motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
     tracker = MultiSensorTracker.for_scene(scene, filters.KalmanFilter(motion))
     decisions = []
-    for k, time in enumerate(times):
+    for k, time in enumerate(scans):
         ours = np.ones(len(z[k]), dtype=np.int64)
         decisions.append(Decision(k, time, (ours,), (ours > 0,)))
     frame = smoothed(tracker, scene, decisions).to_frame()
@@ -51,6 +57,7 @@ def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements():
     np.testing.assert_allclose(frame[["vx", "vy", "vz"]], states[:, 3:], rtol=1e-2, atol=0.05)
     sigma = np.sqrt(np.diagonal(np.linalg.inv(A)).reshape(-1, 6)[:, :3])
     np.testing.assert_allclose(frame[["sigma_x", "sigma_y", "sigma_z"]], sigma, rtol=1e-2)
+    assert frame["time"].tolist() == times.tolist()
     assert frame["hits"].tolist() == [1, 2, 2, 3, 4]
     assert frame["last_detection"].tolist() == [0.0, 1.0, 1.0, 3.0, 5.0]
 
@@ -83,3 +90,26 @@ def test_decisions_of_other_scans_are_refused():
     _, decisions = track_scene(tracker, scene, scans=range(6, 12))
     with pytest.raises(InvalidInputError, match="decisions: that of scan 0 is of another scan"):
         smoothed(tracker, scene, decisions)
+
+
+def test_plots_with_times_of_their_own_are_smoothed():
+    """Of two aircraft with heights: a row for each plot, at its time, and nearer to the truth."""
+    simulated = simulation.simulate_recording("rotating-radar", 1, traffic="crossing", duration=300.0)
+    recording, filter = (
+        simulated.recording,
+        filters.ExtendedKalmanFilter(filters.ConstantVelocity(5.0, 2, "continuous")),
+    )
+    windows = clustering_time_window(recording, 9.5)
+
+    def tracks(smooth):
+        tracker = TrackOrientedMHT([radar_of(recording)], filter)
+        return track_plots(tracker, recording, windows, smooth=smooth).table.to_frame()
+
+    def bends(frame):
+        one = frame[frame.track_id == frame.track_id.mode()[0]]
+        return np.abs((np.diff(one.heading) + 180.0) % 360.0 - 180.0).mean()
+
+    table, later = tracks(False), tracks(True)
+    assert len(set(later.time) & set(recording.times)) > 0.8 * len(later)
+    assert (later.groupby("track_id").time.diff().dropna() >= 0).all()
+    assert bends(later) < 0.5 * bends(table)

@@ -108,13 +108,13 @@ TRACK = (
            kinds.html_page),
     Option("check", "", "print what is declared of sensors and targets against what was seen"),
     Option("all", "", "also write tracks that are tentative, or whose target may be gone"),
+    Option("smooth", "", "write finished tracks instead: each position by all measurements of its track"),
 )  # fmt: skip
 OF_SCENES = (
     Option("cutoff", "M", f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})",
            kinds.positive, _SCENES),
     Option("registration", "NAME", "online: estimate biases of the scene's sensors and correct for them",
            kinds.OneOf(("online",)), {"input": ("scenes", "radars")}),
-    Option("smooth", "", "smooth the tracks: each position by all of its measurements", only=_SCENES),
 )  # fmt: skip
 OF_PLOTS = (
     Option("window", "NAME",
