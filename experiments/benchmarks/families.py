@@ -150,6 +150,8 @@ def _ghost_cases() -> Iterator[Case]:
     )
     for targets, limits, own, seeds in plan:
         ours = (Entry("exact", own), Entry("lagrangian", 5.0), *_entries(HEURISTICS, 5.0), Entry("greedy", 5.0))
+        # it ends by itself, when it is cold
+        ours += (Entry("annealing", 60.0),) if targets <= 40 else ()
         names = ("cp_sat", "highs", "scip", *(("scip_1",) if targets == 20 else ()))
         peers = [Entry(name, limit) for name in names for limit in limits]
         peers += [Entry("sequential", 5.0), Entry("nrl_tracker", 60.0)]

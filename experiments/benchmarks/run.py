@@ -20,7 +20,7 @@ from assoc.solution import TracePoint
 from experiments.benchmarks.families import HEURISTICS, Case, Entry, Instance
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.wide_gaps import linear_bound
-from experiments.common import peers
+from experiments.common import annealing, peers
 from experiments.common.checking import check_answer
 from experiments.common.instances import scenes, synthetic
 
@@ -52,6 +52,7 @@ def warm_up(ours: set[str], others: set[str]) -> None:
     small += [synthetic.axial_random(5, 0), synthetic.planar_random(6, 0)]
     # only a hard problem meets all kernels
     small.append(build_problem(scenes.ghost(20, 0), 0))
+    annealing.make_known()
     for name in sorted(ours):
         for problem in small:
             with contextlib.suppress(InfeasibleError):
@@ -123,6 +124,7 @@ def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = 
 
     seeds: Number of seeds at the most; by default all of the case.
     """
+    annealing.make_known()
     rows: list[Row] = []
     for one in case.by_seed(seeds):
         (seed,) = one.chosen
