@@ -4,6 +4,7 @@
 # make lint   ruff (rules and format), mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make check-set        the benchmark set (experiments/sdlib): made anew, compared, every solution and proof checked
+# make rows   each command that a row of docs/papers.md names, small; FOLDER=tables of the thesis for those that need it
 # make mutants          faults put in on purpose: each must make the tests of its room fail
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
@@ -34,7 +35,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set mutants dist check-dist audit bench bench-quick bench-cold clean
+.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -65,6 +66,9 @@ fuzz: $(VENV)/.installed-test
 check-set: $(VENV)/.installed-test
 	$(PY) -m experiments.sdlib make --compare
 	$(PY) -m experiments.sdlib check
+
+rows: $(VENV)/.installed-test
+	$(PY) -m experiments.pages.commands $(if $(FOLDER),--folder "$(FOLDER)")
 
 mutants: $(VENV)/.installed-test
 	$(PY) -m tests.mutations

@@ -122,7 +122,7 @@ class Batch:
         return cls(truth, exact + rng.standard_normal(exact.shape) * radar.noise, radar)
 
     def start(self, dim: int) -> Gaussian:
-        """Two-point start; accelerations begin at 0 +- 20 m/s^2, a turn rate at 0 +- 0.1 rad/s."""
+        """Two-point start; all else is 0: accelerations +- 20 m/s^2, jerks +- 10 m/s^3, a turn rate +- 0.1 rad/s."""
         R = self.radar.covariance
         (p0, s0), (p1, s1) = (converted(z, R) for z in self.measured[:2])
         B = len(p0)
@@ -131,7 +131,7 @@ class Batch:
         P[:, :3, :3] = s1
         P[:, :3, 3:6] = P[:, 3:6, :3] = s1
         P[:, 3:6, 3:6] = s0 + s1 + 100.0 * np.eye(3)
-        extra = {6: (), 7: (0.1**2,), 9: (400.0, 400.0, 400.0)}[dim]
+        extra = {6: (), 7: (0.1**2,), 9: (400.0,) * 3, 12: (400.0,) * 3 + (100.0,) * 3}[dim]
         for i, variance in enumerate(extra):
             P[:, 6 + i, 6 + i] = variance
         return Gaussian(mean, P)

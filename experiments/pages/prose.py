@@ -47,8 +47,14 @@ def figure(match: re.Match[str]) -> str:
 
 
 def page(name: str) -> str:
-    """Return a page with its figures."""
-    return ITEM.sub(_filled, (FOLDER / f"{name}.md").read_text(encoding="utf-8")).rstrip("\n")
+    """Return a page with its figures.
+
+    Raises ValueError: A slot is misspelt, or outside of paragraphs and items of lists.
+    """
+    text = ITEM.sub(_filled, (FOLDER / f"{name}.md").read_text(encoding="utf-8")).rstrip("\n")
+    if "{{" in text:
+        raise ValueError(f"{name}.md: not filled: {text[text.index('{{') :][:80]!r}")
+    return text
 
 
 def _filled(item: re.Match[str]) -> str:

@@ -10,10 +10,12 @@ import pytest
 
 from experiments.__main__ import programs
 from experiments.common.results import RESULTS, Results, number
-from experiments.pages import prose
+from experiments.pages import commands, prose
 from experiments.pages.__main__ import FOLDER, TABLES, main
 
 PAGES = ("filters.md", "recordings.md", "sweeps.md", "solvers_measured.md")
+"""Pages whose figures are all in the files that they name. In those of prose each result also names its claim: what
+only this test looks at there are settings."""
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NAMES = {*programs()}
@@ -99,7 +101,7 @@ def test_every_figure_of_a_page_names_its_claim(name):
     every = [item for part in parts for item in prose.ITEM.findall(part)]
     # the lists of a part are its claims; of paragraphs only those that have figures of results
     items = [item for item in every if item.startswith("- ") or prose.SLOT.search(item)]
-    assert sum(map(len, map(prose.SLOT.findall, items))) == len(prose.SLOT.findall(text)) > 20
+    assert sum(map(len, map(prose.SLOT.findall, items))) == len(prose.SLOT.findall(text)) > 5
     for item in items:
         # a setting that belongs to a claim stands in its name
         named = [one for slot in prose.SLOT.findall(item) for one in NUMBER.findall(" ".join(slot[1].split()))]
@@ -141,7 +143,7 @@ def test_tables_are_those_of_the_results_and_each_stands_on_a_page(capsys):
 
 
 def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monkeypatch, capsys):
-    commands: dict[str, set[tuple[str, ...]]] = {}
+    programs: dict[str, set[tuple[str, ...]]] = {}
     text = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("papers-*.md"))
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in rows if row[0] not in ("element", "---")]
@@ -156,8 +158,8 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monke
             module, *words = what.removeprefix("experiments.").split()
             assert (ROOT / what).exists() if program == "pytest" else module in NAMES, element
             if program == "python -m":
-                commands.setdefault(module, set()).add(tuple(words))
-    for module, given in commands.items():
+                programs.setdefault(module, set()).add(tuple(words))
+    for module, given in programs.items():
         monkeypatch.setattr("sys.argv", ["program", "--help"])
         with warnings.catch_warnings(), pytest.raises(SystemExit):
             warnings.simplefilter("ignore", RuntimeWarning)
@@ -165,6 +167,22 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monke
         # what follows the options must be given
         usage = capsys.readouterr().out.split("\n\n")[0]
         assert given == {tuple(usage.rpartition("]")[2].split())}, module
+
+
+def test_the_commands_of_the_rows_are_run_small(monkeypatch, capsys, tmp_path):
+    assert len(commands.commands()) > 25 and sum(commands.commands().values()) > 110
+    folder = "python -m experiments.papers.clustering_time_window.tables FOLDER"
+    quick = commands.small("python -m experiments.papers.modified_ekf", None, tmp_path)
+    assert commands.small(folder, None, tmp_path) is None and commands.small(folder, "x", tmp_path)[-1] == "x"
+    assert quick[1:] == ["-m", "experiments.papers.modified_ekf", "--quick"]
+    monkeypatch.setattr(
+        commands, "commands", lambda: {"pytest tests/sizes.py": 1, "python -m experiments": 2, folder: 9}
+    )
+    # no test is collected, the list of experiments knows no --quick
+    assert commands.main([]) == 1
+    assert re.findall(r"^(failed|left out) +(\d)", capsys.readouterr().out, re.MULTILINE) == [
+        ("failed", "1"), ("failed", "2"), ("left out", "9"),
+    ]  # fmt: skip
 
 
 def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():

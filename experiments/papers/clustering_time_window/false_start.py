@@ -8,12 +8,13 @@ nautical miles beside, so that a wrong velocity results.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.metrics import identity_after_each
-from assoc.recordings import Recording, clustering_time_window, radar_of
+from assoc.recordings import Recording, Window, clustering_time_window, radar_of
 from assoc.recordings.columns import NAUTICAL_MILE
 from assoc.simulation import simulate_recording
 from assoc.simulation.antenna import bearings_in_steps, in_steps
@@ -62,38 +63,48 @@ def with_false_start(recording: Recording, offset: tuple[float, float] | None, r
     return Recording(**{name: np.append(getattr(kept, name), value)[order] for name, value in added.items()})
 
 
-def judge(runs: int, rng: np.random.Generator) -> list[Claim]:
-    """How an aircraft's first plots fare with and without a false start."""
+Follow = Callable[[Recording, list[Window]], Taken]
+"""What a tracker does with the windows of a recording."""
+
+
+def _nearest(recording: Recording, windows: list[Window]) -> Taken:
+    return run(nearest(recording, clock=ROTATION, deletion="groups", patience=MISSES), windows)
+
+
+def _hypotheses(recording: Recording, windows: list[Window]) -> Taken:
+    tracker = HypothesisTracker(radar_of(recording))
+    run(tracker, windows)
+    return tracker.decided()
+
+
+METHODS: dict[str, Follow] = {"nearest neighbour, CTW": _nearest, "MHT, CTW, time stamps": _hypotheses}
+
+
+def judge(runs: int, rng: np.random.Generator, methods: dict[str, Follow] | None = None) -> list[Claim]:
+    """How an aircraft's first plots fare with and without a false start; of methods whose name has "MHT", the loss."""
+    methods = METHODS if methods is None else methods
     found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
     for _ in range(runs):
         plain = _appearing(rng)
         for case, offset in CASES.items():
             recording = with_false_start(plain, offset, rng)
             windows = clustering_time_window(recording, ROTATION)
-            hypotheses = HypothesisTracker(radar_of(recording))
-            run(hypotheses, windows)
-            by_method = {
-                "nearest neighbour, CTW": run(
-                    nearest(recording, clock=ROTATION, deletion="groups", patience=MISSES), windows
-                ),
-                "MHT, CTW, time stamps": hypotheses.decided(),
-            }
-            for name, taken in by_method.items():
-                found.setdefault((name, case), []).append(beginning(recording, taken))
+            for name, follow in methods.items():
+                found.setdefault((name, case), []).append(beginning(recording, follow(recording, windows)))
     measures = (
         (f"first {PLOTS} plots in the aircraft's own track", 5.0),
         ("tracks that begin with the aircraft's plot, whose identity the paper's track keeps", None),
         (f"tracks whose identity is right at plot {PLOTS}, by majority of six", 5.0),
     )
     claims = []
-    for name in dict.fromkeys(name for name, _ in found):
+    for name in methods:
         usual = np.array(found[name, "none"])
         for number, (measure, allowed) in enumerate(measures):
             for case in CASES:
                 values = np.array(found[name, case])[:, number]
                 what = f"false start, {case}: {measure}, {name}"
                 claims.append(Claim(what, "%", None, float(values.mean()), _interval(values), source=SOURCE))
-                if case != "none" and name.startswith("MHT") and allowed is not None:
+                if case != "none" and "MHT" in name and allowed is not None:
                     lost = usual[:, number] - values
                     what = f"false start, {case}: lost by it, {measure}, {name}"
                     claims.append(

@@ -1,4 +1,4 @@
-"""The thesis's own tracker (Reid, constant step) beyond tables 4.25 to 4.27: false plots, the fall of MT, pairs.
+"""The thesis's own tracker (Reid, constant step) beyond tables 4.25 to 4.27: clutter, MT, pairs, starts, clocks.
 
     python -m experiments.papers.clustering_time_window.own_tracker [--quick] [--seed N] [--json FILE] [--publish]
 
@@ -6,27 +6,36 @@ IT of docs/metrics.md counts a plot in a track that is not confirmed yet as wron
 each plot it has no place for is charged for false plots that never enter a confirmed track. "Among tracks ever
 confirmed" leaves out the plots of tracks that never are.
 The recordings of 2.5 false plots a turn are those on which papers.clustering_time_window runs Reid's MHT. In the pairs
-a switch to a track that was the other aircraft's is a swap; the others go to a track begun anew. Full size: 6
-recordings of 1,130 s, 3 of each higher rate, 15 pairs of each kind (600 s, 5 nmi apart when parallel).
+a switch to a track that was the other aircraft's is a swap; the others go to a track begun anew. Of clocks: the same 6
+recordings, whose antenna turns in 9.5 s, with times in whole seconds, in windows of 9.5 s or of the thesis's 10 s. Full
+size: 6 recordings of 1,130 s, 3 of each higher rate, 15 pairs of each kind (600 s, 5 nmi apart when parallel), 50
+false starts, 6 recordings for straightness.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
-from assoc.recordings import Recording, Window, clustering_time_window
+from assoc._types import Array
+from assoc.recordings import Recording, Window, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
+from assoc.tracking import Tracker
+from assoc.tracking.plots import track_plots
 from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
-from experiments.papers.clustering_time_window import pairs, published, traffic
+from experiments.papers.clustering_time_window import false_start, pairs, published, traffic
+from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
 
 CHOSEN = "chosen by us"
 TRACKERS = ("nearest neighbour, CTW", "Reid's MHT, CTW")
 RATES = (25.0, 100.0)
 """False plots a turn; S1 has 2.5."""
+PLOTS = 10
+"""Tracks of fewer plots are not judged for straightness."""
 MISSES = (3, 5, 8)
 
 
@@ -60,21 +69,25 @@ def false_plots(rate: float, recordings: Iterable[tuple[Recording, list[Window]]
     return claims
 
 
+WAYS: dict[str, tuple[float | None, int]] = {
+    **{f"constant step, {n} misses": (traffic.ROTATION, n) for n in MISSES},
+    "time stamps": (None, traffic.MISSES),
+}
+"""Clock and misses of Reid's MHT; with time stamps tracks end by time."""
+
+
 def of_pairs(runs: int, rng: np.random.Generator) -> list[Claim]:
     """Swaps and new starts of Reid's MHT in pairs."""
-    ways = {f"constant step, {n} misses": (traffic.ROTATION, n) for n in MISSES} | {"time stamps": (None, 0)}
     claims = []
     for kind in pairs.TRAFFIC:
-        kept: dict[str, list[tuple[bool, bool]]] = {way: [] for way in ways}
+        kept: dict[str, list[tuple[bool, bool]]] = {way: [] for way in WAYS}
         for _ in range(runs):
             recording = simulate_recording(
                 "rotating-radar", int(rng.integers(2**31)), traffic=kind, duration=pairs.DURATION
             ).recording
             windows = clustering_time_window(recording, traffic.ROTATION)
-            for way, (clock, misses) in ways.items():
-                tracker = traffic.reid(recording, clock, misses)
-                run(tracker, windows)
-                taken = tracker.decided()
+            for way, (clock, misses) in WAYS.items():
+                taken = traffic.decided_by_reid(recording, windows, clock, misses)
                 kept[way].append((pairs.switches(recording, taken) == 0, pairs.swaps(recording, taken) > 0))
         for way, rows in kept.items():
             without, swapped = ([one[axis] for one in rows] for axis in (0, 1))
@@ -84,8 +97,99 @@ def of_pairs(runs: int, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
+def of_false_starts(runs: int, rng: np.random.Generator) -> list[Claim]:
+    """A false plot where an aircraft appears, for Reid's MHT."""
+    methods: dict[str, false_start.Follow] = {
+        f"Reid's MHT, {way}": partial(traffic.decided_by_reid, clock=clock, misses=misses)
+        for way, (clock, misses) in WAYS.items()
+    }
+    return false_start.judge(runs, rng, methods)
+
+
+CLOCKS: dict[str, tuple[bool, float, Literal["antenna", "time"]]] = {
+    "exact times, windows of 9.5 s": (False, 9.5, "time"),
+    "exact times, windows of 10 s": (False, 10.0, "time"),
+    "whole seconds, windows of 9.5 s": (True, 9.5, "time"),
+    "whole seconds, windows of 10 s": (True, 10.0, "time"),
+    "whole seconds, windows by the antenna's angle": (True, 9.5, "antenna"),
+    "whole seconds, windows by the antenna's angle, 10 s": (True, 10.0, "antenna"),
+}
+"""Whether times are cut to whole seconds, the turn that is assumed (the true one is 9.5 s), how plots are grouped."""
+
+
+def of_clocks(recordings: Iterable[Recording]) -> list[Claim]:
+    """What coarse times and a wrong turn do to the window and to Reid's MHT."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for exact in recordings:
+        for name, (whole, turn, by) in CLOCKS.items():
+            recording = replace(exact, times=np.floor(exact.times)) if whole else exact
+            windows = clustering_time_window(recording, turn, by=by)
+            assert recording.sources is not None
+            twice = sum(_repeats(recording.sources[window.rows]) for window in windows)
+            found.setdefault((name, "plots of aircraft that the window has already"), []).append(
+                100.0 * twice / float((recording.sources >= 0).sum())
+            )
+            for way, clock in (("constant step", turn), ("time stamps", None)):
+                ct = run(traffic.reid(recording, clock), windows).rates(recording).ct
+                found.setdefault((name, f"CT, Reid's MHT, {way}"), []).append(ct)
+    return [
+        Claim(f"{name}: {what}", "%", None, float(np.mean(values)), mean_interval(np.array(values)), source=CHOSEN)
+        for (name, what), values in found.items()
+    ]
+
+
+def bends(times: Array, places: Array) -> float:
+    """Mean change of direction from leg to leg of a path, degrees; places (n, 2 or more)."""
+    legs = np.diff(places[np.argsort(times, kind="stable")], axis=0)
+    legs = legs[np.linalg.norm(legs[:, :2], axis=1) > 0]
+    turns = np.degrees(np.diff(np.arctan2(legs[:, 1], legs[:, 0])))
+    return float(np.abs((turns + 180.0) % 360.0 - 180.0).mean())
+
+
+def of_straightness(runs: int, rng: np.random.Generator, duration: float) -> list[Claim]:
+    """How straight tracks are: their plots, as in the thesis's tables, the filter's positions, smoothed ones."""
+    found: dict[str, list[float]] = {}
+    for _ in range(runs):
+        simulated = simulate_recording("rotating-radar", int(rng.integers(2**31)), duration=duration)
+        recording, truth, sources = simulated.recording, simulated.truth, simulated.recording.sources
+        assert sources is not None
+        windows = clustering_time_window(recording)
+        follow = partial(track_plots, recording=recording, windows=windows)
+        filtered, later = (follow(_tracker(recording), smooth=smooth) for smooth in (False, True))
+        tables = {"filtered": filtered.table.to_frame(), "smoothed": later.table.to_frame()}
+        rows = np.concatenate([window.rows for window in windows])
+        for track in tables["smoothed"].track_id.unique().tolist():
+            own = rows[filtered.tracks == track]
+            aircraft = np.bincount(sources[own] + 1).argmax() - 1
+            if len(own) < PLOTS or aircraft < 0:
+                continue
+            one = truth.ids == aircraft
+            path = np.stack([np.interp(recording.times[own], truth.times[one], truth.positions[one, axis])
+                             for axis in (0, 1)], axis=1)  # fmt: skip
+            for name, places in (("plots", recording.positions[own]), ("the aircraft itself", path)):
+                found.setdefault(name, []).append(bends(recording.times[own], places))
+            for name, table in tables.items():
+                part = table[table.track_id == track]
+                found.setdefault(name, []).append(bends(part.time.to_numpy(), part[["x", "y"]].to_numpy()))
+    claims = [Claim("straightness: tracks judged", "", None, len(found["plots"]), source=CHOSEN)]
+    for name, values in found.items():
+        what = f"straightness: mean change of direction from position to position, {name}"
+        claims.append(Claim(what, "deg", None, float(np.mean(values)), mean_interval(np.array(values)),
+                            source=f"suggestion 2, in words; {CHOSEN}"))  # fmt: skip
+    return claims
+
+
+def _tracker(recording: Recording) -> Tracker:
+    return HypothesisTracker(radar_of(recording)).tracker
+
+
+def _repeats(sources: Array) -> int:
+    known = sources[sources >= 0]
+    return len(known) - len(np.unique(known))
+
+
 def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
-    """Judge false plots, MT and pairs."""
+    """Judge false plots, MT, pairs, false starts, straightness and clocks."""
     duration = 300.0 if quick else traffic.DURATION
     first = list(traffic.recordings(2 if quick else 6, rng, duration))
     claims = false_plots(2.5, ((recording, groups["window"]) for recording, groups in first))
@@ -112,7 +216,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
               source="table 4.25; 20 points chosen by us"),
         Claim("recordings judged", "", None, len(changes), source=CHOSEN),
     ]  # fmt: skip
-    return claims + of_pairs(2 if quick else 15, rng)
+    claims += of_pairs(2 if quick else 15, rng)
+    claims += of_false_starts(3 if quick else 50, rng)
+    claims += of_straightness(1 if quick else 6, rng, duration)
+    return claims + of_clocks(recording for recording, _ in first)
 
 
 program = partial(main, "papers.clustering_time_window.own_tracker", experiment, __doc__)

@@ -15,7 +15,7 @@ from experiments.common.claims import Claim
 from experiments.common.command import mean_interval
 from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
-from experiments.papers.clustering_time_window.judging import TakesWindows, run
+from experiments.papers.clustering_time_window.judging import Taken, TakesWindows, run
 from experiments.papers.clustering_time_window.published import OVERALL, RATES, WITH_WINDOW, WITHOUT_WINDOW, by_tens
 
 CHOSEN = "chosen by us"
@@ -38,6 +38,15 @@ def reid(recording: Recording, clock: float | None = None, misses: int = MISSES)
     """Reid's MHT; with a clock, a fixed time passes from group to group and tracks are deleted by their misses."""
     options = {} if clock is None else {"life_cycle": replace(_BY_COUNT, deletion_count=misses)}
     return HypothesisTracker(radar_of(recording), clock, kind=HypothesisOrientedMHT, **options)
+
+
+def decided_by_reid(
+    recording: Recording, windows: list[Window], clock: float | None = None, misses: int = MISSES
+) -> Taken:
+    """What `reid` has decided for good about every window."""
+    tracker = reid(recording, clock, misses)
+    run(tracker, windows)
+    return tracker.decided()
 
 
 METHODS: dict[str, tuple[str, Callable[[Recording], TakesWindows]]] = {

@@ -1,0 +1,71 @@
+"""Run each command that a row of docs/papers.md names, small: tests without the slow ones, experiments with --quick.
+
+python -m experiments.pages.commands [--folder FOLDER]
+
+FOLDER is that of the thesis's tables; without it the rows that need it are left out. Some ten minutes of one core.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLES = ROOT / "docs" / "_tables"
+NOT_QUICK = {"experiments.benchmarks": ["--families", "paper", "--solvers", "exact", "--seeds", "1"]}
+"""Programs without --quick, and what makes a small run of them."""
+
+
+def commands() -> Counter[str]:
+    """Commands of the coverage tables, and how many rows name each."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted(TABLES.glob("papers-*.md"))]
+    last = [row.rsplit(" | ", 1)[-1] for text in texts for row in text.splitlines()]
+    return Counter(" ".join(one) for cell in last for one in re.findall(r"`(pytest|python -m) ([^`]+)`", cell))
+
+
+def small(command: str, folder: str | None, scratch: Path) -> list[str] | None:
+    """The command in small, writing into a scratch folder; None where it needs a folder that is not given."""
+    words = command.split()
+    if words[0] == "pytest":
+        return [sys.executable, "-m", *words, "-q", "-x", "-m", "not slow", "-p", "no:cacheprovider"]
+    if words[-1] == "FOLDER":
+        return None if folder is None else [sys.executable, *words[1:-1], folder]
+    module = words[2]
+    made = [sys.executable, *words[1:], *NOT_QUICK.get(module, ["--quick"])]
+    return [*made, "--csv", str(scratch / "rows.csv")] if module in NOT_QUICK else made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run them all; returns 1 if any fails."""
+    about = (__doc__ or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog="python -m experiments.pages.commands", description=about)
+    parser.add_argument("--folder", metavar="FOLDER", help="the thesis's tables as CSV files")
+    folder = parser.parse_args(arguments).folder
+    failed = 0
+    with tempfile.TemporaryDirectory() as scratch:
+        for command, rows in commands().items():
+            words = small(command, folder and str(Path(folder).resolve()), Path(scratch))
+            if words is None:
+                print(f"left out  {rows:3} rows         {command}", flush=True)
+                continue
+            # figures are written where the program stands
+            where = scratch if words[2].startswith("experiments") else ROOT
+            start = time.perf_counter()
+            env = {**os.environ, "PYTHONPATH": str(ROOT)}
+            done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False, env=env)
+            failed += done.returncode != 0
+            word = "failed" if done.returncode else "done"
+            print(f"{word:9} {rows:3} rows {time.perf_counter() - start:6.0f} s {command}", flush=True)
+            if done.returncode:
+                print(done.stdout[-2000:], done.stderr[-2000:], flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
