@@ -12,7 +12,7 @@ from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
-from assoc.sensors.base import wrap_angle
+from assoc.sensors.base import Sensor, wrap_angle
 from assoc.sensors.codes import RADAR2D, RADAR3D
 
 # of radars, how many quantities they measure
@@ -75,6 +75,8 @@ class ModifiedEKF(GaussianFilter):
         if self.kind == SIMPLIFIED:
             v[..., 0] -= 0.5 * r * (t**2 + p**2 - st - sp)
             return scores(v, covariance)
+        # observe has refused all but radars
+        assert isinstance(sensor, Sensor)
         ground = np.hypot(*(state.mean[:, self.motion.position[:2]] - sensor.position[:2]).T)
         c2 = (ground[:, None] / r) ** 2
         v[..., 0] -= 0.5 * r * (c2 * (t**2 - st) + p**2 - sp)

@@ -149,7 +149,7 @@ def track_plots(
         table.add(listed, tracker.filter.motion.position, altitudes, qualities)
     if smooth and done:
         plots, times = zip(*scans, strict=True)
-        scene = Scene(tracker.sensors, ends, plots, tracker.settings.place.region, measurement_times=times)
+        scene = Scene(tracker.sensors, np.array(ends), plots, tracker.settings.place.region, measurement_times=times)
         table = smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=altitudes)
     tracks = np.concatenate(takers)
     aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
