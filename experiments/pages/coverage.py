@@ -74,7 +74,7 @@ def ant_colony() -> str:
         "measurements",
         f"{verdict(paper_solved)}: {paper_solved.ours:.0f} of 100 scans to the optimum. The paper has no "
         "comparison with it",
-        f"{HOLDS} on ghosts of 20 and 40 targets: annealing as it is in [own solver](own_solver.md) ends "
+        f"{HOLDS} on ghosts of 20 and 40 targets: annealing as in `docs/own_solver.md` ends "
         f"{' and '.join(_excess('annealing', size) for size in ('20', '40'))} % above the optimum (median), greedy "
         f"{' and '.join(_excess('greedy', size) for size in ('20', '40'))} %, the ants, which have a local search, "
         f"{' and '.join(_excess('aco', size) for size in ('20', '40'))} %",
