@@ -21,8 +21,9 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct, numbered
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.kbest import checked_k, rank
+from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
-from assoc.ranking.tuple_bounds import tuple_bounds
+from assoc.ranking.tuple_bounds import LIGHTEST, ROUNDING, tuple_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
-# intervals of the recursion up to this width need no listing
-_NARROW = 2e-9
+# intervals up to this width need no listing, nor do those of two lists unless they say next to nothing
+_NARROW, _NARROW_PAIRS = 2e-9, 0.5
 # share of the weight that sums may always lose to rounding
 _ROUNDING = 1e-12
 # a column this far above the solutions listed weighs nothing at any of these temperatures but the last, which counts
@@ -49,7 +50,7 @@ class Marginals(Shown):
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Best estimate between the bounds: from the k best of its cluster, or from the recursion where that is surer.
+        Best estimate between the bounds: from the k best of its cluster, or from sums around it where they are surer.
     lower, upper : float arrays, shape (T,)
         Bounds on the probability among all solutions.
     unseen : float
@@ -80,7 +81,7 @@ class Marginals(Shown):
 @door
 @interruptible()
 def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
-    """Return the association probability of every tuple, by a recursion over measurements and the k best solutions.
+    """Return the association probability of every tuple, by sums around it and the k best solutions.
 
     Parameters
     ----------
@@ -120,8 +121,8 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     the least bound over several a.
 
     With dummies ``ranking/tuple_bounds.py`` bounds each tuple by another way, a recursion over the measurements near
-    it, which does not weaken as scenes grow. The narrower bound counts, and where the recursion leaves no width
-    to speak of, nothing is listed.
+    it, which does not weaken as scenes grow; with two sensors ``ranking/pairs/windows.py`` does, by exact sums. The
+    narrower bound counts, and where these leave no width to speak of, nothing is listed.
     """
     checked_k(k)
     run = Run(0, time_limit=checked_time_limit(time_limit))
@@ -133,9 +134,10 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     probability, lower, upper = np.ones((3, len(tuples)))
     listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
-    known = _by_recursion(problem, index, len(tuples), run)
+    narrow = _NARROW if len(problem.sizes) > 2 else _NARROW_PAIRS
+    known = _without_listing(problem, index, len(tuples), run)
     for cluster, which in _clusters(problem):
-        if known is not None and np.ptp(known[1:, index[which]], axis=0).max() <= _NARROW:
+        if known is not None and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
             waiting[which] = False
             probability[index[which]], lower[index[which]], upper[index[which]] = known[:, index[which]]
             continue
@@ -164,20 +166,42 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     )
 
 
-def _by_recursion(problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run) -> Floats | None:
-    """Estimate and bounds of each distinct tuple by `tuple_bounds`, (3, T); None where it does not apply."""
-    if not problem.dummy:
+def _without_listing(problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run) -> Floats | None:
+    """Estimate and bounds of each distinct tuple, (3, T), by windows or the recursion; None where neither applies."""
+    if not problem.dummy or run.should_stop():
         return None
     share = run.part(0, None if run.time_limit is None else 0.4 * run.time_limit)
     columns = price_all_columns(problem, share)
-    found = tuple_bounds(columns, problem.costs, prepare(problem).single_cost, share)
+    found = _of_two_lists(columns, problem.sizes, share) if len(problem.sizes) == 2 else tuple_bounds(columns, share)
     if found is None:
         return None
+    # logarithms of weights are differences of costs, which may cancel
+    counts = -columns.weights > LIGHTEST
+    used = columns.rows[counts]
+    single = prepare(problem).single_cost
+    largest = np.abs(problem.costs[columns.origin[counts]]).max(initial=0.0)
+    largest += np.abs(single[used[used >= 0]]).max(initial=0.0)
+    sums = 4.0 * (used.shape[1] + 2) * columns.slack.size * largest
+    rounding = float(np.finfo(float).eps * sums)
+    estimate, lower, upper = found
+    lower, upper = np.maximum(lower - rounding, 0.0), np.minimum(upper + rounding, 1.0)
     known = np.repeat([[0.0], [0.0], [1.0]], num, axis=1)
-    known[:, index[columns.origin]] = found.estimate, found.lower, found.upper
-    middle = 0.5 * (found.free_lower + found.free_upper)
-    known[:, index[columns.single]] = middle, found.free_lower, found.free_upper
+    known[:, index[np.append(columns.origin, columns.single)]] = np.clip(estimate, lower, upper), lower, upper
     return known
+
+
+def _of_two_lists(columns: AllColumns, sizes: NDArray[np.integer], run: Run) -> tuple[Floats, Floats, Floats]:
+    """Estimate and bounds of the columns of a problem with two sensors, and of its rows."""
+    counts = -columns.weights > LIGHTEST
+    first, second = columns.rows[counts].T
+    n, m = sizes.tolist()
+    found = window_bounds(first, second - n, -columns.weights[counts], (n, m), run)
+    # the others weigh nothing
+    kept = np.append(counts, np.ones(n + m, dtype=bool))
+    estimate, lower, upper = np.zeros((3, kept.size))
+    estimate[kept], lower[kept], upper[kept] = found
+    upper[~kept] = ROUNDING
+    return estimate, lower, upper
 
 
 def _guess(

@@ -29,7 +29,7 @@ from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
 
 # logarithms of weights beyond which sums would overflow; lighter tuples weigh nothing
-_HEAVIEST, _LIGHTEST = 500.0, -700.0
+_HEAVIEST, LIGHTEST = 500.0, -700.0
 # steps in all, and the most and the fewest for each measurement
 _STEPS, _MOST, _FEWEST = 100_000_000, 1_000_000, 2_000
 # steps between two checks of the time: some ten milliseconds
@@ -39,14 +39,13 @@ _DEEPEST = 400
 _WIDTH = 1e-9
 # influence below which the recursion begins with P <= 1, and its factor where this leaves intervals wide
 _INFLUENCE, _FINER = 0.03, 0.25
-_ROUNDING = 1e-11
+ROUNDING = 1e-11
 _SWEEPS = 60
 
 
-class TupleBounds(NamedTuple):
-    """Estimates and bounds of the probability of N columns, and bounds of that of R rows to be in none of them."""
+class _Found(NamedTuple):
+    """Bounds of the probability of N columns, and of that of R rows to be in none of them."""
 
-    estimate: Floats
     lower: Floats
     upper: Floats
     free_lower: Floats
@@ -75,32 +74,28 @@ class _Walk(NamedTuple):
     values: Floats
 
 
-def tuple_bounds(columns: AllColumns, costs: Floats, single: Floats, run: Run) -> TupleBounds | None:
-    """Bound the probabilities of all columns; None where weights are too large for floats, or a row must be covered.
+def tuple_bounds(columns: AllColumns, run: Run) -> tuple[Floats, Floats, Floats] | None:
+    """Estimate and bound the probabilities of the N columns, and that of the R rows to be in none of them.
 
-    The costs of the problem's tuples and of each row's cheapest singleton say how exact the columns' weights are.
+    None where weights are too large for floats, or a row must be covered; else three arrays (N + R,).
     """
     log_weight, rows = -columns.weights, columns.slack.size
     if not columns.slack.all() or log_weight.max(initial=0.0) > _HEAVIEST:
         return None
-    counts = log_weight > _LIGHTEST
+    counts = log_weight > LIGHTEST
     graph = _graph(columns.rows, np.where(counts, np.exp(log_weight), 0.0), rows)
     num = len(log_weight)
     estimate = np.zeros(num)
     estimate[graph.row_cols] = graph.share
-    found = TupleBounds(estimate, np.zeros(num), np.ones(num), np.zeros(rows), np.ones(rows))
+    found = _Found(np.zeros(num), np.ones(num), np.zeros(rows), np.ones(rows))
     most = int(np.clip(_STEPS // max(rows, 1), _FEWEST, _MOST))
     row = 0
     while row < rows and not run.should_stop():
         row = _bound_rows(graph, found, row, most)
-    # logarithms of weights are differences of costs, which may cancel
-    used = columns.rows[counts]
-    largest = np.abs(costs[columns.origin[counts]]).max(initial=0.0) + np.abs(single[used[used >= 0]]).max(initial=0.0)
-    rounding = _ROUNDING + 4.0 * (columns.rows.shape[1] + 2) * float(np.finfo(float).eps * rows * largest)
-    for low, high in ((found.lower, found.upper), (found.free_lower, found.free_upper)):
-        np.maximum(low - rounding, 0.0, out=low)
-        np.minimum(high + rounding, 1.0, out=high)
-    return found._replace(estimate=np.clip(estimate, found.lower, found.upper))
+    lower = np.maximum(np.append(found.lower, found.free_lower) - ROUNDING, 0.0)
+    upper = np.minimum(np.append(found.upper, found.free_upper) + ROUNDING, 1.0)
+    middle = 0.5 * (found.free_lower + found.free_upper)
+    return np.clip(np.append(estimate, middle), lower, upper), lower, upper
 
 
 def _graph(cols: NDArray[np.int32], weights: Floats, num_rows: int) -> _Graph:
@@ -126,7 +121,7 @@ def _graph(cols: NDArray[np.int32], weights: Floats, num_rows: int) -> _Graph:
 
 
 @njit
-def _bound_rows(graph: _Graph, found: TupleBounds, row: int, most: int) -> int:
+def _bound_rows(graph: _Graph, found: _Found, row: int, most: int) -> int:
     """Narrow the bounds of the columns of some rows, from this one on; return the next row."""
     row_ptr, row_cols = graph.row_ptr, graph.row_cols
     rows = row_ptr.size - 1

@@ -88,7 +88,7 @@ def test_large_undecided_lists_have_narrow_intervals():
     tuples = np.stack([np.repeat(np.arange(100), 8), near.reshape(-1)], axis=1) + 1
     costs = 2.0 * np.take_along_axis(distance, near, axis=1).reshape(-1) ** 2 - 2.0
     result = marginals(AssignmentProblem(tuples, costs, (100, 100)), 5)
-    assert np.mean(result.upper - result.lower) < 0.02
+    assert np.mean(result.upper - result.lower) < 0.01
     pairs = (result.tuples > 0).all(axis=1)
     exact = pair_probabilities(
         *(result.tuples[pairs].T - 1), _log_weights(tuples, costs, result, pairs), (100, 100), 2**20

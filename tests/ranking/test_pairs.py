@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from assoc import AssignmentProblem, marginals
+from assoc.packing.run import Run
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.pairs.graph import pair_graph
 from assoc.ranking.pairs.messages import log_beliefs, log_bounds
 from assoc.ranking.pairs.permutations import without_permutations
+from assoc.ranking.pairs.windows import window_bounds
 from tests.sizes import few_or_all
 
 WIDE = 2**14
@@ -155,3 +157,31 @@ def test_no_pairs():
     nothing = np.zeros(0, dtype=np.int64)
     found = pair_probabilities(nothing, nothing, np.zeros(0), (3, 0), 16)
     assert [len(one) for one in found] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("widths", [(20,), (0, 3), (0, 4, 5)])
+def test_windows_contain_the_truth(widths):
+    """Windows of three to five open vertices, where all of the graph could be summed."""
+    rng = np.random.default_rng(widths[-1])
+    spans = []
+    for _ in range(120):
+        sizes = tuple(rng.integers(2, 8, 2).tolist())
+        first, second = np.nonzero(rng.random(sizes) < rng.choice([0.3, 0.5, 0.9]))
+        log_weight = rng.normal(size=len(first)) * rng.choice([0.5, 2.0, 6.0, 60.0])
+        exact = pair_probabilities(first, second, log_weight, sizes, WIDE).probability
+        truth = np.append(exact, 1.0 - np.bincount(np.append(first, sizes[0] + second), np.tile(exact, 2), sum(sizes)))
+        estimate, lower, upper = window_bounds(first, second, log_weight, sizes, Run(0), widths)
+        assert (lower - 1e-9 <= truth).all() and (truth <= upper + 1e-9).all()
+        assert (lower <= estimate).all() and (estimate <= upper).all()
+        spans.append(upper - lower)
+    assert np.mean(np.concatenate(spans)) < (1e-9 if len(widths) == 1 else 0.25)
+
+
+def test_windows_hold_beside_enormous_weights():
+    """Weights whose sums leave the range of floats: bounds that hold, wider."""
+    first, second = np.nonzero(np.ones((4, 4)))
+    for scale in (1e3, 1e8):
+        log_weight = scale * np.random.default_rng(1).random(16)
+        exact = pair_probabilities(first, second, log_weight, (4, 4), WIDE)
+        _, lower, upper = window_bounds(first, second, log_weight, (4, 4), Run(0), (0, 3))
+        assert (lower[:16] <= exact.upper).all() and (exact.lower <= upper[:16]).all()

@@ -67,14 +67,14 @@ def pair_probabilities(
     graph = pair_graph(first, second, sizes)
     weight = np.ascontiguousarray(log_weight, dtype=np.float64)
     plan = _plan(graph, weight, max(_NARROWEST, int(states).bit_length() - 1))
-    probability = np.zeros(len(first))
+    probability, alone = np.zeros(len(first)), np.ones(sum(sizes))
     rounding = _ROUNDING + 8.0 * np.finfo(float).eps * sum(sizes) * float(np.abs(weight).max())
     if plan.kept.all():
-        swept(plan.steps, *reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability)
+        swept(plan.steps, *reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability, alone)
         low, high = probability - rounding, probability + rounding
         return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
     log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight))
-    swept(plan.steps, *reduced(graph, weight, plan.kept, log_free, sizes[0]), probability)
+    swept(plan.steps, *reduced(graph, weight, plan.kept, log_free, sizes[0]), probability, alone)
     free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
     free = np.clip(free, 0.0, 1.0)
     # left-out pairs, by their replacements at the first list's end

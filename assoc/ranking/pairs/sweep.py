@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.kernels.copying import copy_to
 from assoc.ranking.pairs.graph import PairGraph
@@ -26,7 +26,7 @@ OPEN, PAIR, CLOSE = 0, 1, 2
 """Kinds of steps."""
 DONE = -1
 """Marks a closed vertex."""
-_LARGE = 1e150
+_LARGE, _SMALL = 1e150, 1e-250
 
 
 class Work(NamedTuple):
@@ -141,25 +141,26 @@ def _closed(members: Ints, v: int, steps: Ints, count: int, work: Work) -> int:
 
 
 @njit
-def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats) -> None:
-    """Do a planned sweep forwards and backwards: fill in the probabilities of its edges.
+def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone: Floats) -> None:
+    """Do a planned sweep forwards and backwards: fill in the probabilities of its edges, and of unmatched vertices.
 
     Parameters
     ----------
     steps : int64 array (N, 4)
     weights, free : arrays (K,), (V,)
         Reduced weights of the edges, and of leaving each vertex alone.
-    probability : array (K,)
+    probability, alone : arrays (K,), (V,)
+        Not a number where the sum of all events is so small that digits are lost.
     """
     size, largest, room = 1, 1, 0
     for n in range(len(steps)):
         if steps[n, 0] == OPEN:
             size *= 2
             largest = max(largest, size)
-        elif steps[n, 0] == CLOSE:
+            continue
+        room += size
+        if steps[n, 0] == CLOSE:
             size //= 2
-        else:
-            room += size
     table, before = np.zeros(largest), np.empty(room)
     table[0], size, used = 1.0, 1, 0
     for n in range(len(steps)):
@@ -168,9 +169,10 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats) -> No
         if kind == OPEN:
             table[size : 2 * size] = 0.0
             size *= 2
-        elif kind == PAIR:
-            copy_to(before[used : used + size], table[:size])
-            used += size
+            continue
+        copy_to(before[used : used + size], table[:size])
+        used += size
+        if kind == PAIR:
             for i in range(size):
                 if not i & low and not i & high:
                     table[i | low | high] += weights[what] * table[i]
@@ -198,17 +200,26 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats) -> No
                     pair += before[used + i] * table[i | low | high]
                     table[i] += weights[what] * table[i | low | high]
             pair *= weights[what]
-            probability[what] = pair / (without + pair)
+            probability[what] = _share(pair, without)
         else:
-            top = 0.0
+            used -= 2 * size
+            top = matched = unmatched = 0.0
             for i in range(size - 1, -1, -1):
                 with_it = ((i & ~(low - 1)) << 1) | (i & (low - 1))
                 value = table[i]
                 table[with_it | low] = value
                 table[with_it] = free[what] * value
+                matched += before[used + (with_it | low)] * value
+                unmatched += before[used + with_it] * (free[what] * value)
                 top = max(top, value)
+            alone[what] = _share(unmatched, matched)
             size *= 2
             _scale(table, size, top)
+
+
+@inner_njit
+def _share(part: float, rest: float) -> float:
+    return part / (part + rest) if part + rest > _SMALL else np.nan
 
 
 @njit
