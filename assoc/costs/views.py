@@ -9,9 +9,13 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
+from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.base import Filter
+from assoc.filters.imm import Mixture
 from assoc.sensors import Sensor
+from assoc.sensors.codes import CODES
+from assoc.sensors.kernels.dispatch import linearise
 
 # shares nearer to 0 or 1 than this are 0 or 1
 _SURE = 1e-6
@@ -75,12 +79,119 @@ def _within(mean: Array, spread: Array, limits: tuple[float, float], angular: bo
     return np.asarray(ndtr(high / spread) - ndtr(low / spread))
 
 
+class Views:
+    """The views of S sensors, for targets of a filter's states; one kernel for all of them.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    axes : sequence of int
+        Components of a state that are the position.
+    """
+
+    def __init__(self, sensors: Sequence[Sensor], axes: Sequence[int]) -> None:
+        self._sensors, self._axes = tuple(sensors), np.array(axes, dtype=np.int64)
+        self._bounds = np.stack([_bounds(sensor) for sensor in sensors])
+
+    def shares(self, states: Any, sensors: slice = slice(None)) -> Array:
+        """`share_in_view` of B targets for these sensors, (B, S)."""
+        shares = self._looked(states, self._bounds[sensors], True)
+        for column, sensor in self._users(sensors):
+            shares[:, column] = share_in_view(sensor, *_places(states, self._axes))
+        return shares
+
+    def seen(self, states: Any) -> Array:
+        """Which of B targets are in which sensors' fields of view by their means, bool (B, S)."""
+        seen = self._looked(states, self._bounds, False) > 0.0
+        for s, sensor in self._users(slice(None)):
+            view = sensor.position_part
+            seen[:, s] = view.in_view(view.measure(_places(states, self._axes)[0]))
+        return np.asarray(seen)
+
+    def _users(self, sensors: slice) -> list[tuple[int, Sensor]]:
+        """Sensors of users' own classes, which have no compiled model."""
+        return [(s, one) for s, one in enumerate(self._sensors[sensors]) if type(one) not in CODES]
+
+    def _looked(self, states: Any, bounds: Array, soft: bool) -> Array:
+        if isinstance(states, Mixture):
+            parts = states.weights, states.means, states.covariances
+        else:
+            parts = np.ones((len(states), 1)), states.mean[:, None], states.covariance[:, None]
+        weights, means, covariances = map(np.ascontiguousarray, parts)
+        return np.asarray(_looked(bounds, weights, means, covariances, self._axes, soft))
+
+
+def _bounds(sensor: Sensor) -> Array:
+    """A sensor for `_looked`: code, dimension, position; for each of three components whether an angle, low, high."""
+    part = sensor.position_part
+    row = np.array([CODES.get(type(part), -1), part.dim, *part.position, *(3 * [0.0, -math.inf, math.inf])])
+    for axis, low, high in part.limits:
+        row[5 + 3 * axis : 8 + 3 * axis] = part.angular[axis], low, high
+    return row
+
+
+@njit
+def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axes: Array, soft: bool) -> Array:
+    """`share_in_view` of B mixtures of m Gaussians, or of their means alone; (B, S).
+
+    Parameters
+    ----------
+    bounds : array (S, 14)
+        See `_bounds`.
+    weights, means, covariances : arrays (B, m), (B, m, n), (B, m, n, n)
+    axes : int64 array
+        Components that are the position.
+    soft : bool
+        Whether the covariances count.
+    """
+    B, m = weights.shape
+    S, d = bounds.shape[0], axes.size
+    result = np.zeros((B, S))
+    place, spread, h, H = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    for b in range(B):
+        place[:], spread[:] = 0.0, 0.0
+        for j in range(m):
+            for i in range(d):
+                place[i] += weights[b, j] * means[b, j, axes[i]]
+        for j in range(m if soft else 0):
+            for i in range(d):
+                for k in range(d):
+                    away = (means[b, j, axes[i]] - place[i]) * (means[b, j, axes[k]] - place[k])
+                    spread[i, k] += weights[b, j] * (covariances[b, j, axes[i], axes[k]] + away)
+        for s in range(S):
+            code, dim, share = int(bounds[s, 0]), int(bounds[s, 1]), 1.0
+            if code < 0:
+                continue
+            linearise(code, dim, bounds[s, 2:5], place[0], place[1], place[2], h, H)
+            for a in range(dim):
+                low, high = bounds[s, 6 + 3 * a] - h[a], bounds[s, 7 + 3 * a] - h[a]
+                if bounds[s, 5 + 3 * a] != 0.0:
+                    # the turn of the interval that lies nearest to the mean
+                    turn = 2.0 * math.pi * round((low + high) / (4.0 * math.pi))
+                    low, high = low - turn, high - turn
+                if not soft:
+                    share = share if low <= 0.0 <= high else 0.0
+                    continue
+                variance = 0.0
+                for i in range(3):
+                    for k in range(3):
+                        variance += H[a, i] * spread[i, k] * H[a, k]
+                unit = math.sqrt(2.0) * max(math.sqrt(max(variance, 0.0)), 1e-12)
+                share *= 0.5 * (math.erfc(-high / unit) - math.erfc(-low / unit))
+            result[b, s] = 0.0 if share < _SURE else 1.0 if share > 1.0 - _SURE else share
+    return result
+
+
 def places_of(filter: Filter[Any], states: Any) -> tuple[Array, Array]:
     """Positions (B, 3) and their covariances (B, 3, 3) of states; 0 along axes that the motion model lacks."""
-    axes = list(filter.motion.position)
+    return _places(states, np.array(filter.motion.position))
+
+
+def _places(states: Any, axes: Array) -> tuple[Array, Array]:
+    d = len(axes)
     positions, covariances = np.zeros((len(states), 3)), np.zeros((len(states), 3, 3))
-    positions[:, : len(axes)] = states.mean[:, axes]
-    covariances[:, : len(axes), : len(axes)] = states.covariance[:, axes][:, :, axes]
+    positions[:, :d] = states.mean[:, axes]
+    covariances[:, :d, :d] = states.covariance[:, axes[:, None], axes]
     return positions, covariances
 
 

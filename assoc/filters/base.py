@@ -41,6 +41,9 @@ class State(Protocol):
     def __getitem__(self, rows: Any) -> Any: ...
 
 
+# models of so many sensors are remembered
+_MOST_SENSORS = 64
+
 S = TypeVar("S", bound=State)
 _new = object.__new__
 
@@ -122,7 +125,7 @@ class Filter(ABC, Generic[S]):
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
-        self._seen: tuple[Any, Any] = (None, None)
+        self._seen: dict[int, tuple[Any, Observation]] = {}
 
     @abstractmethod
     def start(self, state: Gaussian) -> S:
@@ -253,12 +256,17 @@ class Filter(ABC, Generic[S]):
 
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
-        # read once: another thread may ask with another sensor
-        seen = self._seen
-        if seen[0] is not sensor:
-            seen = self._seen = (sensor, observation(sensor, self.motion, self.kind))
-        found: Observation = seen[1]
-        return found
+        # by address, with the sensor kept beside, so that no other has it
+        seen = self._seen.get(id(sensor))
+        if seen is None or seen[0] is not sensor:
+            if len(self._seen) >= _MOST_SENSORS:
+                self._seen = {}
+            seen = self._seen[id(sensor)] = (sensor, self._observation(sensor))
+        return seen[1]
+
+    def _observation(self, sensor: Measurement) -> Observation:
+        """What `observe` remembers."""
+        return observation(sensor, self.motion, self.kind)
 
     def move(self, state: S, dt: float) -> tuple[S, Array]:
         """`predict`, and the covariance of the states before and after it, (B, n, n), for smoothing."""

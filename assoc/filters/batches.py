@@ -53,8 +53,13 @@ class Batch:
 
     def __getitem__(self, rows: Any) -> Self:
         """Return the targets that an index array, mask or slice selects."""
-        selected: Self = state_from(type(self), {name: value[rows] for name, value in arrays_of(self).items()})
-        return selected
+        made, count = object.__new__(type(self)), len(self)
+        for name in _names(type(self)):
+            value = getattr(self, name)
+            if len(value) != count:
+                value = np.broadcast_to(value, (count, *value.shape[1:]))
+            made.__dict__[name] = np.ascontiguousarray(value[rows])
+        return made
 
     def __repr__(self) -> str:
         shape = getattr(self, _names(type(self))[0]).shape

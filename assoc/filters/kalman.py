@@ -31,11 +31,10 @@ class KalmanFilter(GaussianFilter):
             )
         super().__init__(motion)
 
-    def observe(self, sensor: Measurement) -> Observation:
-        """Put a measurement model in the form that the kernels take."""
-        o = super().observe(sensor)
+    def _observation(self, sensor: Measurement) -> Observation:
+        """What `observe` remembers."""
+        o = super()._observation(sensor)
         if o.code not in (LINEAR, POSITION):
-            self._seen = (None, None)
             raise InvalidInputError(
                 f"sensor must be linear for a Kalman filter, got {type(sensor).__name__}; use ExtendedKalmanFilter"
             )

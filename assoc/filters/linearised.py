@@ -134,9 +134,7 @@ class GaussianFilter(Filter[Gaussian]):
 
     def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
         """Correct each target with its measurement; see `Filter.update`."""
-        seen = self._seen
-        o = seen[1] if seen[0] is sensor else self.observe(sensor)
-        return self.correct(state, measured, o)
+        return self.correct(state, measured, self.observe(sensor))
 
     def correct(self, state: Gaussian, measured: Array, o: Observation, scale: Array | None = None) -> Update[Gaussian]:
         """Correct, on request with the measurement covariance multiplied by a scale for each target, (B,)."""

@@ -45,11 +45,9 @@ class ModifiedEKF(GaussianFilter):
         super().__init__(motion)
         self.kind = SIMPLIFIED if simplified else MODIFIED
 
-    def observe(self, sensor: Measurement) -> Observation:
-        """Put a measurement model in the form that the kernels take."""
-        o = super().observe(sensor)
-        # remembered again below, once it has passed
-        self._seen = (None, None)
+    def _observation(self, sensor: Measurement) -> Observation:
+        """What `observe` remembers."""
+        o = super()._observation(sensor)
         if o.code not in _DIMENSIONS:
             raise InvalidInputError(
                 f"sensor must be a Radar3D or Radar2D for a modified EKF, got {type(sensor).__name__}"
@@ -58,7 +56,6 @@ class ModifiedEKF(GaussianFilter):
             raise InvalidInputError("sensor: a modified EKF takes no range rate or height; use ExtendedKalmanFilter")
         if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
-        self._seen = (sensor, o)
         return o
 
     def compare(self, state: Gaussian, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:

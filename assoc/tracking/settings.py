@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._parameters import is_number, is_whole
 from assoc.costs.tracks.scores import ScoreTerms, score_terms
+from assoc.costs.views import Views
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.measurement import LinearMeasurement
@@ -130,6 +131,11 @@ class TrackerSettings:
     def terms(self) -> ScoreTerms:
         """Scores of detections and misses of each sensor."""
         return score_terms(self.sensors)
+
+    @cached_property
+    def views(self) -> Views:
+        """What the sensors can see of tracks."""
+        return Views(self.sensors, self.filter.motion.position)
 
     @cached_property
     def births(self) -> NewTracks:

@@ -176,7 +176,9 @@ def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
 def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: Array) -> Decision:
     """Make a decision from track ids and the ids of confirmed tracks."""
     ids = tuple(np.asarray(array, dtype=np.int64) for array in assigned)
-    return Decision(scan, time, ids, tuple(np.isin(array, confirmed_ids) & (array > 0) for array in ids))
+    every = np.concatenate(ids)
+    confirmed = np.isin(every, confirmed_ids) & (every > 0)
+    return Decision(scan, time, ids, tuple(np.split(confirmed, np.cumsum([len(array) for array in ids])[:-1])))
 
 
 def renamed(step: Step, ids: Array, names: Array) -> Step:

@@ -1,5 +1,7 @@
 """Kalman filter and EKF: against the textbook in plain numpy, batches, and refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -293,15 +295,11 @@ def test_threads_do_not_mix_up_sensors_and_time_steps():
     other.noise(np.zeros((1, 7)), 9.0)
 
     class Interrupted(ExtendedKalmanFilter):
-        seen: tuple = (None, None)
-
-        @property
-        def _seen(self):
-            return self.seen
-
-        @_seen.setter
-        def _seen(self, value):
-            self.seen = (BEARING, None)
+        def _observation(self, sensor):
+            if sensor is RADAR:
+                for _ in range(70):
+                    self.observe(replace(BEARING))
+            return super()._observation(sensor)
 
     class InterruptedTurn(CoordinatedTurn):
         @property
@@ -312,6 +310,10 @@ def test_threads_do_not_mix_up_sensors_and_time_steps():
         def _noise(self, value):
             pass
 
-    assert Interrupted(MOTION).observe(RADAR).dim == 3
+    tracking = Interrupted(MOTION)
+    assert tracking.observe(RADAR).dim == 3
+    # the sensors of a scan are remembered together
+    models = [tracking.observe(sensor) for sensor in (RADAR, BEARING)]
+    assert all(tracking.observe(sensor) is model for sensor, model in zip((RADAR, BEARING), models, strict=True))
     turn = InterruptedTurn(1.0, 0.1)
     assert turn.noise(np.zeros((1, 7)), 2.0)[0, 3, 3] == pytest.approx(4.0)

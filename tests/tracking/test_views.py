@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc.costs.views import log_missed, share_in_view
+from assoc.costs.views import Views, log_missed, share_in_view
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian
-from assoc.sensors import Radar3D
+from assoc.filters.imm import Mixture
+from assoc.filters.state import gaussian
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.tracking import TRACKERS, LifeCycle
 from tests.sizes import sample
 
@@ -66,6 +68,39 @@ def test_shares_are_those_of_samples(sector):
         # components are taken as independent, and the sensor as linear
         assert share == pytest.approx(inside.mean(), abs=0.12)
     assert np.ptp(shares) > 0.3 or sector == (3.0, 4.0)
+
+
+class Own(Radar3D):
+    """A user's class, without a compiled model."""
+
+
+def test_views_of_all_sensors_at_once_are_those_of_each():
+    rng, circle = np.random.default_rng(1), [[1e3, 9e3], [2.8, 4.0]]
+    narrow = [[2e3, 10e3], [-0.5, 0.2], [0.05, 0.6]]
+    values = {"position": np.zeros(3), "detection_probability": 0.9}
+    sensors = [
+        radar(0.0, 10e3, field_of_view=narrow),
+        Own(noise=[50.0, 1e-3, 1e-3], field_of_view=narrow, **values),
+        radar(0.0, 12e3),
+        Radar2D(noise=[50.0, 1e-3], field_of_view=circle, **values),
+        Radar3D(noise=[50.0, 1e-3, 1e-3, 5.0], field_of_view=[*narrow, [-300.0, 300.0]], **values),
+        PositionSensor(noise=[9.0] * 3, field_of_view=[[0.0, 5e3], [-1e3, 1e3], [0.0, 3e3]], **values),
+        BearingSensor(noise=[1e-3], field_of_view=[[3.0, 4.0]], **values),
+    ]
+    means = np.zeros((300, 2, 6))
+    means[:, :, 1::2] = rng.uniform([-11e3, -3e3, 1e3], [11e3, 3e3, 4e3], (300, 1, 3)) + rng.normal(0, 50, (300, 2, 3))
+    root = rng.normal(0.0, 200.0, (300, 2, 6, 6))
+    covariances = root @ root.transpose(0, 1, 3, 2)
+    mixture = Mixture(means, covariances, rng.dirichlet([1.0, 1.0], 300))
+    for states in (mixture, gaussian(means[:, 0].copy(), covariances[:, 0].copy()), mixture[:0]):
+        views = Views(sensors, (1, 3, 5))
+        where, spread = states.mean[:, [1, 3, 5]], states.covariance[:, [1, 3, 5]][:, :, [1, 3, 5]]
+        found, seen = views.shares(states), views.seen(states)
+        for s, sensor in enumerate(sensors):
+            np.testing.assert_allclose(found[:, s], share_in_view(sensor, where, spread), rtol=1e-9, atol=1e-12)
+            np.testing.assert_array_equal(views.shares(states, slice(s, s + 1))[:, 0], found[:, s])
+            part = sensor.position_part
+            np.testing.assert_array_equal(seen[:, s], part.in_view(part.measure(where)))
 
 
 def test_a_miss_counts_by_the_share_in_view():

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 
@@ -76,14 +77,24 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
         To be added to the score, at most ln(birth rate).
     """
     widths = region[:, 1] - region[:, 0]
-    wide = np.flatnonzero(widths > 0.0)
-    log_widths = np.log(widths[wide])
-    half = np.zeros((len(covariances), len(wide) + 1))
-    for k in range(1, len(wide) + 1):
-        axes = wide[:k]
-        half[:, k] = 0.5 * np.linalg.slogdet(2.0 * math.pi * covariances[:, axes[:, None], axes])[1]
-    limited: Array = np.minimum(np.diff(half, axis=1), log_widths).sum(axis=1)
-    return limited + math.log(birth_rate) - float(log_widths.sum())
+    limited = _limited(np.ascontiguousarray(covariances), np.flatnonzero(widths > 0.0), widths)
+    return limited + math.log(birth_rate) - float(np.log(widths[widths > 0.0]).sum())
+
+
+@njit
+def _limited(covariances: Array, axes: Array, widths: Array) -> Array:
+    """Logarithms of the integrals: along each axis the deviation given the axes before it, or the region's width."""
+    d = axes.size
+    result, factor = np.zeros(covariances.shape[0]), np.empty((3, 3))
+    for k in range(result.size):
+        for i in range(d):
+            for j in range(i + 1):
+                value = covariances[k, axes[i], axes[j]]
+                for m in range(j):
+                    value -= factor[i, m] * factor[j, m]
+                factor[i, j] = math.sqrt(max(value, 1e-300)) if i == j else value / factor[j, j]
+            result[k] += math.log(min(math.sqrt(2.0 * math.pi) * factor[i, i], widths[axes[i]]))
+    return result
 
 
 def doubted_gain(score: Array, gain: Array) -> Array:

@@ -24,6 +24,9 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate
 from assoc.filters.measurement import Measurement
 
+# asking for the memory left would take longer than correcting so few tracks
+_FEW = 100
+
 
 class TrackTuples(NamedTuple):
     """M candidate tuples of T tracks; every track has one in which all sensors missed it."""
@@ -64,6 +67,8 @@ def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: M
 
 def require_states(states: Any, count: int) -> None:
     """Refuse to correct more tracks than memory allows."""
+    if count <= _FEW:
+        return
     arrays = [value for value in vars(states).values() if isinstance(value, np.ndarray)] if len(states) else []
     each = sum(array.nbytes for array in arrays) / max(len(states), 1)
     # selected, corrected, and a filter's temporaries

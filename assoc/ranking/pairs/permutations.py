@@ -39,7 +39,8 @@ def without_permutations(
         Largest number of sets in a cluster. Where there would be more, the least likely pairs are left as they are.
     """
     share = np.array(probability, dtype=np.float64)
-    if len(share):
+    # without a measurement in the gates of two tracks nothing can be permuted
+    if len(share) and np.bincount(second).max() > 1:
         graph, weight = pair_graph(first, second, sizes), np.ascontiguousarray(log_weight, dtype=np.float64)
         weights = reduced(graph, weight, share > 0.0, np.zeros(sum(sizes)), sizes[0])
         _permuted(graph, *weights, sizes[0], max(4, int(states).bit_length() - 1), share)

@@ -47,7 +47,7 @@ from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import in_view, looked, misses_of
+from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
@@ -158,9 +158,8 @@ class JointProbabilistic(Method):
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             found.append(known)
             assigned.append(ids)
-        return Association(
-            tracks.counted(seen, np.asarray(in_view(progress, tracks.states).any(axis=1))), assigned, tuple(found)
-        )
+        at_all = detected_or_in_view(progress, tracks.states, seen)
+        return Association(tracks.counted(seen, at_all), assigned, tuple(found))
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""

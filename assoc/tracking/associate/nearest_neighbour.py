@@ -17,7 +17,7 @@ from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
-from assoc.tracking.stages.looks import in_view, looked, misses_of
+from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
@@ -63,7 +63,7 @@ class NearestNeighbour(Method):
             tracks = TrackBatch.concatenate([tracks, TrackBatch.new(states[order], new, score[order], time)])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
-        return Association(tracks.counted(seen, np.asarray(in_view(progress, tracks.states).any(axis=1))), assigned)
+        return Association(tracks.counted(seen, detected_or_in_view(progress, tracks.states, seen)), assigned)
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""

@@ -17,8 +17,9 @@ from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances, positions_of_scan, single_positions
 from assoc.costs.tracks.own_times import Places
 from assoc.costs.tracks.scores import ScoreTerms, log_birth
-from assoc.costs.views import blind_somewhere, log_missed, share_in_view
+from assoc.costs.views import Views, blind_somewhere, log_missed
 from assoc.filters.base import Filter
+from assoc.filters.state import gaussian
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -68,6 +69,7 @@ class NewTracks:
         # a target that first appears at a sensor was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
         self._blind = blind_somewhere(place.sensors, place.region)
+        self._views = Views(place.sensors, (0, 1, 2))
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
@@ -111,7 +113,9 @@ class NewTracks:
         total = np.zeros(len(rows))
         for s in np.flatnonzero(self._blind).tolist():
             here = np.flatnonzero(rows[:, s] == 0)
-            share = share_in_view(self._place.sensors[s], positions[here], covariances[here])
+            if not len(here):
+                continue
+            share = self._views.shares(gaussian(positions[here], covariances[here]), slice(s, s + 1))[:, 0]
             total[here] += log_missed(self._terms.miss[s], share) - self._terms.miss[s]
         return total
 
@@ -128,8 +132,10 @@ class NewTracks:
         fit = self._fit(positions, covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
-        later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
-        scores = self._appears[s] + self.overlooked(later, positions, covariances) + self._log_birth(covariances)
+        scores = self._appears[s] + self._log_birth(covariances)
+        if self._blind[:s].any():
+            later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
+            scores += self.overlooked(later, positions, covariances)
         scores = scores - scan.crowd(s, numbers[fit])
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 

@@ -18,7 +18,7 @@ from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
 from assoc.filters.batches import concatenate
 from assoc.tracking.progress import Progress
-from assoc.tracking.stages.looks import in_view, looked, misses_of
+from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
 from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100
@@ -174,8 +174,9 @@ class AtOnce(Growth):
 
     def finished(self) -> Grown:
         """The branches at the end of the scan."""
-        seen = np.where(self.rows.any(axis=1), self._progress.scan.time, np.nan)
-        at_all = np.asarray(in_view(self._progress, self._states).any(axis=1))
+        hit = np.asarray(self.rows.any(axis=1))
+        seen = np.where(hit, self._progress.scan.time, np.nan)
+        at_all = detected_or_in_view(self._progress, self._states, hit)
         return Grown(self._states, seen, seen, at_all)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.views import log_missed, places_of, share_in_view
+from assoc.costs.views import log_missed, places_of
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
@@ -58,17 +58,24 @@ def _inside(settings: TrackerSettings, states: Any) -> Array:
 
 def in_view(progress: Progress, states: Any) -> Array:
     """Which tracks are in which sensors' fields of view by their means, bool (T, S)."""
-    where = places_of(progress.settings.filter, states)[0]
-    views = [sensor.position_part for sensor in progress.settings.sensors]
-    return np.stack([view.in_view(view.measure(where)) for view in views], axis=1)
+    return progress.settings.views.seen(states)
+
+
+def detected_or_in_view(progress: Progress, states: Any, detected: Array) -> Array:
+    """Which tracks were detected, bool (T,), or are in some sensor's field of view, bool (T,)."""
+    if detected.all():
+        return detected
+    found, rows = detected.copy(), np.flatnonzero(~detected)
+    found[rows] = in_view(progress, states[rows]).any(axis=1)
+    return found
 
 
 def dwells(progress: Progress, states: Any) -> Array:
     """Which sensors looked at which tracks in this scan by their means, bool (T, S)."""
-    sectors, where = progress.scan.sectors, places_of(progress.settings.filter, states)[0]
-    seen = in_view(progress, states)
+    sectors, seen = progress.scan.sectors, in_view(progress, states)
     if sectors is None:
         return seen
+    where = places_of(progress.settings.filter, states)[0]
     away = where[:, None] - np.array([sensor.position for sensor in progress.settings.sensors])
     azimuths = np.arctan2(away[..., 1], away[..., 0]).T
     return seen & np.stack([looked_at(*both) for both in zip(sectors, azimuths, strict=True)], axis=1)
@@ -76,12 +83,12 @@ def dwells(progress: Progress, states: Any) -> Array:
 
 def misses(progress: Progress, states: Any) -> Array:
     """Score of a miss of tracks predicted to a scan of one instant by each sensor, (T, S)."""
-    return np.stack([misses_of(progress, states, s) for s in range(len(progress.settings.sensors))], axis=1)
+    return log_missed(progress.settings.terms.miss, progress.settings.views.shares(states))
 
 
 def misses_of(progress: Progress, states: Any, s: int) -> Array:
     """`misses` of sensor s alone, (T,)."""
-    share = share_in_view(progress.settings.sensors[s], *places_of(progress.settings.filter, states))
+    share = progress.settings.views.shares(states, slice(s, s + 1))[:, 0]
     return log_missed(progress.settings.terms.miss[s], share)
 
 
@@ -92,20 +99,25 @@ def looked(progress: Progress, misses: Array) -> Array:
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     """Which tracks are to be deleted after the scan, bool (T,)."""
-    settings, state = progress.settings, progress.state
+    settings, state, time = progress.settings, progress.state, progress.scan.time
     # dwells are counted in scans of the sensor that turns fastest
     most = float(state.turns.max())
     if most < _LEAST_TURN:
         return np.zeros(len(tracks), dtype=np.bool_)
-    seen = in_view(progress, tracks.states)
-    # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
-    waits = tracks.confirmed & _inside(settings, tracks.states)
-    seen |= ~(waits | seen.any(axis=1))[:, None]
-    patience = settings.life_cycle.patience(
-        np.where(seen, settings.terms.miss, 0.0) * (state.turns / most), state.pace / most
-    )
-    gone = tracks.to_delete(settings.life_cycle, progress.scan.time, patience)
+    # a track with a detection at this instant need not wait for one
+    patience, rows = np.full(len(tracks), np.inf), np.flatnonzero(tracks.last_detection < time)
+    if len(rows):
+        states = tracks.states[rows]
+        seen = in_view(progress, states)
+        if not seen.all():
+            # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
+            waits = tracks.confirmed[rows] & _inside(settings, states)
+            seen |= ~(waits | seen.any(axis=1))[:, None]
+        miss = np.where(seen, settings.terms.miss, 0.0) * (state.turns / most)
+        patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
+    gone = tracks.to_delete(settings.life_cycle, time, patience)
     # out of view for so long that nobody knows where it is
     hidden = np.flatnonzero(tracks.hidden > 0.0)
-    gone[hidden] |= ~settings.births.narrow(places_of(settings.filter, tracks.states[hidden])[1])
+    if len(hidden):
+        gone[hidden] |= ~settings.births.narrow(places_of(settings.filter, tracks.states[hidden])[1])
     return gone

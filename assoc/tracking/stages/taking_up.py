@@ -33,15 +33,17 @@ def take_up(progress: Progress) -> Progress:
     """Stage: give newly confirmed tracks the ids of the old ones that they continue; keep the ends of this step."""
     assert progress.found is not None and progress.step is not None
     method, step, known = progress.settings.method, progress.step, progress.found.tracks
-    tracks, lost = method.current(progress.state), _predicted(progress)
-    new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, known.track_id[known.confirmed])]
-    # those that are probably gone; log odds
-    coasting = tracks[tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0)]
-    # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
-    left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
-    if len(new) and len(lost) + len(coasting) + len(left):
+    lost, every = _predicted(progress), progress.state.tracks
+    sure = known.track_id[known.confirmed]
+    if not np.isin(every.track_id[every.confirmed], sure).all():
+        tracks = method.current(progress.state)
+        new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, sure)]
+        # those that are probably gone; log odds
+        coasting = tracks[tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0)]
+        # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
+        left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
         old = TrackBatch.concatenate([lost, coasting, left])
-        start, end = _matched(progress, new, old, len(left))
+        start, end = _matched(progress, new, old, len(left)) if len(new) and len(old) else (np.zeros(0, np.int64),) * 2
         if len(start):
             ids, names = new.track_id[start], old.track_id[end]
             state = method.renamed(progress.state, ids, names)
@@ -49,8 +51,9 @@ def take_up(progress: Progress) -> Progress:
             progress = progress._replace(state=state._replace(tracks=tracks))
             lost, step = lost[~np.isin(lost.track_id, names)], renamed(step, ids, names)
             step = replace(step, ended=np.setdiff1d(step.ended, names[np.isin(names, left.track_id)]))
-    ended = _best(known[np.isin(known.track_id, step.ended)])
-    return progress.with_state(lost=TrackBatch.concatenate([lost, ended]))._replace(step=step)
+    if len(step.ended):
+        lost = TrackBatch.concatenate([lost, _best(known[np.isin(known.track_id, step.ended)])])
+    return progress.with_state(lost=lost)._replace(step=step)
 
 
 def _best(branches: TrackBatch) -> TrackBatch:
