@@ -196,7 +196,7 @@ def clustering_time_window() -> str:
         f"direction from position to position is {bends('plots')} deg for the plots, as the thesis's tables have them, "
         f"{bends('filtered')} filtered and {bends('smoothed')} smoothed; the aircraft's is "
         f"{bends('the aircraft itself')}",
-        f"{ABSENT} in the thesis, which cites it; here CT, MT and IT are "
+        f"{ABSENT} in the thesis, which cites it; here, with the whole recording before it, CT, MT and IT are "
         f"{', '.join(number(m[f'{rate}, spanning tree, CTW'].ours) for rate in ('CT', 'MT', 'IT'))}; of the crossing, "
         "parallel and head-on pairs "
         f"{', '.join(number(m[f'{name}: pairs whose plots share no track, spanning tree'].ours, 2) for name in pairs)}"

@@ -10,7 +10,15 @@ from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
 from experiments.common.claims import load_json
 from experiments.papers.clustering_time_window import __main__ as experiment
-from experiments.papers.clustering_time_window import false_start, own_tracker, pairs, published, tables, traffic
+from experiments.papers.clustering_time_window import (
+    false_start,
+    own_tracker,
+    pairs,
+    published,
+    spanning_tree,
+    tables,
+    traffic,
+)
 from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
@@ -175,6 +183,36 @@ def test_plots_of_tracks_that_are_never_confirmed():
     rows, tracks = np.arange(8), np.array([0, 0, 1, 0, 2, 0, 0, 0])
     taken = Taken(np.zeros(8, int), rows, tracks, np.isin(tracks, [0]))
     assert own_tracker.wrong(judged, taken) == pytest.approx((100 * 3 / 8, 100 / 6, 1, 3))
+
+
+def test_a_window_longer_than_a_turn_takes_aircraft_twice():
+    one = straight(60)
+    recording = Recording(9.5 * np.arange(60), one.ranges, one.azimuths, sources=one.sources)
+    twice = {
+        turn: sum(own_tracker._repeats(recording.sources[window.rows])
+                  for window in clustering_time_window(recording, turn, by="time"))
+        for turn in (9.5, 10.0)
+    }  # fmt: skip
+    assert twice == {9.5: 0, 10.0: 3}
+
+
+def test_bends_of_a_path():
+    square = np.array([(0, 0), (1, 0), (1, 1), (1, 1), (0, 1), (0, 0.0)])
+    assert own_tracker.bends(np.arange(6.0), square) == pytest.approx(90.0)
+    assert own_tracker.bends(np.arange(4.0), np.arange(8.0).reshape(4, 2)) == 0.0
+
+
+def test_clusters_by_a_spanning_tree():
+    """An aircraft is a track, also over a turn without a plot; a plot far from all others is none."""
+    one = straight(20, missing=(7,))
+    times, ranges = np.append(one.times, 95.0), np.append(one.ranges, 3e5)
+    order = np.argsort(times)
+    azimuths, sources = np.append(one.azimuths, 0.0), np.append(one.sources, -1)
+    recording = Recording(times[order], ranges[order], azimuths[order], sources=sources[order])
+    taken = spanning_tree.clusters(recording, clustering_time_window(recording, 10.0, by="time"))
+    lone = recording.sources[taken.rows] < 0
+    assert len(np.unique(taken.tracks[~lone])) == 1 and taken.confirmed[~lone].all()
+    assert lone.sum() == 1 and not taken.confirmed[lone].any()
 
 
 @pytest.mark.slow
