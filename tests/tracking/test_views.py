@@ -193,3 +193,16 @@ def test_a_lost_track_is_taken_up_again_under_its_id(kind):
     assert set() in seen[10:20]
     assert len(other[39]) == 1 and other[39] != seen[39]
     assert any(seen[39] <= set(ids.tolist()) for ids in step.assigned)
+
+
+@sample("kind", KINDS, every=2)
+def test_a_target_that_moves_as_no_filter_expects_keeps_its_id(kind):
+    """As a recording with a gap does: 2 km to the side from one scan to the next."""
+    sensors, seen = [radar(-20e3, P=0.9), radar(20e3, P=0.9)], []
+    tracker = make(kind, sensors)
+    before = flight(sensors, 7, 12, (-14e3, 0.0, 5e3))
+    after = flight(sensors, 8, 24, (-14e3, 2e3, 5e3))
+    for time, z in [*before, *list(after)[12:]]:
+        tracker.step(time, z)
+        seen.append({track.track_id for track in tracker.tracks if track.reported})
+    assert seen[11] == seen[23] and len(seen[11]) == 1

@@ -1,7 +1,7 @@
 """A track that was lost is taken up again: a new track that continues it gets its id.
 
 Ends of confirmed tracks are predicted on for a while. When a track is confirmed that began after such an end, or after
-the last detection of a track that is probably gone, two explanations are compared: the target of the old track, with
+the last detection of a track that is missed now, two explanations are compared: the target of the old track, with
 its predicted position and velocity; or a new target, born anywhere in the region with any usual velocity. Old ends and
 new starts are matched by the assignment problem of these log likelihood ratios.
 """
@@ -25,8 +25,9 @@ from assoc.tracking.track_batch import TrackBatch
 
 # ends are kept for this share of a target's mean lifetime
 _KEPT = 0.25
-# share of lost targets that have manoeuvred, and their variance as a multiple of the prediction's
-_MANOEUVRED, _WIDER = 0.2, 16.0
+# share of lost targets that have manoeuvred, and their variance as a multiple of the prediction's; share of those that
+# have flown on with any usual velocity
+_MANOEUVRED, _WIDER, _ANYWHERE = 0.2, 16.0, 0.02
 
 
 def take_up(progress: Progress) -> Progress:
@@ -38,8 +39,7 @@ def take_up(progress: Progress) -> Progress:
     if not np.isin(every.track_id[every.confirmed], sure).all():
         tracks = method.current(progress.state)
         new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, sure)]
-        # those that are probably gone; log odds
-        coasting = tracks[tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0)]
+        coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
         # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
         left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
         old = TrackBatch.concatenate([lost, coasting, left])
@@ -86,11 +86,15 @@ def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) ->
     # where a track was lost its target may have manoeuvred more than the filter expects
     square, size = _square(off, spread), np.linalg.slogdet(2.0 * math.pi * spread)[1]
     wider = -0.5 * (square / _WIDER + size + len(both) * math.log(_WIDER)) + math.log(_MANOEUVRED)
-    continued = np.logaddexp(math.log1p(-_MANOEUVRED) - 0.5 * (square + size), wider)
-    prior = (
-        settings.initiation.prior(motion)[1][velocity[:, None], velocity]
-        + new.states.covariance[start][:, velocity[:, None], velocity]
-    )
+    continued = np.logaddexp(math.log1p(-_MANOEUVRED - _ANYWHERE) - 0.5 * (square + size), wider)
+    usual, n = settings.initiation.prior(motion)[1][velocity[:, None], velocity], len(place)
+    since = np.maximum(new.last_detection[start] - old.last_detection[end], 0.0)
+    spread[:, :n, :n] += usual * (since**2)[:, None, None]
+    spread[:, n:, n:] += usual
+    free = -0.5 * (_square(off, spread) + np.linalg.slogdet(2.0 * math.pi * spread)[1]) + math.log(_ANYWHERE)
+    # the likelier a track's target is still there, the less it has flown elsewhere
+    continued = np.logaddexp(continued, free - np.logaddexp(0.0, old.existence[end]))
+    prior = usual + new.states.covariance[start][:, velocity[:, None], velocity]
     width = np.maximum(region[:, 1] - region[:, 0], 1.0)[: len(place)]
     born = -0.5 * (_square(new.states.mean[start][:, velocity], prior) + np.linalg.slogdet(2.0 * math.pi * prior)[1])
     born += math.log(settings.initiation.birth_rate) - np.log(width).sum()
