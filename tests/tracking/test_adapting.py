@@ -17,6 +17,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.clutter import ClutterMap
+from assoc.tracking.adapting.health import Health, Quantity, SensorHealth
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
@@ -80,7 +81,13 @@ def test_the_one_wrong_sensor_is_found():
         "noise about twice the declared", "as declared", "as declared"
     ]  # fmt: skip
     assert str(tracker.health).splitlines()[4] == "radar 1: noise about twice the declared"
-    assert max(map(len, str(tracker.health).splitlines())) <= 80
+
+
+def test_the_table_of_health_fits_a_terminal():
+    """Also where a radar's plots without heights are a sensor, whose P_d has many digits."""
+    one = SensorHealth("north, no height", *(Quantity(0.0735, 0.081, 0.05, 0.12) for _ in range(3)))
+    table, *said = str(Health((one,), Quantity(1, 1, 0.9, 1.1))).splitlines()[1:]
+    assert len(table) <= 80 and table.startswith("north, no height") and "8 (5-12)" in table and len(said) == 2
 
 
 @pytest.mark.parametrize("declared", [0.9, 0.6])

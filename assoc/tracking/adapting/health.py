@@ -101,11 +101,12 @@ class Health:
         return (*(f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors), f"targets: {targets}")
 
     def __str__(self) -> str:
-        rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d", "decl.", "false alarms", "decl.")]
+        rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
         for sensor in self.sensors:
-            both = sensor.detection_probability, sensor.false_alarm_rate
-            cells = (cell for value in both for cell in (f"{value:.2f}", f"{value.declared:.3g}"))
-            rows.append((sensor.name[:12], f"{sensor.noise:.2f}", *cells))
+            seen, alarms = sensor.detection_probability, sensor.false_alarm_rate
+            share = f"{100 * seen.seen:.0f} ({100 * seen.low:.0f}-{100 * seen.high:.0f})"
+            declared = f"{100 * seen.declared:.3g}", f"{alarms:.2f}", f"{alarms.declared:.3g}"
+            rows.append((sensor.name[:16], f"{sensor.noise:.2f}", share, *declared))
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         lines = ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
         return "\n".join([*lines, *self.verdicts])
