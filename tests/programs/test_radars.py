@@ -187,7 +187,7 @@ def position_of(values, radar):
         ({"place": None}, r"radar north: place: expected \[latitude, longitude, height\]"),
         ({"place": [147.5, 8.0]}, "radar north: place: expected a latitude within"),
         ({"noise": [40.0]}, r"radar north: noise: expected \[metres, degrees\]"),
-        ({"noise": None}, "radar north: noise: "),
+        ({"noise": None}, r"radar north: noise: the plots do not .*: give it \(\[100, 0.1\], metres and degrees"),
         ({"turn": -4}, "radar north: turn: expected a number above 0, got -4"),
         ({"units": '"m"'}, "radar north: units: expected a table"),
         ({"plaice": [1, 2]}, "unknown key 'plaice'; did you mean place"),

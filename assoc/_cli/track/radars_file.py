@@ -121,8 +121,10 @@ def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...
             options |= {"range_noise": given[0], "azimuth_noise": math.radians(given[1])}
         radar = radar_of(recording, name=name, **options)
     except InvalidInputError as error:
-        key = "turn" if turn is None else "noise"
-        raise InvalidInputError(f"{where}: {key}: {error}") from None
+        if turn is None:
+            raise InvalidInputError(f"{where}: turn: {error}") from None
+        what = str(error).removeprefix("range_noise: ").removeprefix("azimuth_noise: ")
+        raise InvalidInputError(f"{where}: noise: {what} ([100, 0.1], metres and degrees, is usual)") from None
     if "reach_km" in table:
         view = radar.field_of_view.copy()
         view[0, 1] = 1e3 * _number(table["reach_km"], f"{where}: reach_km")
