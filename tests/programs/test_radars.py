@@ -184,6 +184,10 @@ def position_of(values, radar):
     ("changes", "message"),
     [
         ({"file": '"none.csv"'}, "none.csv: no such file"),
+        (
+            {"file": '"other.csv"'},
+            r"no column bearing .* it has: 'time, rho_m, brng.*columns = \{ ... \} of .*radar north",
+        ),
         ({"place": None}, r"radar north: place: expected \[latitude, longitude, height\]"),
         ({"place": [147.5, 8.0]}, "radar north: place: expected a latitude within"),
         ({"noise": [40.0]}, r"radar north: noise: expected \[metres, degrees\]"),
@@ -195,6 +199,7 @@ def position_of(values, radar):
 )
 def test_what_is_wrong_is_one_line(tmp_path, changes, message, capsys):
     file = described(tmp_path, **changes)
+    (tmp_path / "other.csv").write_text("time,rho_m,brng\n1,2,3\n")
     for program, words in ((inspect, []), (track, ["-o", str(tmp_path / "t.csv")])):
         assert program.main([file, *words]) == 2
         said = capsys.readouterr().err

@@ -147,7 +147,11 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
         for key, value in options.items():
             if not isinstance(value, dict) or not all(isinstance(one, str) for one in value.values()):
                 raise InvalidInputError(f"{where}: {key}: expected a table such as {{ range = 'm' }}")
-        return read_plots(file, **options), None, None
+        try:
+            return read_plots(file, **options), None, None
+        except InvalidInputError as error:
+            hint = f"; say which it is: columns = {{ ... }} of {where}" if ": no column " in str(error) else ""
+            raise InvalidInputError(f"{error}{hint}") from None
     content, source = read_asterix_plots(file, table.get("radar"), f"{where}: radar")
     note = content.radars.get(source)
     return content.plots[source], None if note is None else note.rotation, None if note is None else note.place
