@@ -135,6 +135,8 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
         browser.execute_script(POINTER, x, y)
         assert browser.execute_script("return chosen") == id
         screenshot(browser, pictures / f"live-{'dark' if dark else 'light'}-{size[0]}-track.png")
+        share = browser.execute_script("return detail.offsetHeight / map.clientHeight")
+        assert share < (0.3 if size == PHONE else 0.4)
         text = browser.execute_script("return detail.textContent")
         assert text.startswith(f"Track{id}") and "m/s" in text and "Since" in text
         assert "Statuscoasting" in text and "from radar 1" in text and "NIS" in text

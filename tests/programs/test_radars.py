@@ -159,7 +159,10 @@ def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
 
 
 def test_heights_of_lines_are_altitudes(tmp_path):
-    scene = read_radars(described(tmp_path)).scene
+    file = described(tmp_path)
+    (tmp_path / "radars.toml").write_text('name = "Zurich"\n' + (tmp_path / "radars.toml").read_text())
+    scene = read_radars(file).scene
+    assert scene.name == "Zurich"
     assert [sensor.name for sensor in scene.sensors[:2]] == ["north, no height", "north"]
     slant, bearing = seen_from("north", place_of(0, np.array(0.0)))
     azimuth = np.pi / 2 - bearing

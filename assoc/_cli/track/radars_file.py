@@ -76,6 +76,7 @@ def read_radars(path: str) -> Radars:
     turns = [turn for _, _, turn, _, _ in read]
     interval = None if "interval" not in top else _number(top["interval"], f"{path}: interval")
     scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
+    scene = replace(scene, name=str(top.get("name", scene.name)))
     identities = identities_of_radars(recordings, radars, scene.times)
     return Radars(scene, recordings, radars, turns, identities)
 

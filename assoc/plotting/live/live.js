@@ -153,7 +153,7 @@ function describe() {
   const rows = [["Track", id], ["Status", status], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
   if (latitude !== undefined) rows.push(["Place", latitude.toFixed(5) + "\u00b0, " + longitude.toFixed(5) + "\u00b0"]);
   rows.push(["Height", height === null ? "unknown" : Math.round(height) + " m"], ["Speed", Math.hypot(vx, vy).toFixed(1) + " m/s"]);
-  rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Since", moment(started)], ["Scans with a detection", hits]);
+  rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Since", moment(started)], ["Hits", hits]);
   if (quality) {
     quality[2].forEach((number, s) => rows.push(["from " + names[s], number]));
     rows.push(["NIS", quality[0] === null ? "not known yet" : quality[0] + (quality[1] ? "" : ": inconsistent")]);
