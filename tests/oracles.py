@@ -1,7 +1,7 @@
 """What the tests compare against: exhaustive search, scipy's MILP, and generators of small problems.
 
-Nothing here uses a solver of the package. Exhaustive search is written over bit masks of measurements,
-so that "each measurement in exactly one tuple" is one integer comparison.
+Nothing here uses a solver of the package. Exhaustive search is written over bit masks of measurements
+(tests/reliability/exact.py), so that "each measurement in exactly one tuple" is one integer comparison.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
-from experiments.common.checking import check_answer, price_list
+from experiments.common.checking import check_answer
 from experiments.common.peers import by_milp
-from tests.reliability.exact import exact_optimum
+from tests.reliability.exact import coverings, exact_optimum, masks
 
 
 @dataclass(frozen=True)
@@ -25,35 +25,6 @@ class Ranked:
     tuples: tuple[tuple[int, ...], ...]
 
 
-def _masks(problem: AssignmentProblem) -> tuple[list[list[tuple[int, tuple[int, ...], float]]], int]:
-    """For every measurement that must be covered: the tuples to cover it with, as (mask, tuple, cost).
-
-    Dimensions that need not be covered (longer ones of axial problems) come last in the mask, so that
-    the lowest uncovered bit is always one that must be covered.
-    """
-    sizes = problem.sizes.tolist()
-    smallest = min(sizes)
-    must = [problem.dummy or size == smallest for size in sizes]
-    offset = [0] * len(sizes)
-    bits = 0
-    for wanted in (True, False):
-        for sensor, size in enumerate(sizes):
-            if must[sensor] is wanted:
-                offset[sensor] = bits
-                bits += size
-    to_cover = sum(size for size, needed in zip(sizes, must, strict=True) if needed)
-    covering: list[list[tuple[int, tuple[int, ...], float]]] = [[] for _ in range(to_cover)]
-    for key, cost in price_list(problem).items():
-        mask = 0
-        for sensor, index in enumerate(key):
-            if index:
-                mask |= 1 << (offset[sensor] + index - 1)
-        low = (mask & -mask).bit_length() - 1
-        if low < to_cover:
-            covering[low].append((mask, key, cost))
-    return covering, to_cover
-
-
 def all_solutions(problem: AssignmentProblem, limit: int = 300_000) -> list[Ranked]:
     """Every solution, cheapest first (ties in lexicographic order of their tuples).
 
@@ -62,23 +33,24 @@ def all_solutions(problem: AssignmentProblem, limit: int = 300_000) -> list[Rank
     MemoryError
         There are more than ``limit``: the problem is too large for this oracle.
     """
-    covering, to_cover = _masks(problem)
+    covering, to_cover, unit = coverings(problem)
+    key = dict(zip(masks(problem), map(tuple, problem.tuples.tolist()), strict=True))
     found: list[Ranked] = []
 
-    def extend(covered: int, cost: float, chosen: tuple[tuple[int, ...], ...]) -> None:
+    def extend(covered: int, cost: int, chosen: tuple[tuple[int, ...], ...]) -> None:
         free = ~covered
         low = (free & -free).bit_length() - 1
         if low >= to_cover:
             if len(found) >= limit:
                 raise MemoryError(f"more than {limit} solutions")
-            found.append(Ranked(cost, tuple(sorted(chosen))))
+            found.append(Ranked(cost / unit, tuple(sorted(chosen))))
             return
         # A tuple is filed under its lowest bit, and everything below `low` is covered already.
-        for mask, key, price in covering[low]:
+        for mask, price in covering[low]:
             if not mask & covered:
-                extend(covered | mask, cost + price, (*chosen, key))
+                extend(covered | mask, cost + price, (*chosen, key[mask]))
 
-    extend(0, 0.0, ())
+    extend(0, 0, ())
     return sorted(found, key=lambda s: (s.cost, s.tuples))
 
 

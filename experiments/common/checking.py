@@ -7,20 +7,9 @@ from numpy.typing import ArrayLike
 
 from assoc.problem import AssignmentProblem
 
-Tuple = tuple[int, ...]
-
 
 class InfeasibleAnswerError(AssertionError):
     """A solver's answer breaks a constraint of the problem; the message says which."""
-
-
-def price_list(problem: AssignmentProblem) -> dict[Tuple, float]:
-    """Cost of every allowed tuple; one listed twice counts with its smaller cost."""
-    prices: dict[Tuple, float] = {}
-    for row, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
-        key = tuple(row)
-        prices[key] = min(cost, prices.get(key, np.inf))
-    return prices
 
 
 def check_answer(problem: AssignmentProblem, tuples: ArrayLike) -> float:
@@ -29,7 +18,10 @@ def check_answer(problem: AssignmentProblem, tuples: ArrayLike) -> float:
     Returns their total cost, read from the problem and not from the solver.
     Raises InfeasibleAnswerError: A tuple that the problem does not list, or a measurement used too often or not at all.
     """
-    prices = price_list(problem)
+    prices: dict[tuple[int, ...], float] = {}
+    for row, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
+        # one listed twice counts with its smaller cost
+        prices[tuple(row)] = min(cost, prices.get(tuple(row), np.inf))
     chosen = [tuple(int(i) for i in row) for row in np.asarray(tuples).reshape(-1, problem.num_sensors)]
     for key in chosen:
         if key not in prices:

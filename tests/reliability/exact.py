@@ -35,7 +35,7 @@ def exact_ranks(problem: AssignmentProblem, k: int) -> list[Fraction]:
 
 def ranks_of_part(problem: AssignmentProblem, k: int) -> list[Fraction]:
     """Costs of the k best solutions of a problem with few measurements."""
-    covering, to_cover, unit = _coverings(problem)
+    covering, to_cover, unit = coverings(problem)
     memo: dict[int, list[int]] = {}
 
     def rest(covered: int) -> list[int]:
@@ -99,7 +99,7 @@ def _parts(problem: AssignmentProblem) -> list[tuple[list[int], AssignmentProble
 
 def marginals_of_part(problem: AssignmentProblem) -> list[float]:
     """Probability of each tuple of a problem with few measurements."""
-    covering, to_cover, unit = _coverings(problem)
+    covering, to_cover, unit = coverings(problem)
     # for each set of covered measurements: the least cost of the rest, the weight of all rests relative to that
     memo: dict[int, tuple[int, float] | None] = {}
 
@@ -135,9 +135,7 @@ def marginals_of_part(problem: AssignmentProblem) -> list[float]:
             share = reached[covered] * _weight(here[0] - cost, unit) * own / here[1]
             probability[mask] = probability.get(mask, 0.0) + share
             reached[after] = reached.get(after, 0.0) + share
-    offsets = _offsets(problem)[0]
-    masks = (sum(1 << (offsets[s] + i - 1) for s, i in enumerate(row) if i) for row in problem.tuples.tolist())
-    return [probability.get(mask, 0.0) for mask in masks]
+    return [probability.get(mask, 0.0) for mask in masks(problem)]
 
 
 def _weight(exponent: int, unit: int) -> float:
@@ -158,16 +156,21 @@ def _offsets(problem: AssignmentProblem) -> tuple[list[int], int]:
     return offset, to_cover
 
 
-def _coverings(problem: AssignmentProblem) -> tuple[list[list[tuple[int, int]]], int, int]:
+def masks(problem: AssignmentProblem) -> list[int]:
+    """The measurements of each tuple, as bits."""
+    offset, _ = _offsets(problem)
+    return [sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i) for row in problem.tuples.tolist()]
+
+
+def coverings(problem: AssignmentProblem) -> tuple[list[list[tuple[int, int]]], int, int]:
     """For each measurement that must be covered the tuples that begin in it, as bits and cost; cost unit last."""
-    offset, to_cover = _offsets(problem)
+    _, to_cover = _offsets(problem)
     # all costs as whole numbers of the smallest unit among them: sums are exact and quick
     ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
     unit = max((denominator for _, denominator in ratios), default=1)
     covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
     best: dict[int, int] = {}
-    for row, (numerator, denominator) in zip(problem.tuples.tolist(), ratios, strict=True):
-        mask = sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i)
+    for mask, (numerator, denominator) in zip(masks(problem), ratios, strict=True):
         price = numerator * (unit // denominator)
         if mask not in best or price < best[mask]:
             best[mask] = price
