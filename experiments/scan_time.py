@@ -24,7 +24,7 @@ from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances import scenes
-from experiments.common.peers import highs
+from experiments.common.peers import PEERS
 
 
 class Kind(NamedTuple):
@@ -73,7 +73,7 @@ def parts_of(scene: Scene) -> dict[str, float]:
         "exact": median_ms(assoc.assign, lambda: assoc.build_problem(scene, 0)),
         "AssignmentProblem": median_ms(lambda _: fresh()),
         "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), fresh),
-        "HiGHS": median_ms(lambda one: highs(one, 60.0), fresh),
+        "HiGHS": median_ms(lambda one: PEERS["highs"](one, 60.0), fresh),
     }
 
 

@@ -10,12 +10,12 @@ computed by `experiments.common.checking`, not by the peer.
 ``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
 ``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
 ``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
-``nrl_tracker``         PyPI ``nrl-tracker``: relaxation on a dense axial tensor (small problems only)
+``nrl_tracker``         PyPI ``nrl-tracker``: 100 iterations on a dense axial tensor; takes no limit
 ``chils``               CHILS, local search for the heaviest independent set (packing_peers.py)
 ``branch_reduce``       KaMIS's branch and reduce for it
 ``mmwis``               KaMIS's memetic algorithm for it
 ``kap``                 PyPI ``kap``: multiple Hungarian method on the costs of pairs
-``stone_soup``          the optimiser of Stone Soup's multi-frame assignment (multi_frame_peer.py)
+``stone_soup``          Stone Soup's multi-frame assignment (multi_frame_peer.py); takes no limit
 ======================  ==========================================================================
 """
 
@@ -24,6 +24,7 @@ import importlib.util
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -205,6 +206,8 @@ def dense_elements(problem: AssignmentProblem) -> float:
 
 
 def _nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    if dense_elements(problem) > DENSE_LIMIT:
+        raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
     from pytcl.assignment_algorithms.nd_assignment import (  # type: ignore[import-untyped,unused-ignore]
         relaxation_assignment_nd,
     )
@@ -246,65 +249,21 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
         np.minimum(tensor[place], cost, out=tensor[place])
 
 
-def cp_sat(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """OR-Tools CP-SAT with two workers, costs scaled by 1e6 and rounded."""
-    return _answer(lambda p, limit: _cp_sat(p, limit, 2), problem, time_limit)
-
-
 def cp_sat_1(problem: AssignmentProblem, time_limit: float, told: Told | None = None) -> PeerAnswer:
     """CP-SAT with one worker, which may be listened to as it finds solutions."""
     return _answer(lambda p, limit: _cp_sat(p, limit, 1, told), problem, time_limit)
 
 
-def scip(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """Run SCIP in OR-Tools MathOpt on two threads (its concurrent mode)."""
-    return _answer(lambda p, limit: _scip(p, limit, 2), problem, time_limit)
-
-
-def scip_1(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """Run SCIP in OR-Tools MathOpt on one thread, often faster than its concurrent mode."""
-    return _answer(lambda p, limit: _scip(p, limit, 1), problem, time_limit)
-
-
-def highs(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """HiGHS through scipy, relative gap 1e-9."""
-    return _answer(_highs, problem, time_limit)
-
-
-def sequential(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """Two-dimensional assignments sensor by sensor, first to last; no bound."""
-    return _answer(assign_in_turn, problem, time_limit)
-
-
-def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """N-D relaxation of PyPI's ``nrl-tracker`` with its defaults (100 iterations; it takes no time limit).
-
-    Raises MemoryError: The dense tensor would exceed `DENSE_LIMIT` elements.
-    """
-    if dense_elements(problem) > DENSE_LIMIT:
-        raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
-    return _answer(_nrl_tracker, problem, time_limit)
-
-
-def stone_soup(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """Stone Soup's dual decomposition (it takes no time limit)."""
-    return _answer(multi_frame_peer.multi_frame, problem, time_limit)
-
-
-def _packing_peer(solve: Callable[[AssignmentProblem, float], Chosen]) -> Peer:
-    return lambda problem, time_limit: _answer(solve, problem, time_limit)
-
-
 PEERS: dict[str, Peer] = {
-    "cp_sat": cp_sat,
+    "cp_sat": partial(_answer, lambda problem, limit: _cp_sat(problem, limit, 2)),
     "cp_sat_1": cp_sat_1,
-    "scip": scip,
-    "scip_1": scip_1,
-    "highs": highs,
-    "sequential": sequential,
-    "nrl_tracker": nrl_tracker,
-    "stone_soup": stone_soup,
-    **{name: _packing_peer(getattr(packing_peers, name)) for name in PACKING_PEERS},
+    "scip": partial(_answer, lambda problem, limit: _scip(problem, limit, 2)),
+    "scip_1": partial(_answer, lambda problem, limit: _scip(problem, limit, 1)),
+    "highs": partial(_answer, _highs),
+    "sequential": partial(_answer, assign_in_turn),
+    "nrl_tracker": partial(_answer, _nrl_tracker),
+    "stone_soup": partial(_answer, multi_frame_peer.multi_frame),
+    **{name: partial(_answer, getattr(packing_peers, name)) for name in PACKING_PEERS},
 }
 
 

@@ -52,7 +52,7 @@ def test_heuristic_peers_are_feasible_and_not_better(name: str) -> None:
 def test_two_sensors_sequential_is_exact() -> None:
     for problem in oracles.small_problems(60, seed=3, dummy=True):
         if problem.num_sensors == 2 and (problem.costs[np.count_nonzero(problem.tuples, axis=1) == 1] == 0).all():
-            answer = peers.sequential(problem, 1.0)
+            answer = peers.PEERS["sequential"](problem, 1.0)
             assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)
 
 
@@ -64,7 +64,7 @@ def test_limits() -> None:
     assert peers.dense_elements(dense) == 300**3
     assert not peers.available("nrl_tracker", dense)
     with pytest.raises(MemoryError):
-        peers.nrl_tracker(dense, 1.0)
+        peers.PEERS["nrl_tracker"](dense, 1.0)
 
 
 @pytest.mark.parametrize("name", ["chils", "mmwis", "branch_reduce"])
