@@ -66,9 +66,9 @@ def plot_heat_map(
     xs, ys, middle, low, high = cells(study, measure, across, up)
     ax = axes_or_new(ax)
     texts = np.full(middle.shape, "", dtype=object)
-    for place, value in np.ndenumerate(middle):
+    for cell, value in np.ndenumerate(middle):
         if not np.isnan(value):
-            texts[place] = f"{value:.3g}\n{low[place]:.3g} .. {high[place]:.3g}"
+            texts[cell] = f"{value:.3g}\n{low[cell]:.3g} .. {high[cell]:.3g}"
     known = middle[~np.isnan(middle)]
     image = draw_cells(xs, ys, middle, colour_limits(known), ax=ax, texts=texts)
     if is_constant(known):
@@ -103,14 +103,14 @@ def cells(
     xs, ys = (np.array(sorted(study[name].dropna().unique().tolist()), dtype=object) for name in (across, up))
     middle, low, high = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
     for (x, y), runs in study.groupby([across, up]):
-        place = [*ys].index(y), [*xs].index(x)
+        cell = [*ys].index(y), [*xs].index(x)
         # settings that differ only in other parameters count as repeats
         runs = runs.assign(repeat=runs.groupby(["setting", "repeat"]).ngroup())
         table = by_problem(runs, measured(runs, measure))
         weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
-        middle[place] = factor * weighted_mean(table, weights)
+        middle[cell] = factor * weighted_mean(table, weights)
         if intervals:
-            low[place], high[place] = (factor * end for end in mean_interval(table, weights))
+            low[cell], high[cell] = (factor * end for end in mean_interval(table, weights))
     return xs, ys, middle, low, high
 
 

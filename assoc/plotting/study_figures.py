@@ -188,11 +188,11 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     axes = figure.subplots(1, 2, sharey=True)
     for ax, column, label in zip(axes, ("iteration", "seconds"), ("iteration", "ms"), strict=True):
         # drawn from the last to the first, so that the best lie on top
-        for place, row in reversed([*enumerate(summary.to_dict("records"))]):
+        for rank, row in reversed([*enumerate(summary.to_dict("records"))]):
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
-            if place < _MOST_CURVES:
+            if rank < _MOST_CURVES:
                 label = setting_title(row, names, several)
-                line = {"color": colour(place), "linestyle": DASHES[place % len(DASHES)]}
+                line = {"color": colour(rank), "linestyle": DASHES[rank % len(DASHES)]}
                 style = {**line, "linewidth": 1.6, "zorder": 3, "label": label}
             draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:

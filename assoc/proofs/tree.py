@@ -90,7 +90,7 @@ class Aim:
 class _Open(NamedTuple):
     """An open node: its index, what it allows, and its parent's basis and multipliers."""
 
-    place: int
+    node: int
     allowed: Allowed
     variable: NDArray[np.int32]
     duals: Floats
@@ -132,7 +132,7 @@ class _Search:
     def visit(self, task: _Open) -> None:
         """Bound a node, and branch if the bound is not enough."""
         program, aim, tree = self._program, self._aim, self.tree
-        node = tree.nodes[task.place]
+        node = tree.nodes[task.node]
         basis = basis_of(program, task.allowed, task.variable, task.duals)
         effort = Effort(aim.enough + 0.1 * self._margin, most_exchanges(program), aim.deadline)
         status, _ = solve_dual(program, task.allowed, basis, effort)

@@ -48,4 +48,4 @@ def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllC
     u, v = murty.duals
     duals = np.concatenate([v, u] if turned else [u, v])
     columns = priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
-    return columns, Found([murty.edges(place) for place in range(murty.num_found)], murty.rest, murty.evaluations)
+    return columns, Found([murty.edges(rank) for rank in range(murty.num_found)], murty.rest, murty.evaluations)

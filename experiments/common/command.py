@@ -87,15 +87,15 @@ def publish(claims: list[Claim], name: str, seed: int, about: str | None, *, par
 
 def replaced(claims: list[Claim], newer: list[Claim]) -> list[Claim]:
     """Claims, those of a quantity that newer ones have replaced by them; new quantities follow those before them."""
-    found, place = list(claims), len(claims)
+    found, index = list(claims), len(claims)
     for claim in newer:
         known = [i for i, one in enumerate(found) if one.quantity == claim.quantity]
         if known:
-            place = known[0]
-            found[place] = claim
+            index = known[0]
+            found[index] = claim
         else:
-            place = min(place + 1, len(found))
-            found.insert(place, claim)
+            index = min(index + 1, len(found))
+            found.insert(index, claim)
     return found
 
 

@@ -243,10 +243,10 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
     sizes = problem.sizes.tolist()
     tensor[tuple(slice(size, None) for size in sizes)] = 0.0
     for key, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
-        place = tuple(
+        cells = tuple(
             slice(index - 1, index) if index else slice(size, None) for index, size in zip(key, sizes, strict=True)
         )
-        np.minimum(tensor[place], cost, out=tensor[place])
+        np.minimum(tensor[cells], cost, out=tensor[cells])
 
 
 def cp_sat_1(problem: AssignmentProblem, time_limit: float, told: Told | None = None) -> PeerAnswer:

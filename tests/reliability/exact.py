@@ -92,7 +92,7 @@ def _parts(problem: AssignmentProblem) -> list[tuple[list[int], AssignmentProble
     for rows in members.values():
         columns = [np.unique(column, return_inverse=True) for column in problem.tuples[rows].T]
         # numbers from 1, and 0 for none also where no tuple has none
-        tuples = np.stack([place + (values[0] > 0) for values, place in columns], axis=1)
+        tuples = np.stack([index + (values[0] > 0) for values, index in columns], axis=1)
         parts.append((rows, AssignmentProblem(tuples, problem.costs[rows], tuples.max(axis=0))))
     return parts
 

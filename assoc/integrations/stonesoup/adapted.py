@@ -137,9 +137,9 @@ def adapt(
     if false_alarm_rate is None:
         clutter = getattr(source, "clutter_model", None)
         false_alarm_rate = 1.0 if clutter is None else float(clutter.clutter_rate)
-    place, turn = _place(model)
+    position, turn = _place(model)
     options: dict[str, Any] = {
-        "position": place,
+        "position": position,
         "detection_probability": float(detection_probability),
         "false_alarm_rate": false_alarm_rate,
         "name": name,
@@ -165,16 +165,16 @@ def adapt(
 
 def _place(model: Any) -> tuple[Array, float]:
     """Position (3,) and turn about z of a model."""
-    place = np.zeros(3)
+    position = np.zeros(3)
     offset = np.asarray(getattr(model, "translation_offset", np.zeros(0)), dtype=np.float64).ravel()
-    place[: min(len(offset), 3)] = offset[:3]
+    position[: min(len(offset), 3)] = offset[:3]
     rotation = np.asarray(getattr(model, "rotation_offset", np.zeros(3)), dtype=np.float64).ravel()
     if rotation[:2].any():
         raise InvalidInputError(
             f"{type(model).__name__}: the sensor is tilted by {rotation[:2].tolist()} rad about x and y; "
             "expected a rotation_offset about z alone"
         )
-    return place, float(rotation[2])
+    return position, float(rotation[2])
 
 
 def _full_view(kind: type[Sensor], dim: int, max_range: float | None) -> Array | None:

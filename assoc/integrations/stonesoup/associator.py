@@ -64,14 +64,14 @@ class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
         self.solution = None
         ordered = sorted_paths(tracks)
         found = OrderedSet(sorted_detections(detections))
-        place = {id(detection): d for d, detection in enumerate(found, start=1)}
+        index = {id(detection): d for d, detection in enumerate(found, start=1)}
         offered = self.generate_hypotheses(ordered, found, timestamp, **kwargs)
         missed: dict[int, Hypothesis] = {}
         pairs: dict[tuple[int, int], Hypothesis] = {}
         for t, track in enumerate(ordered, start=1):
             for hypothesis in offered[track]:
                 if hypothesis:
-                    pairs[t, place[id(hypothesis.measurement)]] = hypothesis
+                    pairs[t, index[id(hypothesis.measurement)]] = hypothesis
                 else:
                     missed[t] = hypothesis
         chosen = dict(missed)

@@ -69,12 +69,12 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
         The sensor is of a user-defined kind.
     """
     common = {"ndim_state": ndim_state, "noise_covar": sensor.covariance}
-    place = StateVector(sensor.position)
+    offset = StateVector(sensor.position)
     if isinstance(sensor, PositionSensor):
         return LinearGaussian(mapping=tuple(mapping[: sensor.dim]), **common)
     if type(sensor) is BearingSensor:
-        return Cartesian2DToBearing(mapping=tuple(mapping[:2]), translation_offset=place[:2], **common)
-    common.update(mapping=tuple(mapping), translation_offset=place, noise_covar=sensor.covariance[::-1, ::-1])
+        return Cartesian2DToBearing(mapping=tuple(mapping[:2]), translation_offset=offset[:2], **common)
+    common.update(mapping=tuple(mapping), translation_offset=offset, noise_covar=sensor.covariance[::-1, ::-1])
     if isinstance(sensor, Radar3D):
         if sensor.measures_velocity:
             raise InvalidInputError("Radar3D: range rate is not handed to Stone Soup; leave the fourth component out")

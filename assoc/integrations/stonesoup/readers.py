@@ -96,9 +96,9 @@ class SceneGroundTruthReader(GroundTruthReader):  # type: ignore[misc]
             time = moment(scan.time, self.start_time)
             present: OrderedSet[GroundTruthPath] = OrderedSet()
             assert scan.truth_ids is not None and scan.truth_positions is not None
-            for target, place in zip(scan.truth_ids.tolist(), scan.truth_positions, strict=True):
+            for target, position in zip(scan.truth_ids.tolist(), scan.truth_positions, strict=True):
                 vector = np.zeros(self.ndim_state)
-                vector[list(self.mapping)] = place[: len(self.mapping)]
+                vector[list(self.mapping)] = position[: len(self.mapping)]
                 vector[list(self.velocity_mapping)] = velocities[k, target][: len(self.velocity_mapping)]
                 path = paths.setdefault(target, GroundTruthPath(id=f"target {target}"))
                 path.append(GroundTruthState(StateVector(vector), timestamp=time, metadata={"target": target}))
@@ -111,14 +111,14 @@ def _velocities(scene: Scene) -> dict[tuple[int, int], Array]:
     assert scene.truth is not None
     seen: dict[int, list[tuple[int, Array]]] = {}
     for k, (ids, places) in enumerate(zip(scene.truth.target_ids, scene.truth.positions, strict=True)):
-        for target, place in zip(ids.tolist(), places, strict=True):
-            seen.setdefault(target, []).append((k, place))
+        for target, position in zip(ids.tolist(), places, strict=True):
+            seen.setdefault(target, []).append((k, position))
     result: dict[tuple[int, int], Array] = {}
     for target, history in seen.items():
         velocity = np.zeros(3)
-        for (k, place), (after, then) in zip(history, history[1:], strict=False):
+        for (k, position), (after, then) in zip(history, history[1:], strict=False):
             elapsed = float(scene.times[after] - scene.times[k])
-            velocity = (then - place) / elapsed if elapsed > 0 else velocity
+            velocity = (then - position) / elapsed if elapsed > 0 else velocity
             result[k, target] = velocity
         result[history[-1][0], target] = velocity
     return result

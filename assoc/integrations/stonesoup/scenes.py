@@ -119,13 +119,15 @@ def _truth(
     for i, path in enumerate(paths):
         # of several states of a path at one time the last one counts
         for moment, state in {state.timestamp: state for state in path}.items():
-            place = np.zeros(3)
-            place[: len(frame.mapping)] = np.asarray(state.state_vector, dtype=np.float64).ravel()[list(frame.mapping)]
-            known.setdefault(moment, []).append((i, place))
+            position = np.zeros(3)
+            position[: len(frame.mapping)] = np.asarray(state.state_vector, dtype=np.float64).ravel()[
+                list(frame.mapping)
+            ]
+            known.setdefault(moment, []).append((i, position))
     present = [known.get(moment, []) for moment in moments]
     return Truth(
         target_ids=[np.array([i for i, _ in targets], dtype=np.int64) for targets in present],
-        positions=[np.array([place for _, place in targets]).reshape(len(targets), 3) for targets in present],
+        positions=[np.array([position for _, position in targets]).reshape(len(targets), 3) for targets in present],
         sources=[
             [np.array([number.get(id(getattr(d, "groundtruth_path", None)), -1) for d in p], dtype=np.int64) for p in s]
             for s in scans

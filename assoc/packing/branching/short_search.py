@@ -90,8 +90,8 @@ def _remainder(packing: Packing, linear: LinearProgram, part: Part) -> Remainder
 def _arrays(packing: Packing, rest: Remainder) -> PackingArrays:
     """The remaining columns of a packing over the remaining rows, as branch and bound takes them."""
     rows = rest.rows[rest.rows < packing.num_rows]
-    place = np.full(packing.num_rows + 1, -1, dtype=np.int32)
-    place[rows] = np.arange(rows.size)
+    index = np.full(packing.num_rows + 1, -1, dtype=np.int32)
+    index[rows] = np.arange(rows.size)
     return packing.arrays._replace(
-        cols=place[packing.cols[rest.columns]], weights=packing.weights[rest.columns], slack=rest.slack[: rows.size]
+        cols=index[packing.cols[rest.columns]], weights=packing.weights[rest.columns], slack=rest.slack[: rows.size]
     )

@@ -51,10 +51,10 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     duals = whole.duals[smaller.row_origin]
     duals = np.ascontiguousarray(np.where(smaller.slack, np.minimum(duals, 0.0), duals))
     hard_pass(smaller, duals)
-    place = np.full(whole.packing.num_columns, -1, dtype=np.int32)
-    place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
+    index = np.full(whole.packing.num_columns, -1, dtype=np.int32)
+    index[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
     owner = whole.best[smaller.row_origin]
-    owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
+    owner = np.where(owner >= 0, index[owner], -1).astype(np.int32)
     components = split_components(smaller, duals, whole.origin[smaller.origin])
     give_covers(components, smaller, owner)
     rounding = 1e-12 * (sum(abs(one.weight) for one in components) + abs(whole.weight))

@@ -65,11 +65,11 @@ def remainder_of(
     used = np.bincount(entries, minlength=sides.size) > 0
     # a row that must be covered stays even if no column covers it: then there is no solution
     rows = np.flatnonzero(used | (~slack & (sides > 0.0)))
-    row_place = np.full(sides.size, -1, dtype=np.int32)
-    row_place[rows] = np.arange(rows.size)
+    row_index = np.full(sides.size, -1, dtype=np.int32)
+    row_index[rows] = np.arange(rows.size)
     start = np.concatenate([[0], np.cumsum(counts)])
-    rest = Program(program.weights[columns], start, row_place[entries], sides[rows], program.width)
-    variable = _variables(program, basis.variable, columns, row_place, rows.size)
+    rest = Program(program.weights[columns], start, row_index[entries], sides[rows], program.width)
+    variable = _variables(program, basis.variable, columns, row_index, rows.size)
     return Remainder(rest, slack[rows], columns, rows, variable, basis.duals[rows])
 
 
@@ -86,18 +86,18 @@ def _variables(
     program: Program,
     variable: NDArray[np.int32],
     columns: NDArray[np.int64],
-    row_place: NDArray[np.int32],
+    row_index: NDArray[np.int32],
     size: int,
 ) -> NDArray[np.int32]:
     """The remaining variables of a basis, renumbered; the first is repeated where there are too few."""
     num = program.weights.size
-    place = np.full(num, -1, dtype=np.int64)
-    place[columns] = np.arange(columns.size)
+    index = np.full(num, -1, dtype=np.int64)
+    index[columns] = np.arange(columns.size)
     is_column = variable < num
-    kind, row = np.divmod(np.where(is_column, 0, variable - num), row_place.size)
-    there = row_place[row] >= 0
-    alone = np.where(there, columns.size + kind * size + row_place[row], -1)
-    numbered = np.where(is_column, place[np.where(is_column, variable, 0)], alone)
+    kind, row = np.divmod(np.where(is_column, 0, variable - num), row_index.size)
+    there = row_index[row] >= 0
+    alone = np.where(there, columns.size + kind * size + row_index[row], -1)
+    numbered = np.where(is_column, index[np.where(is_column, variable, 0)], alone)
     numbered = numbered[numbered >= 0]
     # a basis without remaining variables has only anchors
     first = numbered[0] if numbered.size else columns.size + size

@@ -131,13 +131,13 @@ def _summary(frame: pd.DataFrame, table: pd.DataFrame, titles: Sequence[str]) ->
 
 
 def _table(table: pd.DataFrame, names: Sequence[str]) -> str:
-    headers = ["place", "solver", *names, "runs"]
+    headers = ["rank", "solver", *names, "runs"]
     shown = [name for name in LABELS if table[name].notna().any()]
     for name in shown:
         headers += [LABELS[name], "95 %"]
     rows = []
-    for place, row in enumerate(table.to_dict("records"), start=1):
-        line: list[tuple[str, Any]] = [(str(place), place), (str(row["solver"]), str(row["solver"]))]
+    for rank, row in enumerate(table.to_dict("records"), start=1):
+        line: list[tuple[str, Any]] = [(str(rank), rank), (str(row["solver"]), str(row["solver"]))]
         line += [_value(row[name]) for name in names]
         line.append((str(row["runs"]), int(row["runs"])))
         for name in shown:

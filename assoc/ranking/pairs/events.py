@@ -79,12 +79,12 @@ def pair_probabilities(
     free = np.clip(free, 0.0, 1.0)
     # left-out pairs, by their replacements at the first list's end
     out = np.flatnonzero(~plan.kept)
-    place = np.empty(len(first), dtype=np.int64)
+    index = np.empty(len(first), dtype=np.int64)
     count = graph.ptr[sizes[0]]
-    place[graph.edge[:count]] = np.arange(count)
+    index[graph.edge[:count]] = np.arange(count)
     least, most = np.exp(plan.log_lower), np.exp(plan.log_upper)
     ends = graph.ends[out]
-    probability[out] = (free[graph.ends[:, 0]] * np.exp(log_part[place] - log_free[graph.ends[:, 0]]))[out]
+    probability[out] = (free[graph.ends[:, 0]] * np.exp(log_part[index] - log_free[graph.ends[:, 0]]))[out]
     width = np.bincount(plan.label, -free * np.expm1(-log_free))
     first_label, second_label = plan.label[ends].T
     apart = first_label != second_label
