@@ -86,6 +86,13 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
             assert np.median(np.abs(own.altitude - height)) < 60.0
     text = (tmp_path / "tracks.kml").read_text()
     assert ("absolute" in text) and "4521" in text and "2021-07-12" in text
+    # smoothed, the tracks have their names and are nearer to the aircraft
+    assert track.main([file, "-o", out, "--smooth"]) == 0
+    smooth = pd.read_csv(out, dtype={"target": str})
+    assert set(smooth.target.unique()) >= {"2000", "4521", "7001"}
+    own = smooth[(smooth.target == f"{CODES[0]:04o}") & (smooth.time > 1626098400 + 60)]
+    lat, lon, _ = place_of(0, own.time.to_numpy() - 1626098400)
+    assert np.median(111_200 * np.hypot(own.latitude - lat, np.cos(np.radians(47)) * (own.longitude - lon))) < 100.0
     capsys.readouterr()
 
 
