@@ -86,7 +86,12 @@ def test_larger_sparse_ones():
         keep = rng.random((n, m)) < degree / m
         row_slack = np.where(rng.random(n) < must, np.inf, 0.0)
         feasible += _check(rng.normal(-2, 3, (n, m)), keep, row_slack, np.zeros(m))
-    assert feasible >= 3
+    # dense ones, with ties, with rows and columns that must be matched, and one that cannot be
+    matrix = np.outer(np.arange(150.0), np.arange(160.0)) % 97.0
+    keep = rng.random(matrix.shape) < 0.95
+    for row_slack, column_slack in [(np.inf, 0.0), (4.0, 0.0), (np.inf, np.inf), (3.0, np.inf)]:
+        feasible += _check(matrix, keep, np.full(150, row_slack), np.full(160, column_slack))
+    assert feasible >= 5
 
 
 def test_parallel_edges():
@@ -117,14 +122,30 @@ def test_two_lists_are_solved_and_proved_by_one_matching(kind, dummy):
     assert answer.status == "optimal"
 
 
-def test_large_lists_need_no_branching():
-    """Ten candidates each, tied many times: branching took a minute for ten thousand."""
+def test_large_lists_are_proved_by_multipliers_alone():
+    """Ten candidates each, tied many times: the reduction leaves a gap that branching took a minute to close."""
     rng = np.random.default_rng(7)
     n = 2000
     tuples = np.stack([np.repeat(np.arange(n), 10), rng.integers(0, n, 10 * n)], axis=1) + 1
-    problem = assoc.AssignmentProblem(tuples, rng.integers(-9, 3, 10 * n) * 0.1, (n, n))
-    answer = assoc.assign(problem, nodes=1)
-    assert answer.status == "optimal" and answer.iterations == 1
+    costs = rng.integers(-9, 3, 10 * n) * 0.1
+    answer = assoc.assign(assoc.AssignmentProblem(tuples, costs, (n, n)), nodes=0)
+    assert answer.status == "optimal"
+    one, two = (np.minimum(duals, 0.0) for duals in answer.duals)
+    assert (one[tuples[:, 0] - 1] + two[tuples[:, 1] - 1] <= costs + 1e-9).all()
+    assert one.sum() + two.sum() == pytest.approx(answer.cost, rel=1e-9)
+
+
+def test_a_component_of_two_sides_needs_no_branching():
+    """Sensor 2 pairs with sensors 1 and 3, who do not pair with each other; other targets have all three."""
+    rng = np.random.default_rng(3)
+    n = 600
+    pairs = rng.integers(1, n + 1, (8 * n, 2))
+    first = rng.random(8 * n) < 0.5
+    tuples = np.stack([np.where(first, pairs[:, 0], 0), pairs[:, 1], np.where(first, 0, pairs[:, 0])], axis=1)
+    tuples = np.concatenate([tuples, [[n + 1, n + 1, n + 1]]])
+    costs = np.append(rng.integers(-9, 0, 8 * n) * 0.1, -1.0)
+    answer = assoc.assign(assoc.AssignmentProblem(tuples, costs, (n + 1, n + 1, n + 1)), nodes=0)
+    assert answer.status == "optimal" and answer.iterations == 0
 
 
 def test_what_two_sensors_decide_is_matched():

@@ -168,8 +168,10 @@ def match_sparse(
     problem = _Costs(indptr, indices, costs, row_slack, base)
     state = _State(row_edge, u, v, owner, pending)
     num_pending = _reduce_rows(problem, state, num_pending)
-    if num_pending > 0 and not _augment_all(problem, state, num_pending):
-        return np.inf
+    if num_pending > 0:
+        dense = indices.size > _MANY and 4 * indices.size > n * m
+        if not (_augment_dense(problem, state, num_pending) if dense else _augment_all(problem, state, num_pending)):
+            return np.inf
     total = 0.0
     for i in range(n):
         total += row_slack[i] if row_edge[i] < 0 else costs[row_edge[i]]
@@ -245,16 +247,13 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     tree_distance = np.empty(m + 1)
     heap_key = np.empty(64)
     heap_column = np.empty(64, np.int64)
-    # with many edges a column the nearest one is found faster by looking at all than in a heap
-    scans = indices.size > _MANY and 4 * indices.size > m * (indptr.size - 1)
     edge_row = np.empty(indices.size, np.int64)
     for i in range(indptr.size - 1):
         for k in range(indptr[i], indptr[i + 1]):
             edge_row[k] = i
     for at in range(num_pending):
         start = pending[at]
-        num_reached, num_closed = 0, 0
-        num_tree = 0
+        num_reached, num_tree = 0, 0
         size = 0
         sink_distance, sink_row, sink_column = np.inf, -1, -1
         i, d = start, 0.0
@@ -280,23 +279,12 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
                         sink_distance, sink_column = value, j
                         continue
                     distance[j] = value
-                    if scans:
-                        continue
                     if size == heap_key.size:
                         heap_key = doubled(heap_key)
                         heap_column = doubled(heap_column)
                     push(heap_key, heap_column, size, value, j)
                     size += 1
             found = False
-            if num_closed < num_reached and scans:
-                best = num_closed
-                for t in range(num_closed + 1, num_reached):
-                    if distance[reached[t]] < distance[reached[best]]:
-                        best = t
-                j = reached[best]
-                reached[best], reached[num_closed] = reached[num_closed], j
-                d, found = distance[j], True
-                num_closed += 1
             while size > 0:
                 d = heap_key[0]
                 j = heap_column[0]
@@ -335,4 +323,74 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
             if i == start:
                 break
             j = indices[after]
+    return True
+
+
+@inner_njit
+def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
+    """The same on a matrix of the costs: with many edges the nearest column is found faster by a look at all."""
+    indptr, indices, costs, row_slack, base = problem
+    row_edge, u, v, owner, pending = state
+    n, m = row_slack.size, base.size
+    matrix, edge, mate = np.full((n, m), np.inf), np.empty((n, m), np.int64), np.full(n, -1, np.int64)
+    for i in range(n):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if costs[k] - base[j] < matrix[i, j]:
+                matrix[i, j], edge[i, j] = costs[k] - base[j], k
+        if row_edge[i] >= 0:
+            mate[i] = indices[row_edge[i]]
+    distance, previous = np.empty(m), np.empty(m, np.int64)
+    # columns: those that are still open, then those that are closed, the last first
+    order = np.arange(m)
+    tree_distance = np.empty(m)
+    for at in range(num_pending):
+        start = pending[at]
+        num_open = m
+        distance[:] = np.inf
+        sink_distance, sink_row, sink_column = np.inf, -1, -1
+        i, d = start, 0.0
+        while True:
+            if d + row_slack[i] - u[i] < sink_distance:
+                sink_distance, sink_row = d + row_slack[i] - u[i], i
+            least, place, row, shift = np.inf, -1, matrix[i], d - u[i]
+            for t in range(num_open):
+                j = order[t]
+                value, known = shift + row[j] - v[j], distance[j]
+                if value < known:
+                    distance[j], previous[j], known = value, i, value
+                if known < least or (known == least and owner[j] < 0):
+                    least, place = known, t
+            if least >= sink_distance:
+                break
+            j = order[place]
+            # rounding may make a reduced cost negative
+            d = max(d, least)
+            if owner[j] < 0:
+                sink_distance, sink_column = d, j
+                break
+            num_open -= 1
+            order[place], order[num_open] = order[num_open], j
+            tree_distance[num_open] = d
+            i = owner[j]
+        if sink_distance == np.inf:
+            return False
+        u[start] += sink_distance
+        for t in range(num_open, m):
+            u[owner[order[t]]] += sink_distance - tree_distance[t]
+            v[order[t]] -= sink_distance - tree_distance[t]
+        if sink_column >= 0:
+            j = sink_column
+        elif sink_row == start:
+            continue
+        else:
+            j = mate[sink_row]
+            mate[sink_row] = -1
+        while True:
+            i = previous[j]
+            owner[j], mate[i], j = i, j, mate[i]
+            if i == start:
+                break
+    for i in range(n):
+        row_edge[i] = edge[i, mate[i]] if mate[i] >= 0 else -1
     return True
