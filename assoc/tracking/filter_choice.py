@@ -43,7 +43,7 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3, *, unscented
         2 or 3.
     unscented : bool
         Unscented filters instead of extended ones, for `open_heights`: linearised at a height that is kilometres off,
-        slant ranges seem to tell more of it than they do.
+        slant ranges seem to determine it better than they do.
     """
     kind: Any = filters.UnscentedKalmanFilter if unscented else filters.ExtendedKalmanFilter
     modes: list[Any] = [

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _OPEN_HEIGHT, _OPEN_VELOCITY = 5e3, 200.0
-"""Standard deviations of a height and of velocities that a system does not tell, metres and m/s."""
+"""Standard deviations of a height and of velocities that a system does not report, metres and m/s."""
 _LEAST_BOX = 1e4
 """Least side of the box of all tracks from which a density of targets is estimated, metres."""
 _ROUNDS = 15

@@ -54,7 +54,7 @@ def learn(progress: Progress) -> Progress:
     rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
     if len(tracks):
         _seek(progress, late, rows, looks)
-    # tracks in dense clutter tell little of sensors
+    # tracks in dense clutter say little about sensors
     plain = progress.scan.crowding(rows) == 0.0
     hits = (rows > 0) & plain[:, None]
     looks = hits | (looks & plain[:, None])
