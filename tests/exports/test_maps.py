@@ -92,6 +92,15 @@ def test_tracks_have_coordinates_and_call_signs(scene, tmp_path):
     assert len(root.findall(".//k:Placemark", space)) == frame["track_id"].nunique()
 
 
+def test_only_known_heights_are_shown(tmp_path):
+    """Those known to 2 km; a track without them lies on the ground."""
+    frame = pd.DataFrame({"track_id": [1, 1, 2, 2, 3, 3], "time": [0.0, 1] * 3, "latitude": 1.0, "longitude": 3.0})
+    frame = frame.assign(altitude=[5e3, 5e3, 5e3, 5e3, np.nan, np.nan], sigma_z=[50, 60, 2500, 2600, 0, 0])
+    write_map(tmp_path / "a.kml", frame)
+    found = ElementTree.parse(tmp_path / "a.kml").findall(".//{*}altitudeMode")
+    assert [one.text for one in found] == ["absolute", "clampToGround", "clampToGround"]
+
+
 def test_a_map_over_the_date_line_and_of_a_point(tmp_path):
     frame = pd.DataFrame({"track_id": [1, 1, 1, 2], "time": [0.0, 1, 2, 0], "latitude": 1.0, "altitude": 5.0})
     frame["longitude"] = [179.9, -179.9, -179.8, 3.0]

@@ -378,7 +378,10 @@ class LiveTracker:
         scan = Scan(0, end, tuple(z), times=tuple(times)).aligned(sensors)
         found = [positions_of_scan(place.at(end), scan, s)[0] for s in range(len(sensors))]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
-        return Picture(end, tracks, ended, np.concatenate(found), owner, self._agreements(step, tracks))
+        begin = clock.perf_counter()
+        agreements = self._agreements(step, tracks)
+        self.seconds[-1] += clock.perf_counter() - begin
+        return Picture(end, tracks, ended, np.concatenate(found), owner, agreements)
 
     def _agreements(self, step: Step | None, tracks: Sequence[Track]) -> dict[int, Agreement]:
         """How well the tracks agree with their measurements after a step, None if it failed."""
