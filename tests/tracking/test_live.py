@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from dataclasses import replace
 
@@ -462,3 +463,16 @@ def test_own_positions_that_cannot_be_are_left_out():
     tracker.take_own_position("ship", 1.0, [0.0, 0, 0], 0.5)
     tracker.take_own_position("boat", 1.0, [0.0, 0, 0], 0.5)
     assert told == ["own position for 'ship' left out: the sensor is on no platform; further ones are only counted"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "factor", "said"), [(0, 1e-3, "kilometres|another unit"), (1, 57.3, "degrees"), (0, 1.0, None)]
+)
+def test_units_that_are_hardly_meant_are_told_once(scene, axis, factor, said):
+    tracker, told = live(scene)
+    for plot in [*replayed(scene, 0.0)][:200]:
+        values = np.array(plot.values)
+        values[axis] *= factor
+        tracker.take(plot.sensor, plot.time, values)
+    doubts = [line for line in told if line.startswith("warning: ")]
+    assert len(doubts) == (len(scene.sensors) if said else 0) and all(re.search(said, line) for line in doubts), doubts

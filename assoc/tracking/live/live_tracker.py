@@ -14,8 +14,10 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._system.door import doors
 from assoc._text.times import moment
+from assoc._types import Array
 from assoc.costs.positions import positions_of_scan
 from assoc.errors import AssocError, InvalidInputError
+from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.arrays import LARGEST
@@ -36,6 +38,8 @@ JUMP = 60.0
 _AGREE = 10
 """Doubtful plots in a row, close in time, after which the clock is taken to have jumped."""
 _MOST_TIMED = 100_000
+# numbers of plots of a sensor after which their units are checked
+_LOOKS = (1, 10, 50)
 
 
 @doors
@@ -91,6 +95,7 @@ class LiveTracker:
         self._kept = KeptIdentities()
         self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
+        self._first: list[list[Array]] = [[] for _ in scene.sensors]
         self.counts: Counter[str] = Counter()
         """Plots used, late plots, and those that could not be used, by reason."""
         self.seconds: deque[float] = deque(maxlen=_MOST_TIMED)
@@ -322,9 +327,21 @@ class LiveTracker:
         turn, sensor = self.settings.turn_of(s), self.settings.scene.sensors[s]
         if self.state.antennas[s].silent:
             self.settings.tell(f"{self.settings.name_of(s)} is back at {moment(time)}")
+        self._doubt_units(s, z)
         azimuth = 0.0 if turn is None else float(z[sensor.components.index("azimuth")])
         for part in self.settings.parts[s]:
             self.state.antennas[part] = self.state.antennas[part].after(time, azimuth, turn)
+
+    def _doubt_units(self, s: int, z: Array) -> None:
+        """Tell once if the first plots of a sensor are hardly in metres and radians."""
+        first, sensor = self._first[s], self.settings.scene.sensors[s]
+        if len(first) >= _LOOKS[-1]:
+            return
+        first.append(z)
+        doubts = implausible([sensor], [[np.array(first)]]) if len(first) in _LOOKS else ()
+        if doubts:
+            self.settings.tell(f"warning: {'; '.join(doubts)}")
+            self._first[s] = [z] * _LOOKS[-1]
 
     def _step(self) -> Picture:
         """Take in the interval that ends, with sensors where their platforms are."""
