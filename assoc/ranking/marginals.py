@@ -13,7 +13,8 @@ from assoc._parameters import checked_time_limit
 from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._text.shown import Shown
-from assoc._types import Floats
+from assoc._types import Floats, Ints
+from assoc.errors import InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
@@ -23,6 +24,7 @@ from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
+from assoc.ranking.sampler import estimates
 from assoc.ranking.tuple_bounds import LIGHTEST, ROUNDING, tuple_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+METHODS = ("auto", "certified", "estimate")
+# intervals wider than this have their probabilities sampled
+_WIDE = 0.02
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
 # intervals up to this width need no listing, nor do those of two lists unless they say next to nothing
@@ -50,13 +55,16 @@ class Marginals(Shown):
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Best estimate between the bounds: from the k best of its cluster, or from sums around it where they are surer.
+        Best estimate between the bounds: from the k best of its cluster, from sums around it where they are surer, or
+        sampled.
     lower, upper : float arrays, shape (T,)
         Bounds on the probability among all solutions.
     unseen : float
         The width of the widest interval.
     listed : int
         Number of solutions listed, over all clusters.
+    error : float
+        The largest standard error of the probabilities that are sampled, by the spread of several chains; 0: none is.
     """
 
     tuples: NDArray[np.int32]
@@ -65,6 +73,7 @@ class Marginals(Shown):
     upper: Floats
     unseen: float
     listed: int
+    error: float = 0.0
 
     def to_frame(self) -> pd.DataFrame:
         """One row per tuple that can have a probability: the sensors' indices, probability, lower, upper."""
@@ -80,7 +89,9 @@ class Marginals(Shown):
 
 @door
 @interruptible()
-def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
+def marginals(
+    problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None, method: str = "auto"
+) -> Marginals:
     """Return the association probability of every tuple, by sums around it and the k best solutions.
 
     Parameters
@@ -91,14 +102,18 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
         Solutions to list for each cluster of tuples (``problem.components()``); clusters are independent, so
         that k of each give narrower intervals than k of the whole problem.
     time_limit : float, optional
-        Seconds for the rankings; the fewer solutions are proved, the wider the intervals.
+        Seconds for all; the fewer solutions are proved, the wider the intervals.
+    method : {"auto", "certified", "estimate"}
+        "auto": where intervals stay wide, probabilities are sampled (`assoc.ranking.sampler`); the intervals never are.
+        "certified": nothing is sampled. "estimate": of clusters that need it only the best solution is sought, to
+        sample from, and their intervals are [0, 1].
 
     Raises
     ------
     InfeasibleError
         There is no solution, or none was found in the time.
     InvalidInputError
-        ``k`` is not a whole number >= 1, or the time limit is not positive.
+        ``k`` is not a whole number >= 1, the time limit is not positive, or the method is not one of these.
 
     Notes
     -----
@@ -125,6 +140,8 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     narrower bound counts, and where these leave no width to speak of, nothing is listed.
     """
     checked_k(k)
+    if method not in METHODS:
+        raise InvalidInputError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
     run = Run(0, time_limit=checked_time_limit(time_limit))
     # the fallback for clusters that there is no time for
     prepare_fallback(prepare(problem).packing, run)
@@ -132,10 +149,13 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     # a ranking prepares its columns before it checks the clock, which takes about as long as all this did
     begin = run.runtime() / max(problem.num_tuples, 1)
     probability, lower, upper = np.ones((3, len(tuples)))
+    # standard errors of what is sampled; nan: nothing is
+    error = np.full(len(tuples), np.nan)
     listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
     narrow = _NARROW if len(problem.sizes) > 2 else _NARROW_PAIRS
-    known = _without_listing(problem, index, len(tuples), run)
+    two = len(problem.sizes) == 2
+    known = _without_listing(problem, index, len(tuples), run) if two or method != "estimate" else None
     for cluster, which in _clusters(problem):
         if known is not None and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
             waiting[which] = False
@@ -148,22 +168,25 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
         waiting[which] = False
         # a cluster that is the whole problem has its greedy solution already
         clock = run if cluster is problem else run.part(0, run.time_limit)
-        shares, share, count = _of_cluster(cluster, k, clock)
+        shares, share, count, sampled = _of_cluster(cluster, k, clock, method)
         listed += count
         # a tuple that is listed twice is one tuple: each solution has it once, in either row
         touched, total = _totals(index[which], shares, len(tuples))
         probability[touched] = np.minimum(total, 1.0)
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
+        if sampled is not None:
+            probability[touched] = np.clip(_totals(index[which], sampled[0], len(tuples))[1], 0.0, 1.0)
+            error[touched] = _totals(index[which], sampled[1], len(tuples))[1]
     if known is not None:
-        narrower = known[2] - known[1] < upper - lower
+        narrower = (known[2] - known[1] < upper - lower) & (np.isnan(error) | (known[2] - known[1] < _WIDE))
         lower, upper = np.maximum(lower, known[1]), np.minimum(upper, known[2])
         # the two kinds of bounds may meet at a point, but for rounding
         upper = np.maximum(upper, lower)
-        probability = np.clip(np.where(narrower, known[0], probability), lower, upper)
-    return Marginals(
-        tuples.astype(np.int32), probability, lower, upper, float((upper - lower).max(initial=0.0)), listed
-    )
+        probability = np.where(narrower, known[0], probability)
+    probability = np.clip(probability, lower, upper)
+    widest, spread = float((upper - lower).max(initial=0.0)), float(np.nan_to_num(error).max(initial=0.0))
+    return Marginals(tuples.astype(np.int32), probability, lower, upper, widest, listed, spread)
 
 
 def _without_listing(problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run) -> Floats | None:
@@ -258,8 +281,18 @@ def _totals(index: NDArray[np.int64], values: Floats, num: int) -> tuple[NDArray
     return touched, np.asarray(np.bincount(number.reshape(-1), values), dtype=np.float64)
 
 
-def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, float, int]:
-    """Each tuple's share in the weight of the k best, the share of the unseen rest, and the number listed."""
+def _of_cluster(
+    problem: AssignmentProblem, k: int, run: Run, method: str
+) -> tuple[Floats, float, int, tuple[Floats, Floats] | None]:
+    """Each tuple's share in the weight of the k best, the share of the unseen rest, and the number listed.
+
+    And where they leave much open: sampled probabilities and their standard errors.
+    """
+    everything = run
+    if method == "estimate":
+        k = 1
+    if method != "certified" and run.time_limit is not None:
+        run = run.part(0, 0.6 * run.time_limit)
     # rank one more than is listed: its cost bounds the rest
     ranking = rank(problem, k + 1, None, run)
     solutions = ranking.solutions[:k]
@@ -270,14 +303,35 @@ def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, f
     weight_of = np.zeros(problem.num_tuples)
     for solution, weight in zip(solutions, weights, strict=True):
         weight_of[solution.indices] += weight
-    others = _others(problem, ranking.columns, cost_of, rest, run)
+    others = _others(problem, ranking.columns, cost_of, rest, run) if method != "estimate" else np.inf
     share = others / (total + others) if others < np.inf else 1.0
     # large costs have fewer exact digits than their differences need; sums lose as much as errors below this
     rounding = 2.0 * float(np.finfo(float).eps * np.abs(cost_of).max())
     if rounding > _ROUNDING:
         share = min(share + 4.0 * rounding, 1.0)
     # the share of a tuple in every listed solution is 1, whatever rounding did to the sums
-    return np.minimum(weight_of / total, 1.0), share, len(solutions)
+    sampled = None
+    if method != "certified" and share > _WIDE:
+        sampled = _sampled(
+            ranking.columns, [solutions[0].indices, solutions[-1].indices], problem.num_tuples, everything
+        )
+    return np.minimum(weight_of / total, 1.0), share, len(solutions), sampled
+
+
+def _sampled(columns: AllColumns, starts: list[Ints], num: int, run: Run) -> tuple[Floats, Floats] | None:
+    """Sampled probabilities of the tuples of a cluster, and their standard errors, from these solutions (tuples)."""
+    column = np.full(num, -1, dtype=np.int64)
+    column[columns.origin] = np.arange(len(columns.origin))
+    found = estimates(columns, [column[start][column[start] >= 0] for start in starts], run)
+    if found is None:
+        return None
+    share = np.zeros((len(found), num))
+    share[:, columns.origin] = found
+    if columns.single.size:
+        share[:, columns.single] = 1.0
+        column, sensor = np.nonzero(columns.rows >= 0)
+        np.subtract.at(share.T, columns.single[columns.rows[column, sensor]], found.T[column])
+    return share.mean(axis=0), share.std(axis=0, ddof=1) / np.sqrt(len(found))
 
 
 def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, rest: float, run: Run) -> float:

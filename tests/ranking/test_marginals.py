@@ -57,6 +57,31 @@ def test_intervals_contain_the_truth(count):
     assert np.median(widths) < 0.5
 
 
+def test_estimates_are_calibrated():
+    """Sampled from the best solution, of problems with and without dummies: near the truth, and as far as they say."""
+    errors, likely = [], []
+    for problem, _ in enumerable(16, 71, limit=500):
+        truth = exact_marginals(problem)
+        found = marginals(problem, method="estimate")
+        true = np.array([truth[tuple(key)] for key in found.tuples.tolist()])
+        assert (found.lower - 1e-9 <= true).all() and (true <= found.upper + 1e-9).all()
+        assert np.abs(found.probability - true).max() < 0.02 + 5.0 * found.error
+        errors.append(np.abs(found.probability - true).mean())
+        likely.append(true[found.probability > 0.5] - found.probability[found.probability > 0.5])
+    assert np.mean(errors) < 0.01
+    assert abs(np.mean(np.concatenate(likely))) < 0.01
+
+
+def test_estimates_leave_intervals_alone():
+    problem = axial_problem(np.random.default_rng(4), (9, 9, 9), 1.0, "mixed")
+    certified, auto = marginals(problem, 3, method="certified"), marginals(problem, 3)
+    assert (certified.lower == auto.lower).all() and (certified.upper == auto.upper).all()
+    assert certified.error == 0.0 < auto.error
+    assert auto.probability.tolist() == marginals(problem, 3).probability.tolist()
+    with pytest.raises(InvalidInputError, match="method: expected one of"):
+        marginals(problem, method="guess")
+
+
 def odd_cycle(length, cost):
     """Sensors of one measurement each, in a cycle of pairs that cost the same."""
     tuples = np.zeros((length, length), dtype=np.int32)
@@ -152,7 +177,7 @@ def test_the_unseen_weight_is_bounded_tightly_when_solved_out():
         costs = np.array([s.cost for s in found])
         weights = np.exp(costs[0] - costs)
         k = max(1, len(found) // 3)
-        share = _of_cluster(problem, k, Run(0))[1]
+        share = _of_cluster(problem, k, Run(0), "certified")[1]
         unseen = weights[k:].sum() / weights.sum()
         assert unseen - 1e-9 <= share <= unseen + 1e-6
         checked += 1
