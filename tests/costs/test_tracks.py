@@ -36,8 +36,13 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     assert (np.diff(rows * 1000 + columns) > 0).all()
     # the box is not everything
     assert len(boxed) < 0.3 * tracks * found
-    inside = gating.within(Expected(h, S), rows, z, columns, angular, gate)
-    assert inside.all()
+    # partial tuples of the tracks in reverse, whose gates are half as wide
+    track, narrow = np.arange(tracks)[::-1].copy(), Expected(h[::-1].copy(), S[::-1] / 4.0)
+    near = gating.Near(np.searchsorted(rows, np.arange(tracks + 1)), columns)
+    half = {(t, k) for t, k in boxed if (np.abs(v[t, k]) <= reach[t] / 2.0).all()}
+    both = gating.near_both(narrow, track, near, z, angular, gate, 10**6)
+    assert list(zip(*both, strict=True)) == sorted((tracks - 1 - t, k) for t, k in half)
+    assert gating.near_both(narrow, track, near, z, angular, gate, 2)[0].size == min(len(half), 3)
 
 
 CUBE = np.array([[0.0, 1e3]] * 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,11 +66,10 @@ def _turning(angular: tuple[bool, ...]) -> Array:
 def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, most: int) -> tuple[Array, Array]:
     """Pairs whose components are all within reach, sorted by track; at most one more than ``most``."""
     num, dim = h.shape
-    reach = np.empty((num, dim))
+    reach = _reach(covariance, gate)
     total = np.zeros(dim)
     for t in range(num):
         for i in range(dim):
-            reach[t, i] = math.sqrt(gate * covariance[t, i, i]) * (1.0 + 1e-9)
             total[i] += reach[t, i]
     # the component in which a gate is the smallest share of all measurements; angles have no order
     axis, widest = -1, 0.0
@@ -96,16 +96,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
     for t in range(num):
         first = count
         for k in range(low[t], high[t]):
-            inside = True
-            for i in range(dim):
-                off = abs(z[order[k], i] - h[t, i])
-                if turning[i]:
-                    off %= _TURN
-                    off = min(off, _TURN - off)
-                if not off <= reach[t, i]:
-                    inside = False
-                    break
-            if inside:
+            if _inside(h[t], z[order[k]], reach[t], turning):
                 if count == tracks.size:
                     tracks, found = _doubled(tracks), _doubled(found)
                 tracks[count] = t
@@ -128,18 +119,85 @@ def _doubled(array: Array) -> Array:
     return larger
 
 
-def within(
-    expected: Expected, rows: Array, measurements: Array, found: Array, angular: tuple[bool, ...], gate: float
-) -> Array:
-    """Which pairs (row of `expected`, row of `measurements`) may pass a chi-square gate; bool (K,)."""
-    off: Array = np.abs(measurements[found] - expected.mean[rows])
-    turning = np.array(angular)
-    if turning.any():
-        part = off[:, turning] % _TURN
-        off[:, turning] = np.minimum(part, _TURN - part)
-    # |v_i| <= sqrt(gate S_ii) for every residual within the gate
-    reach: Array = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
-    return np.asarray((off <= reach[rows]).all(axis=1))
+class Near(NamedTuple):
+    """Measurements near each track: those of track t are ``found[first[t]:first[t + 1]]``, ascending."""
+
+    first: Array
+    found: Array
+
+
+def near_both(
+    expected: Expected,
+    track: Array,
+    near: Near,
+    measurements: Array,
+    angular: tuple[bool, ...],
+    gate: float,
+    most: int,
+) -> tuple[Array, Array]:
+    """Pairs of partial tuples and measurements that may pass a chi-square gate; at most one more than ``most``.
+
+    Parameters
+    ----------
+    expected : Expected
+        As of `near_pairs`, of each partial tuple.
+    track : int array (B,)
+        The track of each partial tuple.
+    near : Near
+        Only measurements near the track are looked at.
+
+    Returns
+    -------
+    tuple, measurement : int arrays (K,)
+        Ordered by tuple, then measurement.
+    """
+    arrays = track, near.first, near.found, np.ascontiguousarray(measurements), _turning(angular)
+    return _near_both((expected.mean, _reach(expected.covariance, gate)), *arrays, most)
+
+
+@njit
+def _reach(covariance: Array, gate: float) -> Array:
+    """The largest residuals within a gate: ``|v_i| <= sqrt(gate S_ii)``, (B, d)."""
+    num, dim = covariance.shape[:2]
+    reach = np.empty((num, dim))
+    for t in range(num):
+        for i in range(dim):
+            reach[t, i] = math.sqrt(gate * covariance[t, i, i]) * (1.0 + 1e-9)
+    return reach
+
+
+@inner_njit
+def _inside(h: Array, z: Array, reach: Array, turning: Array) -> bool:
+    """Whether no residual is larger than its reach."""
+    for i in range(h.size):
+        off = abs(z[i] - h[i])
+        if turning[i]:
+            off %= _TURN
+            off = min(off, _TURN - off)
+        if not off <= reach[i]:
+            return False
+    return True
+
+
+@njit
+def _near_both(
+    boxes: tuple[Array, Array], track: Array, first: Array, near: Array, z: Array, turning: Array, most: int
+) -> tuple[Array, Array]:
+    """The kernel of `near_both`; ``boxes`` are centres and reaches."""
+    h, reach = boxes
+    rows = np.empty(64 + 2 * track.size, np.int64)
+    found = np.empty(rows.size, np.int64)
+    count = 0
+    for row in range(track.size):
+        for k in range(first[track[row]], first[track[row] + 1]):
+            if _inside(h[row], z[near[k]], reach[row], turning):
+                if count == rows.size:
+                    rows, found = _doubled(rows), _doubled(found)
+                rows[count], found[count] = row, near[k]
+                count += 1
+                if count > most:
+                    return rows[:count].copy(), found[:count].copy()
+    return rows[:count].copy(), found[:count].copy()
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:

@@ -19,7 +19,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.gating import angular_components, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
-from assoc.costs.tracks.tuples import gate_of, join, require_states
+from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.costs.views import log_missed, places_of, share_in_view
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
@@ -272,7 +272,7 @@ class TimedScan:
             first, second = self.near_beginnings(r, s)
             near_anchor, near_found = np.append(near_anchor, self.offsets[r] + first), np.append(near_found, second)
         order = np.lexsort((near_found, near_anchor))
-        parent, found = join(anchor, near_anchor[order], near_found[order], int(self.offsets[-1]))
+        parent, found = _join(anchor, near_anchor[order], near_found[order], int(self.offsets[-1]))
         new = rows[parent]
         new[:, s] = found + 1
         followed = self.follow(track[parent], new)
@@ -423,3 +423,13 @@ def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTe
         mine = np.flatnonzero(followed.lead == s)
         gain[mine] += births[rows[mine, s] - 1] - terms.detection[s]
     return np.asarray(-gain)
+
+
+def _join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:
+    """Partial tuples times the measurements near their tracks (sorted by track): row of the tuple, measurement."""
+    first = np.searchsorted(near_track, np.arange(count + 1))
+    low, high = first[track], first[track + 1]
+    lengths = high - low
+    parent = np.repeat(np.arange(len(track)), lengths)
+    offsets = np.repeat(low - (np.cumsum(lengths) - lengths), lengths)
+    return parent, near_found[np.arange(len(parent)) + offsets]

@@ -17,7 +17,7 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.limits import MAX_TUPLES
-from assoc.costs.tracks.gating import angular_components, near_pairs, within
+from assoc.costs.tracks.gating import Near, angular_components, near_both, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Filter
@@ -139,16 +139,17 @@ def grow_track_tuples(
     alone, ahead = -misses.sum(axis=1), _ahead(sensors, terms, misses)
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
         gate = gate_of(sensor, gate_probability)
-        near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
-        parent, found = join(track, *near, count)
+        angles = angular_components(sensor)
+        parent, found = near_pairs(filter.expected(states, sensor), z, angles, gate)
         if s:
             # measurements so far narrow the gate
-            angles = angular_components(sensor)
-            inside = within(filter.expected(grown, sensor), parent, z, found, angles, gate)
-            parent, found = parent[inside], found[inside]
+            near = Near(np.searchsorted(parent, np.arange(count + 1)), found)
+            parent, found = near_both(filter.expected(grown, sensor), track, near, z, angles, gate, max_tuples)
         if len(parent) + len(track) > max_tuples:
+            # ordered by tuple: extrapolated to those left
+            about = len(track) + len(parent) * len(track) / (int(parent[-1]) + 1 if len(parent) else 1)
             raise LimitExceededError(
-                f"about {len(parent) + len(track):.3g} candidate tuples of tracks and measurements, "
+                f"about {about:.3g} candidate tuples of tracks and measurements, "
                 f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
             )
         done = _corrected(filter, grown, z, sensor, gate, parent, found)
@@ -172,13 +173,3 @@ def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms, misses: Array) -> 
     peak = [-0.5 * float(np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1]) for sensor in sensors]
     gain = np.maximum(terms.detection + np.array(peak), misses.max(axis=0, initial=-np.inf))
     return np.append(np.cumsum(gain[::-1])[::-1], 0.0)
-
-
-def join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:
-    """Partial tuples times the measurements near their tracks (sorted by track): row of the tuple, measurement."""
-    first = np.searchsorted(near_track, np.arange(count + 1))
-    low, high = first[track], first[track + 1]
-    lengths = high - low
-    parent = np.repeat(np.arange(len(track)), lengths)
-    offsets = np.repeat(low - (np.cumsum(lengths) - lengths), lengths)
-    return parent, near_found[np.arange(len(parent)) + offsets]
