@@ -35,6 +35,8 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
+SPHINX = $(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 .PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
@@ -56,8 +58,9 @@ lint: $(VENV)/.installed-lint
 	$(PY) -m mypy
 	$(VENV)/bin/lint-imports
 
+# the first time tutorials say that kernels are compiled, which -W takes for a warning
 docs: $(VENV)/.installed-docs
-	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(SPHINX) || $(SPHINX)
 
 fuzz: $(VENV)/.installed-test
 	$(PY) -m tests.reliability.fuzzing --count 20000 --processes 2
