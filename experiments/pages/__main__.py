@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.pages import benchmark_set, benchmarks, coverage, measured, metaheuristics, trackers
+from experiments.pages import benchmark_set, benchmarks, coverage, measured, metaheuristics, real_sensors, trackers
 from experiments.pages.prose import PAGES
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "_tables"
-MODULES = (benchmark_set, benchmarks, coverage, measured, metaheuristics, trackers)
+MODULES = (benchmark_set, benchmarks, coverage, measured, metaheuristics, real_sensors, trackers)
 TABLES: dict[str, Callable[[], str]] = {name: make for module in MODULES for name, make in module.TABLES.items()}
 """Name of the file -> what makes it."""
 

@@ -14,7 +14,9 @@ SHOWN = {
     "joint-probabilistic": "`joint-probabilistic`",
 }
 """Trackers as the results name them, and in the tables; GNN is `nearest-neighbour` with the rule `assignment`."""
-GOALS = ("close_targets", "bearings", "asynchronous", "comparison", "biases", "benchmark", "capacity", "live")
+GOALS = (
+    "close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark", "capacity", "live",
+)  # fmt: skip
 """Experiments whose goals are listed, in this order."""
 
 _PARTS = ("localisation", "missed", "false")

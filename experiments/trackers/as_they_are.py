@@ -144,13 +144,14 @@ WHAT = {
 }  # fmt: skip
 
 
-def claims_of(label: str, runs: Sequence[Judged]) -> list[Claim]:
-    """What a tracker did on the scenes of a row."""
+def claims_of(label: str, runs: Sequence[Judged], ids: bool = True) -> list[Claim]:
+    """What a tracker did on the scenes of a row; `ids`: also how many it gave."""
     claims = []
     for field, values in zip(Judged._fields, np.array(runs, dtype=np.float64).T, strict=True):
-        if np.isfinite(values).any():
-            unit = "m" if field == "gospa" else ""
-            claims.append(mean_claim(f"{label}: {WHAT[field]}", unit, values[np.isfinite(values)]))
+        if np.isfinite(values).any() and (ids or field != "ids"):
+            what, values = f"{label}: {WHAT[field]}", values[np.isfinite(values)]
+            # counts are small: their intervals say little
+            claims.append(mean_claim(what, "m", values) if field == "gospa" else Claim(what, ours=float(values.mean())))
     print(f"{label:60} {'  '.join(f'{one.ours:7.2f}' for one in claims)}", flush=True)
     return claims
 
@@ -187,7 +188,7 @@ def experiment(rows: Sequence[str], names: Sequence[str], seed: int, seeds: int,
             known = "multi-sensor if known"
             runs[known] = [judge("multi-sensor", one, one.known) for one in cases if one.known is not None]
         for name, found in runs.items():
-            claims += claims_of(f"{label}, {name}", found)
+            claims += claims_of(f"{label}, {name}", found, row.ids)
         claims += _goals(label, row, runs)
     return claims
 

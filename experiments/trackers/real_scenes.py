@@ -365,6 +365,7 @@ class Row(NamedTuple):
     also: Trackers besides the usual ones.
     without: Of `WITHOUT`, what the scene needs.
     goals: Largest value of what is judged, by tracker and field of `Judged`.
+    ids: Whether tracks may get too many ids.
     harmless: Nothing is wrong, or it does no harm: trackers have to be as good as the oracle, nearly.
     """
 
@@ -372,6 +373,7 @@ class Row(NamedTuple):
     also: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     goals: Mapping[str, float] = {}
+    ids: bool = False
     harmless: bool = False
 
 
@@ -401,16 +403,16 @@ ROWS: dict[str, Row] = {
     "formations, noise twice the declared": Row(
         misdeclared(SETTINGS["formations"], Setting("formations", NOISY)), without=("estimates",)
     ),
-    "8 g": Row(agile, without=("estimates", "life"), goals={"gospa": 260.0}),
-    "8 g, scans of 2 s": Row(lambda seed: agile(seed, 2.0), without=("estimates", "life")),
+    "8 g": Row(agile, without=("estimates", "life"), goals={"gospa": 260.0}, ids=True),
+    "8 g, scans of 2 s": Row(lambda seed: agile(seed, 2.0), without=("estimates", "life"), ids=True),
     "wind farm": Row(wind_farm, without=("map",), goals={"gospa": 230.0, "false": 0.5}),
     "one 2-D radar, 100 false alarms": Row(
         one_planar, without=("map",), goals={"missed": 0.2 * TARGETS, "false": 0.02}
     ),
     "one 2-D radar, 100 false alarms, declared 20": Row(lambda seed: one_planar(seed, 20.0), without=("estimates",)),
     "one 2-D radar, 100 false alarms, declared 500": Row(lambda seed: one_planar(seed, 500.0), without=("estimates",)),
-    "dark band of 4 km": Row(dark_band, without=("life",)),
-    "splitting": Row(splitting),
+    "dark band of 4 km": Row(dark_band, without=("life",), ids=True),
+    "splitting": Row(splitting, ids=True),
     "100 m abreast": Row(lambda seed: abreast(seed, 100.0), also=(JOINT, f"{JOINT}, all permutations")),
     "200 m abreast": Row(lambda seed: abreast(seed, 200.0), also=(JOINT, f"{JOINT}, all permutations")),
     "formations": Row(
