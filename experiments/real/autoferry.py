@@ -1,6 +1,7 @@
 """Two boats seen by lidar, radar and cameras of a moving ferry, with their true positions (Autoferry, CC0).
 
-    python -m experiments.real.autoferry FOLDER [--only NAME ...] [--sensors NAME ...] [--quick] [--json FILE] [--publish]
+    python -m experiments.real.autoferry FOLDER [--only NAME ...] [--sensors NAME ...] [--quick] [--json FILE]
+                                                [--publish]
 
 FOLDER holds scenarioN_detections.json and scenarioN_groundTruth.json. One setting for all scenarios, below. GOSPA
 (cutoff 50 m, order 2) at the radar's frames, beside the nearest detection within 25 m of each boat ("oracle"). Only
