@@ -36,7 +36,7 @@ class MovingTargets:
     Parameters
     ----------
     away : float
-        A track moves from the time at which it is so far from where it was first seen confirmed, metres. It stays a
+        A track moves once it has been detected so far from where it was first seen confirmed, metres. It stays a
         moving one when it stops.
     length : float
         Moving tracks nearer to each other than this, metres, are one target ...
@@ -61,7 +61,8 @@ class MovingTargets:
         self._moved &= living
         for track in tracks:
             begin = self._first.setdefault(track.track_id, track.position)
-            if float(np.linalg.norm(track.position - begin)) > self.away:
+            # a track that is missed may drift away from what stands
+            if not track.missed and float(np.linalg.norm(track.position - begin)) > self.away:
                 self._moved.add(track.track_id)
         order = list(self._first)
         groups: list[list[Track]] = []

@@ -7,9 +7,9 @@ import numpy as np
 from assoc.tracking import MovingTargets
 
 
-def picture(*tracks):
+def picture(*tracks, missed=0):
     return [
-        SimpleNamespace(track_id=i, position=np.array([x, y, 0.0]), velocity=np.array([vx, 0.0, 0.0]))
+        SimpleNamespace(track_id=i, position=np.array([x, y, 0.0]), velocity=np.array([vx, 0.0, 0.0]), missed=missed)
         for i, x, y, vx in tracks
     ]
 
@@ -23,6 +23,14 @@ def test_moving_is_having_been_away():
     assert targets.of(picture((1, 0.0, 0.0, 0.0)))[0].moving
     assert targets.of([]) == []
     assert not targets.of(picture((1, 100.0, 0.0, 0.0)))[0].moving
+
+
+def test_what_is_not_seen_to_move_does_not():
+    """A track of a dock drifts away while it is missed; a boat is detected again farther on."""
+    targets = MovingTargets(away=15.0)
+    targets.of(picture((1, 0.0, 0.0, 2.0)))
+    assert not targets.of(picture((1, 40.0, 0.0, 2.0), missed=3))[0].moving
+    assert targets.of(picture((1, 42.0, 0.0, 2.0)))[0].moving
 
 
 def test_bow_and_stern_are_one_and_boats_that_pass_are_two():
