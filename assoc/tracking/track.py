@@ -182,8 +182,10 @@ def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: A
 
 
 def renamed(step: Step, ids: Array, names: Array) -> Step:
-    """The step with these names (K,) in place of ids (K,)."""
+    """The step with these names (K,) of confirmed tracks in place of ids (K,)."""
     name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
     assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
-    final = tuple(replace(one, assigned=assigned) if one.scan == step.scan else one for one in step.final)
-    return replace(step, assigned=assigned, final=final)
+    confirmed = tuple(flags | np.isin(one, names) for flags, one in zip(step.confirmed, assigned, strict=True))
+    now = {"assigned": assigned, "confirmed": confirmed}
+    final = tuple(replace(one, **now) if one.scan == step.scan else one for one in step.final)
+    return replace(step, **now, final=final)

@@ -206,3 +206,21 @@ def test_a_target_that_moves_as_no_filter_expects_keeps_its_id(kind):
         tracker.step(time, z)
         seen.append({track.track_id for track in tracker.tracks if track.reported})
     assert seen[11] == seen[23] and len(seen[11]) == 1
+
+
+@sample("kind", KINDS, every=3)
+def test_after_a_hard_manoeuvre_a_track_goes_on_at_once(kind):
+    """In the first scan after it measurements lie 350 m from where the track is predicted; two radars see it then."""
+    sensors = [radar(-20e3, P=0.9), radar(20e3, P=0.9), radar(P=0.9)]
+    tracker, ids, off = make(kind, sensors), set(), []
+    for k in range(24):
+        turned = 350.0 * max(k // 4 - 1, 0)
+        where = np.array([[-8e3 + 800.0 * k, turned, 5e3]])
+        rng = np.random.default_rng([3, k])
+        noisy = [one.measure(where) + rng.normal(0.0, one.noise) for one in sensors]
+        tracker.step(4.0 * k, [z[: int(s != k // 4 % 3)] for s, z in enumerate(noisy)])
+        shown = [track for track in tracker.tracks if track.reported]
+        if k >= 3:
+            ids |= {track.track_id for track in shown}
+            off.append([np.linalg.norm(track.position - where[0]) for track in shown])
+    assert len(ids) == 1 and all(len(one) == 1 and one[0] < 200.0 for one in off)

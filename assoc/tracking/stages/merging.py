@@ -14,9 +14,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from assoc._types import Array
+from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
 from assoc.filters.base import Expected
 from assoc.tracking.progress import Progress
@@ -67,11 +67,14 @@ def _near(progress: Progress, tracks: TrackBatch) -> tuple[Array, Array]:
     """Rows of pairs of tracks whose targets may be in one place, the lower id first."""
     axes = np.array(progress.settings.filter.motion.position)
     mean, covariance = tracks.states.mean[:, axes], _WIDER * tracks.states.covariance[:, axes[:, None], axes]
-    gate = float(chi2.ppf(_TOGETHER, len(axes)))
+    gate = float(chi_square_quantiles(_TOGETHER, len(axes))[len(axes)])
     # twice the larger covariance is no less than the sum
     wide = Expected(np.ascontiguousarray(mean), 2.0 * covariance)
     pairs = np.stack(near_pairs(wide, wide.mean, (False,) * len(axes), gate), axis=1)
-    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    if not len(pairs):
+        return pairs[:, 0], pairs[:, 1]
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     lower = tracks.track_id[pairs[:, 0]] < tracks.track_id[pairs[:, 1]]
     first, second = np.where(lower[:, None], pairs, pairs[:, ::-1]).T
     off, spread = mean[first] - mean[second], covariance[first] + covariance[second]

@@ -3,7 +3,8 @@
 Ends of confirmed tracks are predicted on for a while. When a track is confirmed that began after such an end, or after
 the last detection of a track that is missed now, two explanations are compared: the target of the old track, with
 its predicted position and velocity; or a new target, born anywhere in the region with any usual velocity. Old ends and
-new starts are matched by the assignment problem of these log likelihood ratios.
+new starts are matched by the assignment problem of these log likelihood ratios. A tentative track is confirmed by this
+if it continues an old one by far rather than it is of false alarms: so after a hard manoeuvre a track goes on at once.
 """
 
 from __future__ import annotations
@@ -28,17 +29,20 @@ _KEPT = 0.25
 # share of lost targets that have manoeuvred, and their variance as a multiple of the prediction's; share of those that
 # have flown on with any usual velocity
 _MANOEUVRED, _WIDER, _ANYWHERE = 0.2, 16.0, 0.02
+# a tentative track continues a confirmed one at these odds against false alarms, as a logarithm
+_SURE = math.log(1e3)
 
 
 def take_up(progress: Progress) -> Progress:
-    """Stage: give newly confirmed tracks the ids of the old ones that they continue; keep the ends of this step."""
+    """Stage: give new tracks the ids of the old ones that they continue; keep the ends of this step."""
     assert progress.found is not None and progress.step is not None
     method, step, known = progress.settings.method, progress.step, progress.found.tracks
     lost, every = _predicted(progress), progress.state.tracks
-    sure = known.track_id[known.confirmed]
-    if not np.isin(every.track_id[every.confirmed], sure).all():
+    sure, gone = known.track_id[known.confirmed], every.confirmed & (every.missed > 0) & (every.existence < 0.0)
+    if len(lost) or gone.any() or not np.isin(every.track_id[every.confirmed], sure).all():
         tracks = method.current(progress.state)
-        new = tracks[tracks.confirmed & ~np.isin(tracks.track_id, sure)]
+        likely = (tracks.missed == 0) & (tracks.score > 0.0)
+        new = tracks[(tracks.confirmed | likely) & ~np.isin(tracks.track_id, sure)]
         coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
         # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
         left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
@@ -48,6 +52,7 @@ def take_up(progress: Progress) -> Progress:
             ids, names = new.track_id[start], old.track_id[end]
             state = method.renamed(progress.state, ids, names)
             tracks = state.tracks.with_parents(names, old.parent[end])
+            tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, names))
             progress = progress._replace(state=state._replace(tracks=tracks))
             lost, step = lost[~np.isin(lost.track_id, names)], renamed(step, ids, names)
             step = replace(step, ended=np.setdiff1d(step.ended, names[np.isin(names, left.track_id)]))
@@ -80,6 +85,8 @@ def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) ->
     both = np.concatenate([place, velocity])
     after = new.started[:, None] > old.last_detection[None, :]
     after[:, len(old) - left :] = True
+    # tentative tracks continue only those that are probably gone; existence is log odds
+    after &= new.confirmed[:, None] | ((np.arange(len(old)) < len(old) - left) & (old.existence < 0.0))
     start, end = np.nonzero(after)
     off = new.states.mean[start][:, both] - old.states.mean[end][:, both]
     spread = (new.states.covariance[start] + old.states.covariance[end])[:, both[:, None], both]
@@ -108,7 +115,7 @@ def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) ->
     if progress.state.identities is not None:
         says, possible = progress.state.identities.of_tracks(old.track_id[end], new.track_id[start])
         gain = np.where(possible, gain + says, -np.inf)
-    good = np.flatnonzero(gain > 0)
+    good = np.flatnonzero((gain > 0) & (new.confirmed[start] | (new.score[start] + gain > _SURE)))
     if not len(good):
         return start[:0], end[:0]
     pairs = np.stack([start, end], axis=1)[good]
