@@ -83,13 +83,12 @@ def concatenate(states: Sequence[Any]) -> Any:
     joined = {}
     for name in parts[0]:
         values = [part[name] for part in parts]
-        shape = np.max([value.shape[1:] for value in values], axis=0, initial=0)
-        joined[name] = np.concatenate([_padded(value, shape) for value in values])
+        if len({value.shape[1:] for value in values}) > 1:
+            shape = np.max([value.shape[1:] for value in values], axis=0)
+            values = [_padded(value, shape) for value in values]
+        joined[name] = np.concatenate(values)
     return state_from(type(present[0]), joined)
 
 
 def _padded(value: Array, shape: Array) -> Array:
-    missing = shape - value.shape[1:]
-    if not missing.any():
-        return value
-    return np.pad(value, [(0, 0), *((0, int(width)) for width in missing)])
+    return np.pad(value, [(0, 0), *((0, int(width)) for width in shape - value.shape[1:])])

@@ -241,9 +241,9 @@ class InteractingMultipleModel(Filter[Mixture]):
         o = self.observe(sensor)
         base = v[:, :1]
         if hasattr(sensor, "angular"):
-            turns = np.array(sensor.angular[: o.dim]) * 2 * np.pi
-            with np.errstate(invalid="ignore", divide="ignore"):
-                v = base + (v - base) - np.where(turns > 0, turns * np.round((v - base) / turns), 0.0)
+            angular, off = list(sensor.angular[: o.dim]), v - base
+            v = base + off
+            v[..., angular] -= 2 * np.pi * np.round(off[..., angular] / (2 * np.pi))
         mean = np.einsum("bm,bmi->bi", state.weights, v)
         away = v - mean[:, None]
         S = np.einsum("bm,bmij->bij", state.weights, np.stack([d.covariance for d in done], axis=1))

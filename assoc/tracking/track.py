@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -186,6 +186,6 @@ def renamed(step: Step, ids: Array, names: Array) -> Step:
     name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
     assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
     confirmed = tuple(flags | np.isin(one, names) for flags, one in zip(step.confirmed, assigned, strict=True))
-    now = {"assigned": assigned, "confirmed": confirmed}
+    now: dict[str, Any] = {"assigned": assigned, "confirmed": confirmed}
     final = tuple(replace(one, **now) if one.scan == step.scan else one for one in step.final)
     return replace(step, **now, final=final)

@@ -76,24 +76,32 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     array (K,)
         To be added to the score, at most ln(birth rate).
     """
-    widths = region[:, 1] - region[:, 0]
-    limited = _limited(np.ascontiguousarray(covariances), np.flatnonzero(widths > 0.0), widths)
-    return limited + math.log(birth_rate) - float(np.log(widths[widths > 0.0]).sum())
+    return np.asarray(_log_birth(np.ascontiguousarray(covariances), region, math.log(birth_rate)))
 
 
 @njit
-def _limited(covariances: Array, axes: Array, widths: Array) -> Array:
-    """Logarithms of the integrals: along each axis the deviation given the axes before it, or the region's width."""
-    d = axes.size
-    result, factor = np.zeros(covariances.shape[0]), np.empty((3, 3))
+def _log_birth(covariances: Array, region: Array, log_rate: float) -> Array:
+    result, factor, log_volume = np.zeros(covariances.shape[0]), np.zeros((3, 3)), 0.0
+    for i in range(3):
+        width = region[i, 1] - region[i, 0]
+        log_volume += math.log(width) if width > 0.0 else 0.0
     for k in range(result.size):
-        for i in range(d):
+        for i in range(3):
+            width = region[i, 1] - region[i, 0]
+            factor[i, i] = 0.0
+            if not width > 0.0:
+                continue
             for j in range(i + 1):
-                value = covariances[k, axes[i], axes[j]]
+                value = covariances[k, i, j]
                 for m in range(j):
                     value -= factor[i, m] * factor[j, m]
-                factor[i, j] = math.sqrt(max(value, 1e-300)) if i == j else value / factor[j, j]
-            result[k] += math.log(min(math.sqrt(2.0 * math.pi) * factor[i, i], widths[axes[i]]))
+                if i == j:
+                    # deviation along this axis given the axes before it
+                    factor[i, i] = math.sqrt(max(value, 1e-300))
+                else:
+                    factor[i, j] = value / factor[j, j] if factor[j, j] > 0.0 else 0.0
+            result[k] += math.log(min(math.sqrt(2.0 * math.pi) * factor[i, i], width))
+        result[k] += log_rate - log_volume
     return result
 
 

@@ -109,10 +109,10 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     if len(rows):
         states = tracks.states[rows]
         seen = in_view(progress, states)
-        if not seen.all():
+        dark = np.flatnonzero(~seen.any(axis=1))
+        if len(dark):
             # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
-            waits = tracks.confirmed[rows] & _inside(settings, states)
-            seen |= ~(waits | seen.any(axis=1))[:, None]
+            seen[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark]))[:, None]
         miss = np.where(seen, settings.terms.miss, 0.0) * (state.turns / most)
         patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
     gone = tracks.to_delete(settings.life_cycle, time, patience)

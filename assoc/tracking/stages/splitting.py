@@ -20,18 +20,21 @@ _OLDER = 2
 def name_parents(progress: Progress) -> Progress:
     """Stage: give newly confirmed tracks that began where another one was, which goes on, the id of that one."""
     assert progress.found is not None
-    tracks, known = progress.settings.method.current(progress.state), progress.found.tracks
-    old = np.isin(tracks.track_id, known.track_id[known.confirmed])
+    every, known = progress.state.tracks, progress.found.tracks
+    sure = known.track_id[known.confirmed]
+    if np.isin(every.track_id[every.confirmed], sure).all():
+        return progress
+    tracks = progress.settings.method.current(progress.state)
+    old = np.isin(tracks.track_id, sure)
     new, old = tracks[tracks.confirmed & ~old], tracks[tracks.confirmed & old & (tracks.missed == 0)]
     if not len(new) or not len(old):
         return progress
     ratio = _ratio(progress, new, old)
     row = np.argmax(ratio, axis=1)
-    sure = np.flatnonzero(ratio.max(axis=1) > math.log(_LIKELIER))
-    if not len(sure):
+    likely = np.flatnonzero(ratio.max(axis=1) > math.log(_LIKELIER))
+    if not len(likely):
         return progress
-    parents = old.track_id[row[sure]]
-    return progress.with_state(tracks=progress.state.tracks.with_parents(new.track_id[sure], parents))
+    return progress.with_state(tracks=every.with_parents(new.track_id[likely], old.track_id[row[likely]]))
 
 
 def _ratio(progress: Progress, new: TrackBatch, old: TrackBatch) -> Array:

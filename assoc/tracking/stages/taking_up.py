@@ -41,6 +41,7 @@ def take_up(progress: Progress) -> Progress:
     sure, gone = known.track_id[known.confirmed], every.confirmed & (every.missed > 0) & (every.existence < 0.0)
     if len(lost) or gone.any() or not np.isin(every.track_id[every.confirmed], sure).all():
         tracks = method.current(progress.state)
+        # single false alarms score less
         likely = (tracks.missed == 0) & (tracks.score > 0.0)
         new = tracks[(tracks.confirmed | likely) & ~np.isin(tracks.track_id, sure)]
         coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
