@@ -1,7 +1,7 @@
 """All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds, or of published results (surfaces-*). They have two pixels for each of a plain
-screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
+Pictures are of fixed scenes and seeds, or of published results (surfaces-*, reliability). They have two pixels for each
+of a plain screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
 """
 
 import argparse
@@ -15,10 +15,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import assoc
 from assoc._files.output import write_atomically
 from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
+from experiments.common.results import Results
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 LARGEST = 250_000
@@ -204,13 +207,22 @@ def surfaces(kind: str) -> Callable[[Any], None]:
 
 def stonesoup_fusion(figure: Any) -> None:
     """Draw three ways to track in Stone Soup, on the ten scenes of the experiment's full run; takes minutes."""
-    import numpy as np
-
     from experiments.trackers import fusion_in_stone_soup as fusion
 
     figure.set_size_inches(11, 4.6)
     seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()
     fusion.draw(figure, (fusion.compare(seeds)[0][:, :, :, 0], fusion.simulate(seeds[0])))
+
+
+def reliability(figure: Any) -> None:
+    """Share of tuples that are true, over the probability that they are given."""
+    claims = [c for c in Results("probabilities").claims if c.quantity.startswith("reliability")]
+    said, true = (np.array([c.ours for c in claims[k::2]]) for k in range(2))
+    low, high = np.array([c.interval for c in claims[1::2]], dtype=float).T
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color="0.7", linewidth=1.0)
+    axes.errorbar(said, true, yerr=[true - low, high - true], fmt="o", color="tab:blue", capsize=3)
+    axes.set(xlabel="probability given", ylabel="share that is true", xlim=(0, 1), ylim=(0, 1.02))
 
 
 PICTURES: dict[str, Callable[[Any], None]] = {
@@ -230,6 +242,7 @@ PICTURES: dict[str, Callable[[Any], None]] = {
     "surfaces-ghosts-40": surfaces("surfaces-ghosts-40"),
     "surfaces-poor-radars": surfaces("surfaces-poor-radars"),
     "stonesoup-fusion": stonesoup_fusion,
+    "reliability": reliability,
 }
 _NEEDS = {"report": "chromium and chromedriver are", "stonesoup-fusion": "stonesoup is"}
 

@@ -4,7 +4,7 @@ A move chooses up to three measurements near each other, takes the tuples that c
 them anew, from all combinations that the rest of the solution allows, each with its conditional probability.
 Insertions, ejections and exchanges between two or three tuples are such moves. Which measurements are chosen does not
 depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). Some chains start
-from the best solution, others from a greedy one; how far apart their frequencies are says how far the estimates can be
+from the best solution, others from another; how far apart their frequencies are says how far the estimates can be
 trusted.
 
 References

@@ -176,6 +176,16 @@ def ghost_rankings() -> str:
     return table(["", "proved", *(f"{one}, s" for one in times), "widest interval, median"], rows)
 
 
+def probabilities() -> str:
+    """Mean width of certified intervals of probabilities, and estimates beside long chains."""
+    r = Results("probabilities")
+    kinds = [c.quantity.removesuffix(": mean width") for c in r.claims if c.quantity.endswith(": mean width")]
+    what = ("mean width", "seconds", "estimate, seconds", "estimate, mean off long chains",
+            "estimate, furthest off long chains")  # fmt: skip
+    rows = [[kind, *(_judged(r[q], 3) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
+    return table(["", *what], rows)
+
+
 def linear_programs() -> str:
     """Times of our simplex method, and ratios of HiGHS's to them."""
     r = Results("linear_programs")
@@ -329,6 +339,7 @@ TABLES = {
     "linear-programs": linear_programs,
     "scan-time": scan_time,
     "ghost-rankings": ghost_rankings,
+    "probabilities": probabilities,
     "sizes": sizes,
     "prior": prior,
 }

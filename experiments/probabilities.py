@@ -1,0 +1,208 @@
+"""How wide the certified intervals of association probabilities are, and how good the estimates.
+
+    python -m experiments.probabilities [--quick] [--only KIND ...] [--json FILE] [--publish]
+
+Widths and processor time of one thread of ``assoc.marginals``: two lists of points whose ten nearest of the other list
+are candidates (distances of a unit, cost 2 d^2 - 2, one point per 0.01), position sensors and bearings of the
+benchmarks. Sampled probabilities are compared with chains three times as long; on small problems whose intervals close,
+which are exact sums, also with what the k best alone say. Reliability: crowds with truth, tuples grouped by the
+probability they are given, and the share of each group that is one target's detections and all of them.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+
+import assoc
+from assoc._types import Array
+from assoc.problem import AssignmentProblem
+from assoc.ranking.columns import price_all_columns
+from assoc.ranking.marginals import Marginals
+from assoc.ranking.sampler import estimates
+from assoc.simulation import simulate
+from experiments.benchmarks.run import one_core
+from experiments.common.claims import Claim
+from experiments.common.command import add_only, make_parser, run
+from experiments.common.instances import scenes
+
+NAME = "probabilities"
+_GOAL = "goal chosen by us"
+# of the chains compared with; seconds on the clock, where others may use the machine, and the goal for those of a core
+_LONG = 3.0
+_CLOCK, _LIMIT = 40.0, 10.0
+_SMALL, _SCENES = 80, 80
+_EDGES = np.linspace(0.0, 1.0, 11)
+
+
+def two_lists(count: int, seed: int) -> AssignmentProblem:
+    """Two lists of random points, each point of the first with its ten nearest of the second."""
+    rng = np.random.default_rng(seed)
+    first, second = rng.random((2, count, 2)) * np.sqrt(count)
+    distance = np.linalg.norm(first[:, None] - second, axis=2)
+    near = np.argsort(distance, axis=1)[:, :10]
+    tuples = np.stack([np.repeat(np.arange(count), 10), near.reshape(-1)], axis=1) + 1
+    costs = 2.0 * np.take_along_axis(distance, near, axis=1).reshape(-1) ** 2 - 2.0
+    return AssignmentProblem(tuples, costs, (count, count))
+
+
+def _scan(make: Callable[[int], assoc.Scene]) -> Callable[[int], AssignmentProblem]:
+    return lambda seed: assoc.build_problem(make(seed), 0)
+
+
+KINDS: dict[str, tuple[Callable[[int], AssignmentProblem], float, float]] = {
+    "two lists of 200": (lambda seed: two_lists(200, seed), 0.01, 1.0),
+    "two lists of 1,000": (lambda seed: two_lists(1_000, seed), 0.01, 1.0),
+    "gated 3 x 300": (_scan(lambda seed: scenes.gated(3, 300, seed)), 0.01, 1.0),
+    "gated 3 x 1,000": (_scan(lambda seed: scenes.gated(3, 1_000, seed)), 0.01, 1.0),
+    "gated 4 x 200": (_scan(lambda seed: scenes.gated(4, 200, seed)), 0.2, _LIMIT),
+    "crowd 3 x 100": (_scan(lambda seed: simulate("crowd", seed, targets=100, scans=1)), 0.2, _LIMIT),
+    "crowd 3 x 300": (_scan(lambda seed: simulate("crowd", seed, targets=300, scans=1)), 0.2, _LIMIT),
+    "ghosts of 20": (_scan(lambda seed: scenes.ghost(20, seed)), 0.05, _LIMIT),
+    "ghosts of 40": (_scan(lambda seed: scenes.ghost(40, seed)), 0.2, _LIMIT),
+}
+"""What makes a problem from a seed, the mean width that is the goal, and the seconds."""
+
+
+def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    begin = time.thread_time()
+    answer = call()
+    return answer, time.thread_time() - begin
+
+
+def widths(name: str, seeds: Sequence[int]) -> list[Claim]:
+    """Certified intervals and estimates of one kind."""
+    make, goal, limit = KINDS[name]
+    mean, seconds, taken, apart, furthest = [], [], [], [], []
+    for seed in seeds:
+        found, spent = _timed(lambda seed=seed: assoc.marginals(make(seed), method="certified", time_limit=_CLOCK))
+        mean.append(float((found.upper - found.lower).mean()))
+        seconds.append(spent)
+        if name.startswith("two"):
+            continue
+        found, spent = _timed(lambda seed=seed: assoc.marginals(make(seed), method="estimate"))
+        taken.append(spent)
+        if seed == seeds[0]:
+            away = np.abs(found.probability - _long(make(seed), found))
+            apart.append(float(away.mean()))
+            furthest.append(float(away.max()))
+    claims = [
+        Claim(f"{name}: mean width", "", None, float(np.mean(mean)), None, (None, goal), source=_GOAL),
+        Claim(f"{name}: seconds", "s", None, float(np.mean(seconds)), None, (None, limit), source=_GOAL),
+    ]
+    if taken:
+        claims += [
+            Claim(f"{name}: estimate, seconds", "s", None, float(np.mean(taken)), None, (None, 2.0), source=_GOAL),
+            Claim(f"{name}: estimate, mean off long chains", "", None, apart[0], None, (None, 0.02), source=_GOAL),
+            Claim(f"{name}: estimate, furthest off long chains", "", None, furthest[0]),
+        ]
+    return claims
+
+
+def _long(problem: AssignmentProblem, like: Marginals) -> Array:
+    """Probabilities of the same tuples from longer chains, from the best and the greedy solution."""
+    from assoc.packing.run import Run
+
+    columns = price_all_columns(problem, Run(0))
+    number = {tuple(problem.tuples[i].tolist()): j for j, i in enumerate(columns.origin.tolist())}
+    starts = [
+        np.array([number[key] for key in map(tuple, assoc.assign(problem, solver).tuples.tolist()) if key in number])
+        for solver in ("exact", "greedy")
+    ]
+    share = estimates(columns, starts, Run(0), length=_LONG)
+    assert share is not None
+    of = dict(zip(number, share.mean(axis=0)[list(number.values())], strict=True))
+    # false alarms are as good as the tuples they exclude
+    keys = list(map(tuple, like.tuples.tolist()))
+    return np.array([of.get(key, p) for key, p in zip(keys, like.probability, strict=True)])
+
+
+def calibration(count: int) -> list[Claim]:
+    """Sampled probabilities of small crowds, and those of the ten best alone, against exact sums."""
+    errors: dict[str, list[Array]] = {"sampled": [], "10 best": []}
+    exact = 0
+    for seed in range(count):
+        scene = simulate("crowd", seed, targets=5, scans=1, width=900.0, height=700.0, noise=100.0)
+        problem = assoc.build_problem(scene, 0)
+        truth = assoc.marginals(problem, 10_000, method="certified")
+        if truth.unseen > 1e-6:
+            continue
+        exact += 1
+        sampled = assoc.marginals(problem, method="estimate").probability
+        errors["sampled"].append(np.abs(sampled - truth.probability))
+        solutions = assoc.kbest(problem, 10)
+        weights = np.exp(solutions[0].cost - np.array([solution.cost for solution in solutions]))
+        held = dict.fromkeys(map(tuple, truth.tuples.tolist()), 0.0)
+        for solution, weight in zip(solutions, weights / weights.sum(), strict=True):
+            for key in map(tuple, solution.tuples.tolist()):
+                held[key] += weight
+        errors["10 best"].append(np.abs(np.array(list(held.values())) - truth.probability))
+    claims = [Claim("small crowds: summed exactly", "", None, exact)]
+    for way, found in errors.items():
+        all_of = np.concatenate(found)
+        band = (None, 0.01) if way == "sampled" else None
+        claims += [
+            Claim(f"small crowds: {way}, mean error", "", None, float(all_of.mean()), None, band, source=_GOAL),
+            Claim(f"small crowds: {way}, largest error", "", None, float(all_of.max())),
+        ]
+    return claims
+
+
+def reliability(count: int) -> list[Claim]:
+    """Share of tuples that are true among those of about one probability: crowds with truth."""
+    said, right = [], []
+    for seed in range(count):
+        scene = simulate("crowd", seed, targets=12, scans=1, width=2_000.0, height=1_000.0, noise=100.0)
+        found = assoc.marginals(assoc.build_problem(scene, 0), method="estimate")
+        sources = scene.truth.sources[0]
+        true: dict[int, list[int]] = {}
+        for s, of in enumerate(sources):
+            for i, target in enumerate(of.tolist()):
+                if target >= 0:
+                    true.setdefault(target, [0] * len(sources))[s] = i + 1
+        keys = set(map(tuple, true.values()))
+        several = np.count_nonzero(found.tuples, axis=1) > 1
+        said.append(found.probability[several])
+        right.append(np.array([key in keys for key in map(tuple, found.tuples[several].tolist())]))
+    p, hit = np.concatenate(said), np.concatenate(right)
+    claims = []
+    for low, high in zip(_EDGES[:-1], _EDGES[1:], strict=True):
+        own = (p > low if low else p > 0.01) & (p <= high)
+        n, good = int(own.sum()), int(hit[own].sum())
+        if not n:
+            continue
+        ends = (float(beta.ppf(0.025, good, n - good + 1)) if good else 0.0,
+                float(beta.ppf(0.975, good + 1, n - good)) if good < n else 1.0)  # fmt: skip
+        name, mean = f"reliability, {low:.1f} to {high:.1f}", float(p[own].mean())
+        claims.append(Claim(f"{name}: said", "", None, mean))
+        claims.append(Claim(f"{name}: true", "", None, good / n, ends, holds=ends[0] <= mean <= ends[1]))
+    return claims
+
+
+def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
+    """Measure these kinds, and calibration and reliability."""
+    claims = []
+    with one_core():
+        # kernels are compiled before anything is timed
+        for name in ("two lists of 200", "ghosts of 20"):
+            assoc.marginals(KINDS[name][0](0))
+        for name in kinds:
+            claims += widths(name, range(1_000, 1_001 if quick else 1_002))
+        share = 10 if quick else 1
+        claims += calibration(_SMALL // share)
+        return claims + reliability(_SCENES // share)
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the measurement; returns its exit code."""
+    parser = make_parser(NAME, __doc__)
+    add_only(parser, list(KINDS))
+    chosen = parser.parse_args(arguments)
+    kinds = chosen.only or list(KINDS)
+    return run(parser, chosen, lambda quick, _: experiment(quick, kinds), __doc__)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
