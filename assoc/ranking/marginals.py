@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 METHODS = ("auto", "certified", "estimate")
 # intervals wider than this have their probabilities sampled
 _WIDE = 0.02
+# seconds that chains take to begin, for each measurement of each column, at most
+_ENTRY = 5e-7
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
 # intervals up to this width need no listing, nor do those of two lists unless they say next to nothing
@@ -311,7 +313,7 @@ def _of_cluster(
         share = min(share + 4.0 * rounding, 1.0)
     # the share of a tuple in every listed solution is 1, whatever rounding did to the sums
     sampled = None
-    if method != "certified" and share > _WIDE:
+    if method != "certified" and share > _WIDE and everything.remaining() > _ENTRY * ranking.columns.rows.size:
         sampled = _sampled(
             ranking.columns, [solutions[0].indices, solutions[-1].indices], problem.num_tuples, everything
         )
