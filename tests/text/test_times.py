@@ -65,7 +65,7 @@ def test_the_page_shows_heights_above_the_earth():
     for heights in (True, False):
         page = LivePage(scene, heights=heights)
         try:
-            number, x, _, height, *_, latitude, longitude = page._row(track(NOON))
+            number, x, _, height, *_, latitude, longitude = page._row(track(NOON), None, ())
         finally:
             page.close()
         assert (number, x) == (7, 1e5) and 45 < latitude < 49 and 5 < longitude < 9
