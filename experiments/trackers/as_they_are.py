@@ -3,11 +3,11 @@
     python -m experiments.trackers.as_they_are [--seeds N] [--others N] [--only ROW ...] [--trackers NAME ...]
                                                [--quick] [--seed N] [--json FILE] [--publish]
 
-Each row of `experiments.trackers.real_scenes` runs through an oracle that is told which measurement is whose (same
-filter), through `multi-sensor` by what is declared, and through `multi-sensor` and `mht` as the programs run them: they
-estimate what is not known ("adapting"). "If known" is `multi-sensor` that is told the truth about the sensors. GOSPA
-with a cutoff of 500 m and its 95 % interval; false tracks and missed targets at an instant; identity switches and ids
-of reported tracks in a scene.
+Each row of `experiments.trackers.real_scenes` (40 scans of 4 s) runs through an oracle that is told which measurement
+is whose (same filter), through `multi-sensor` by what is declared, and through `multi-sensor` and `mht` as the programs
+run them: they estimate what is not known ("adapting"). "If known" is `multi-sensor` that is told the truth about the
+sensors. GOSPA with a cutoff of 500 m and its 95 % interval; false tracks and missed targets at an instant; identity
+switches and ids of reported tracks in a scene.
 
 Ablation, each of six parts off, alone, where a row needs it. Without views: sensors are said to see everything, always.
 Without heights: states in the plane. Without estimates: a tracker that forgets, before each scan, what it has learnt of
