@@ -41,7 +41,7 @@ def test_debiased_mean_and_covariance_against_samples(elevation):
     z = sensor.measure(place + error) + rng.standard_normal((count, 3)) * sensor.noise
     state = Gaussian(np.concatenate([place, np.zeros(3)]), P)
     big = Gaussian(np.tile(state.mean, (20_000, 1)), P)
-    for simplified in (False, True):
+    for simplified in (True, False):
         one = ModifiedEKF(MOTION, simplified)
         rest = np.concatenate(
             [
@@ -52,15 +52,18 @@ def test_debiased_mean_and_covariance_against_samples(elevation):
         stated = one.expected(state, sensor).covariance[0] - H @ P @ H.T
         mean, spread = rest.mean(axis=0), np.cov(rest.T)
         if simplified:
-            simple = spread[0, 0] / stated[0, 0]
+            short, simple = spread[0, 0], spread[0, 0] / stated[0, 0]
             continue
         assert np.abs(mean / np.sqrt(np.diag(spread))).max() < 0.05
         np.testing.assert_allclose(np.diag(spread) / np.diag(stated), 1.0, atol=0.03)
     # the short form states far too little in range
     assert simple > 1.5
+    # equation 2.28 lacks cos^4 of the elevation at sigma_azimuth^4: at 35 and 60 deg it fits neither residual
+    printed = stated[0, 0] + 0.5 * r**2 * sensor.noise[1] ** 4 * (1 - math.cos(e) ** 4)
+    assert elevation < 30 or 1.15 * spread[0, 0] < printed < short / 1.15
     # an ordinary EKF leaves a bias in range that the modified one has not
     plain = sensor.residual(z, sensor.measure(place[None])) - error @ H[:, :3].T
-    assert abs(plain[:, 0].mean()) > 3 * abs(mean[0]) or elevation > 50
+    assert abs(plain[:, 0].mean()) > 3 * abs(mean[0])
     assert np.var(plain[:, 0]) > 1.2 * sensor.covariance[0, 0]
 
 

@@ -22,9 +22,9 @@ class UnitRates(ForwardDifference):
 
     References
     ----------
-    The paper on the modified EKF, equations 4.1 to 4.15 (2.13 with all rates 1), a forward difference. Equation 4.4
-    prints -2 sin(a) cos(e) twice; 4.10 to 4.12, which the
-    paper uses, are right. Its Jacobian prints dt^2 in the rows of the velocities, where dt belongs.
+    The paper on the modified EKF, equations 4.1 to 4.15 (2.13 with all rates 1), a forward difference. Equations 4.4
+    and 4.5 each print a term twice; 4.10 to 4.12, which the paper uses, are right. Its Jacobian prints dt^2 in the rows
+    of the velocities, where dt belongs, and six wrong entries.
     """
 
     def __init__(self, covariance: Array) -> None:
