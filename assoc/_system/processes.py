@@ -11,7 +11,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Generator, Iterable, Sequence, Sized
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from itertools import islice
 from typing import Any, NoReturn
@@ -65,53 +64,70 @@ def parallel_map(
     memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", here=False)
     content = _packed(task)
     workers: list[subprocess.Popen[bytes]] = []
-    idle: queue.SimpleQueue[subprocess.Popen[bytes]] = queue.SimpleQueue()
+    # an interrupt may strike anywhere: unlike locks of Python, these queues cannot be left locked by it
+    tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    questions: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
+    answers: queue.SimpleQueue[tuple[int, Any, bool]] = queue.SimpleQueue()
+    ended: list[bool] = []
 
-    def introduce(worker: subprocess.Popen[bytes], content: bytes) -> None:
+    def attend(worker: subprocess.Popen[bytes]) -> None:
         with suppress(OSError):  # it died, which its first item will find
-            _write(worker.stdin, content)
-        idle.put(worker)
-
-    def ask(item: Any) -> Any:
-        question = _packed(item)
-        worker = idle.get()
-        try:
-            _write(worker.stdin, question)
-            answer = pickle.load(worker.stdout)  # type: ignore[arg-type]
-        except (OSError, EOFError, pickle.UnpicklingError):
-            raise LimitExceededError(_DIED) from None
-        finally:
-            idle.put(worker)
-        value, failed = pickle.loads(answer)
-        if failed:
-            raise value
-        return value
+            _write(worker.stdin, tasks.get())
+        while (entry := questions.get()) is not None and not ended:
+            number, item = entry
+            try:
+                answers.put((number, *_asked(worker, item)))
+            except BaseException as error:
+                answers.put((number, error, True))
 
     # a thread for each process waits for its answers
-    threads = ThreadPoolExecutor(jobs)
-    running: list[Future[Any]] = []
-    left = iter(items)
+    threads: list[threading.Thread] = []
+    numbered, asked, given = enumerate(items), 0, 0
+    arrived: dict[int, Any] = {}
     try:
         _start(workers, jobs)
         for worker in workers:
-            threads.submit(introduce, worker, content)
+            tasks.put(content)
+            threads.append(threading.Thread(target=attend, args=(worker,), daemon=True))
+            threads[-1].start()
         del content  # it may be large
         while True:
-            room = None if ordered else 2 * jobs - len(running)
-            running += [threads.submit(ask, item) for item in islice(left, room)]
-            if not running:
+            for entry in islice(numbered, None if ordered else 2 * jobs - (asked - given)):
+                questions.put(entry)
+                asked += 1
+            if given == asked:
                 return
-            done, _ = wait(running[:1] if ordered else running, _POLL, FIRST_COMPLETED)
-            for future in done:
-                running.remove(future)
-                yield future.result()
+            with suppress(queue.Empty):
+                number, value, failed = answers.get(timeout=_POLL)
+                arrived[number if ordered else given] = value, failed
+            while given in arrived:
+                value, failed = arrived.pop(given)
+                given += 1
+                if failed:
+                    raise value
+                yield value
     finally:
         # after an interruption or an error, nobody needs what they still do
+        ended.append(True)
         for worker in workers:
             worker.kill()
-        threads.shutdown(cancel_futures=True)
+            questions.put(None)
+        for thread in threads:
+            thread.join()
         for worker in workers:
             worker.communicate()
+
+
+def _asked(worker: subprocess.Popen[bytes], item: Any) -> tuple[Any, bool]:
+    """The answer of a process, or its error; and whether it is one."""
+    question = _packed(item)
+    try:
+        _write(worker.stdin, question)
+        answer = pickle.load(worker.stdout)  # type: ignore[arg-type]
+    except (OSError, EOFError, pickle.UnpicklingError):
+        raise LimitExceededError(_DIED) from None
+    value, failed = pickle.loads(answer)
+    return value, failed
 
 
 def _start(workers: list[subprocess.Popen[bytes]], jobs: int) -> None:
