@@ -96,7 +96,7 @@ def estimates(columns: AllColumns, starts: list[Ints], run: Run, length: float =
             forgotten = made if made < moves else 0
             for chain in chains if forgotten else ():
                 chain.spent[:], chain.since[:] = 0.0, made
-    if made == 0:
+    if made == forgotten:  # nothing, or no more than is forgotten
         return None
     for chain in chains:
         there = np.unique(chain.owner[chain.owner >= 0])

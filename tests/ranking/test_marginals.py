@@ -1,5 +1,7 @@
 """Intervals of association probabilities against full enumeration."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from assoc.ranking.columns import price_all_columns
 from assoc.ranking.marginals import _of_cluster, marginals
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.partition_function import log_partition
+from assoc.ranking.sampler import estimates
 from tests.oracles import all_solutions, axial_problem, gated_problem, small_problems
 from tests.reliability.exact import exact_marginals
 from tests.sizes import few_or_all
@@ -276,3 +279,14 @@ def test_two_sensors_without_duals_of_the_packing():
         result = marginals(problem, 2)
         for key, low, high in zip(result.tuples.tolist(), result.lower, result.upper, strict=True):
             assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
+
+
+@pytest.mark.parametrize("looks", [0, 1, 2])
+def test_sampling_may_end_at_any_time(looks):
+    """Also where all moves made so far are those to be forgotten."""
+    problem = gated_problem(np.random.default_rng(1), (20, 20, 20), 0.2)
+    columns = price_all_columns(problem, Run(np.random.default_rng(0)))
+    run = Mock(should_stop=Mock(side_effect=[False] * looks + [True] * 99))
+    best = np.zeros(0, dtype=np.int64)
+    found = estimates(columns, [best], run)
+    assert found is None if looks < 2 else np.isfinite(found).all() and found.max() <= 1.0
