@@ -200,6 +200,7 @@ def test_rankings_are_compared_cost_by_cost() -> None:
             ranking.compared(wrong)
 
 
+@pytest.mark.slow
 def test_a_ranking_that_misses_a_solution_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     real = assoc.kbest
     monkeypatch.setattr(ranking, "SPATIAL_K", 4)

@@ -46,6 +46,7 @@ def test_memory_that_grows_is_seen():
     assert held(watch, "Python's objects") is False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(long_runs.KINDS))
 def test_a_short_run_of_each_tracker(kind):
     claims, watch = long_runs.track(kind, 40, np.random.default_rng(1))

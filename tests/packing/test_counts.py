@@ -213,6 +213,7 @@ def test_a_long_first_pass_is_split_before_it_ends():
     assert nodes[1] < 0.2 * nodes[0]
 
 
+@pytest.mark.slow
 def test_tuples_of_many_sensors():
     """Any two share a measurement, so that the linear program is far below the optimum and the root is split."""
     rng = np.random.default_rng(0)

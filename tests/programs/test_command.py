@@ -244,6 +244,7 @@ def test_modules_that_cannot_be_imported(here, capsys, text, message):
     refused(capsys, solve.main, ["s.npz", "--import", text], message)
 
 
+@pytest.mark.slow
 def test_own_solvers_of_a_function(scene_file, here):
     from assoc.solvers import Outcome, Parameters
 

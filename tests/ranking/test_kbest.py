@@ -285,6 +285,7 @@ def test_large_two_sensors():
     assert flat == pytest.approx([s.cost for s in kbest(lifted, 60)], abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(20, 20, 20), (150, 150)])
 def test_time_limit_returns_only_what_is_proved(shape):
     rng = np.random.default_rng(10)

@@ -152,6 +152,7 @@ def test_groupings_without_a_window(tmp_path):
             call()
 
 
+@pytest.mark.slow
 def test_groups_without_number_are_refused():
     recording = circling()
     for mean, shape in ((1e-300, 2.0), (6.2, 1e-300)):

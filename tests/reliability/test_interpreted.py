@@ -142,6 +142,7 @@ def test_the_process_beside_leaves_the_cores_to_the_program():
         process.wait(60)
 
 
+@pytest.mark.slow
 def test_kernels_ask_for_nothing_that_numpy_does_otherwise():
     kernels = [
         node

@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 _PROGRAM = """
 import json
 import os
@@ -75,6 +77,7 @@ def run(tmp_path, **variables):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_one_overload_for_all_whole_numbers_and_inner_kernels_from_python(tmp_path):
     # 4; 1 + 2 + 3 and 1 + 2 + 3; 1 + 2; 2; 7; 4 and 4
     expected = [36.0, 3.0, float("inf"), ["nothing to add", 0]]
@@ -83,6 +86,7 @@ def test_one_overload_for_all_whole_numbers_and_inner_kernels_from_python(tmp_pa
     assert run(tmp_path) == [expected, [0, 0, 0, 0, 1], 0]
 
 
+@pytest.mark.slow
 def test_a_kept_inner_kernel_is_linked_into_a_new_one(tmp_path):
     run(tmp_path)
     found, overloads, compiled = run(tmp_path, OTHER="1")

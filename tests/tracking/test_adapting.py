@@ -90,6 +90,7 @@ def test_the_table_of_health_fits_a_terminal():
     assert len(table) <= 80 and table.startswith("north, no height") and "8 (5-12)" in table and len(said) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("declared", [0.9, 0.6])
 def test_detection_probabilities_are_in_their_intervals(declared):
     shares, truth = [], 0.6
@@ -234,6 +235,7 @@ def test_no_track_stays_where_clutter_is_dense(name):
     assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
 
 
+@pytest.mark.slow
 def test_the_clutter_of_turning_radars_has_places():
     whole = simulation.simulate("rotating-radars", 2, duration=60.0)
     rng, low = np.random.default_rng(3), np.array([14e3, -17e3, 0.0])

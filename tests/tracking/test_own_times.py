@@ -170,6 +170,7 @@ def test_a_bearing_before_the_radar_that_begins_the_track_is_used():
     assert len(tracker.tracks) == 1 and track.time == 2.0
 
 
+@pytest.mark.slow
 def test_all_trackers_follow_rotating_radars_like_the_oracle():
     scene = simulate("rotating-radars", 0, aircraft=6, duration=40.0, interval=4.0)
     oracle = OracleTracker(scene)
