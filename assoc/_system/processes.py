@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import pickle
 import queue
@@ -64,32 +65,36 @@ def parallel_map(
     memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", here=False)
     content = _packed(task)
     workers: list[subprocess.Popen[bytes]] = []
-    # an interrupt may strike anywhere: unlike locks of Python, these queues cannot be left locked by it
+    # an interrupt may strike anywhere: `threading` could be left locked by it, these queues and threads of C cannot
     tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     questions: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
     answers: queue.SimpleQueue[tuple[int, Any, bool]] = queue.SimpleQueue()
+    left: queue.SimpleQueue[None] = queue.SimpleQueue()
     ended: list[bool] = []
 
     def attend(worker: subprocess.Popen[bytes]) -> None:
-        with suppress(OSError):  # it died, which its first item will find
-            _write(worker.stdin, tasks.get())
-        while (entry := questions.get()) is not None and not ended:
-            number, item = entry
-            try:
-                answers.put((number, *_asked(worker, item)))
-            except BaseException as error:
-                answers.put((number, error, True))
+        try:
+            with suppress(OSError):  # it died, which its first item will find
+                _write(worker.stdin, tasks.get())
+            while (entry := questions.get()) is not None and not ended:
+                number, item = entry
+                try:
+                    answers.put((number, *_asked(worker, item)))
+                except BaseException as error:
+                    answers.put((number, error, True))
+        finally:
+            left.put(None)
 
     # a thread for each process waits for its answers
-    threads: list[threading.Thread] = []
+    threads = 0
     numbered, asked, given = enumerate(items), 0, 0
     arrived: dict[int, Any] = {}
     try:
         _start(workers, jobs)
         for worker in workers:
             tasks.put(content)
-            threads.append(threading.Thread(target=attend, args=(worker,), daemon=True))
-            threads[-1].start()
+            _thread.start_new_thread(attend, (worker,))
+            threads += 1
         del content  # it may be large
         while True:
             for entry in islice(numbered, None if ordered else 2 * jobs - (asked - given)):
@@ -112,8 +117,8 @@ def parallel_map(
         for worker in workers:
             worker.kill()
             questions.put(None)
-        for thread in threads:
-            thread.join()
+        for _ in range(threads):
+            left.get()
         for worker in workers:
             worker.communicate()
 

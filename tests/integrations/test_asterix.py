@@ -382,7 +382,7 @@ def test_multilateration(category, code, step, unit, tmp_path):
 
 
 def test_tracks_with_accuracies_and_places(tmp_path):
-    row = dict.fromkeys(COLUMNS, 4.0) | {"sigma_x": 12.3, "sigma_y": 1e9, "sigma_z": 0.0, "confirmed": True}
+    row = dict.fromkeys(COLUMNS, 4.0) | {"sigma_x": 12.1, "sigma_y": 1e9, "sigma_z": 0.0, "confirmed": True}
     row |= {"latitude": -33.25, "longitude": 179.9999999, "altitude": 1905.0}
     frame = pd.DataFrame([row | {"status": "confirmed"}, row | {"time": 8.0, "sigma_z": 40.0, "status": "coasting"}])
     write_tracks(tmp_path / "tracks.ast", frame)

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
+import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc._system.processes import parallel_map
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.simulation import simulate
@@ -187,3 +189,21 @@ def test_no_folder_for_temporary_files_either(tmp_path):
     home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
     one = first_run(folder, "assert not double.stats.cache_path", PYTHONDONTWRITEBYTECODE="1", **home)
     assert (one.communicate(timeout=60)[1], one.returncode) == ("", 0)
+
+
+def test_an_interrupt_can_leave_no_lock_locked():
+    """KeyboardInterrupt between a lock of `threading` and its block leaves it locked, and all would wait for ever."""
+    entered = []
+
+    def look(frame, event, _):
+        if event == "call" and frame.f_code.co_filename == threading.__file__:
+            entered.append(frame.f_code.co_name)
+
+    before = sys.getprofile()
+    sys.setprofile(look)
+    try:
+        found = [list(parallel_map(abs, range(-40, 0), 2, ordered=ordered)) for ordered in (True, False)]
+    finally:
+        sys.setprofile(before)
+    assert found[0] == list(range(40, 0, -1)) and sorted(found[1]) == found[0][::-1]
+    assert not {"__enter__", "acquire", "release", "wait", "start", "join"} & {*entered}
