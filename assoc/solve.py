@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from assoc._cli.options import (
     Given,
     Option,
     Parser,
+    check_scheduler,
     flag_of,
     flags_of_solvers,
     parameter_options,
@@ -32,14 +34,15 @@ from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.signals import EarlyEnd
 from assoc._cli.table import GrowingTable, print_table
 from assoc._cli.values import Output, csv_table, html_page, scan_range, whole
-from assoc._files.output import write_json, write_text
+from assoc._files.output import write_json, write_text, written_gradually
 from assoc._parameters import Parameter, parameters_of
-from assoc.errors import InvalidInputError
+from assoc._system.cluster import LostError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.solvers import registry
 
 if TYPE_CHECKING:
     from assoc._cli.solver_log import SolverLog
-    from assoc.association.association import Association
+    from assoc.association.association import Association, Totals
     from assoc.association.plan import Plan
     from assoc.association.scan import ScanAssociation
     from assoc.association.source import Source
@@ -54,7 +57,9 @@ _GATING = [replace(COMMON[name], only=_SCENES) for name in ("gate_probability", 
 _SOLVER = Option("solver", "NAME", f"name of the solver (default {DEFAULT_SOLVER})")
 _SCANS = Option("scans", "A:B", "only scans A to B-1, counted from 0; A alone is one scan")
 _KBEST = Option("kbest", "K", "the K best associations of each scan, in order", whole(1))
-_OF_FILE = (_SOLVER, COMMON["seed"], COMMON["time_limit"], COMMON["jobs"], _SCANS, *_GATING, _KBEST)  # fmt: skip
+_LINES = Output(".jsonl", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
+_SHARED = [COMMON[name] for name in ("seed", "time_limit", "jobs", "scheduler")]
+_OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST)
 """Options that a TOML file may have."""
 _OPTIONS = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "+"}),
@@ -62,6 +67,8 @@ _OPTIONS = (
     Option("all", "", f"print all scans on a terminal, not only the first {_SHOWN}"),
     Option("json", "FILE", "write the result as JSON", Output(".json")),
     Option("csv", "FILE", "write the table as CSV", csv_table),
+    Option("lines", "FILE", "write each scan as it is done, and keep none in memory: .jsonl, a line a scan; or "
+           ".parquet, a row a target", _LINES),
     Option("report", "FILE", "write an HTML page: scene, association, convergence (needs assoc[report])", html_page),
     COMMON["config"],
     Option("proof", "FILE", "write a proof for 'assoc check' as JSON, and its problem beside it as .txt",
@@ -89,12 +96,14 @@ def _solve(words: list[str]) -> None:
     proof = given["proof"]
     beside = [] if proof is None else [_problem_beside(proof)]
     given.check_outputs([*given["files"], given["config"]], also=beside)
+    check_scheduler(given)
     with messages(given):
         _associate(solver, given, parameters)
 
 
 def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     from assoc._cli.solver_log import SolverLog
+    from assoc.association.association import Totals
     from assoc.association.source import load_source
 
     files, jobs = given["files"], given["jobs"] or 1
@@ -113,14 +122,31 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     names = [files[number] for number, _ in items]
     # output to a pipe comes at the end, with all scans and columns: programs read it
     table = _ScanTable(sources, names, len(names) if given["all"] else _SHOWN) if sys.stdout.isatty() else None
-    progress = with_progress(plan.run(items, jobs), len(items), bar)
+    progress = with_progress(plan.run(items, jobs, given["scheduler"]), len(items), bar)
     # with -v the log already has a line for each scan
     watched = progress if table is None or given["verbose"] else table.watch(progress)
+    # all that needs the scans afterwards
+    kept = given["lines"] is None or any(given[name] for name in ("json", "csv", "report", "proof", "all"))
+    totals = Totals()
+    scans: list[ScanAssociation] = []
+    failed: LostError | LimitExceededError | None = None
     # other processes do not receive the request to end: their scans are abandoned
-    with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
-        scans = _collected(watched, log)
+    with _EARLY_END.work(0.0 if jobs > 1 or given["scheduler"] else _LAST_SCAN), _written(given, sources) as write:
+        try:
+            for (number, _), scan in zip(items, _until_asked(watched), strict=False):
+                log.end(scan)
+                totals.add(scan)
+                write(scan, number)
+                if kept or len(scans) < _SHOWN:
+                    scans.append(scan)
+        except (LostError, LimitExceededError) as error:
+            # what is finished is written all the same
+            failed = error
+    done = totals.sums()["scans"]
     elapsed = time.perf_counter() - started
     if not scans and items:
+        if failed is not None:
+            raise failed
         _EARLY_END.say("")
     found, names = plan.gather(scans), names[: len(scans)]
     of_items = [sources[number] for number, _ in items[: len(scans)]]
@@ -129,22 +155,50 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
         (given["csv"], lambda: _write_csv(given["csv"], found, names)),
         (given["report"], lambda: _write_report(given, found, of_items, names)),
         (given["proof"], lambda: _write_proof(given["proof"], plan, found, items)),
-        (given, lambda: _print(found, names, elapsed, table)),
+        (given, lambda: _print(found, totals, names, elapsed, table)),
     )
-    _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written")
+    if failed is not None:
+        raise type(failed)(f"{failed}; {done} of {len(items)} scans are finished and written")
+    _EARLY_END.say(f"{done} of {len(items)} scans are finished and written")
 
 
-def _collected(scans: Iterable[ScanAssociation], log: SolverLog) -> list[ScanAssociation]:
-    """All scans, or those finished when a signal ends the work."""
-    found = []
+@contextmanager
+def _written(given: Given, sources: Sequence[Source]) -> Iterator[Callable[[ScanAssociation, int], object]]:
+    """A function that writes a scan of one of the sources at once."""
+    path, files = given["lines"], given["files"]
+    if path is None:
+        yield lambda scan, number: None
+    elif _LINES.ending(path) == ".parquet":
+        from assoc._files.tables import table_writer
+        from assoc.association.association import frame_of_scan
+
+        count = max(len(source.sizes) if hasattr(source, "sizes") else len(source.sensors) for source in sources)
+        with table_writer(path) as writer:
+
+            def add(scan: ScanAssociation, number: int) -> None:
+                frame = frame_of_scan(scan, count)
+                writer.add(frame if len(files) == 1 else frame.assign(file=files[number]))
+
+            yield add
+    else:
+        import json
+
+        with written_gradually(path) as file:
+
+            def add_line(scan: ScanAssociation, number: int) -> None:
+                of_file = {} if len(files) == 1 else {"file": files[number]}
+                file.write(json.dumps({**scan.to_dict(), **of_file}, allow_nan=False).encode() + b"\n")
+
+            yield add_line
+
+
+def _until_asked(scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
+    """The scans until a signal ends the work."""
     try:
-        for scan in scans:
-            found.append(scan)
-            log.end(scan)
+        yield from scans
     except KeyboardInterrupt:
         if not _EARLY_END.asked:
             raise
-    return found
 
 
 def parser() -> Parser:
@@ -274,12 +328,12 @@ class _ScanTable:
             self._growing.add(cells)
             yield scan
 
-    def finish(self, association: Association) -> None:
+    def finish(self, association: Association, total: int) -> None:
         """Print the remaining rows."""
         if self._growing is None or not self._growing.fits:
             _print_table(association.scans[: self._most], self._names, brief=True)
-        if len(association.scans) > self._most:
-            print_lines(f"... and {len(association.scans) - self._most} more scans (--all shows them)")
+        if total > self._most:
+            print_lines(f"... and {total - self._most} more scans (--all shows them)")
 
 
 def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: bool) -> None:
@@ -289,14 +343,18 @@ def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: b
     print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
 
 
-def _print(association: Association, names: list[str], elapsed: float, table: _ScanTable | None) -> None:
-    if table is None:
-        _print_table(association.scans, names, brief=False)
+def _print(
+    association: Association, totals: Totals, names: list[str], elapsed: float, table: _ScanTable | None
+) -> None:
+    total = totals.sums()
+    if table is not None:
+        table.finish(association, total["scans"])
     else:
-        table.finish(association)
+        _print_table(association.scans, names, brief=False)
+        if total["scans"] > len(association.scans):
+            print_lines(f"... and {total['scans'] - len(association.scans)} more scans")
     print()
-    print_lines(association.summary())
-    total = association.totals()
+    print_lines(totals.summary(association.solver))
     solving, compiling = total["runtime"], total["compile_time"]
     print_lines(f"{elapsed:.2f} s in all, {solving:.2f} s of it in the solver, {compiling:.2f} s compiling")
 

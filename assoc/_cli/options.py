@@ -13,6 +13,7 @@ from assoc._cli.lines import HelpFormatter
 from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
 from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._parameters import parameters_of
+from assoc._system.imports import check_extra
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
 from assoc.errors import InvalidInputError
@@ -305,6 +306,14 @@ def read_first(words: Sequence[str], *names: str) -> dict[str, str | None]:
     return vars(parser.parse_known_args(words)[0])
 
 
+def check_scheduler(given: Given) -> None:
+    """Refuse ``--scheduler`` beside ``--jobs``, or without dask."""
+    if given["scheduler"]:
+        if given["jobs"]:
+            raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
+        check_extra("distributed", "dask")
+
+
 def verbosity(more: str) -> tuple[Option, Option]:
     """Return ``-q`` and ``-v``; ``more`` is what ``-v`` prints."""
     return (
@@ -325,6 +334,7 @@ COMMON = {option.name: option for option in (
     Option("target_density", "D",
            "targets per m^3 (in the plane per m^2), or auto: positions integrated out (default: equation 5)", density),
     Option("jobs", "N", "number of processes, or 'all' for one per core (default 1)", processes),
+    Option("scheduler", "ADDRESS", "run on a dask cluster: tcp://host:port"),
     Option("import", "MODULE", "import modules of your own first, which register solvers (docs/own_solver.md)"),
     Option("config", "FILE", "read these options from a TOML file; solver parameters in a table [solver]"),
 )}  # fmt: skip

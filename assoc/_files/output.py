@@ -7,13 +7,13 @@ import os
 import secrets
 import stat
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
 from assoc._system import temporary
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocError, InvalidInputError
 
 FilePath = str | os.PathLike[str]
 
@@ -93,12 +93,43 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
     if number is not None or is_stream(path):
         _write_stream(path, number, writer)
         return
+    with _replacing(path) as file:
+        writer(file)
+
+
+@contextmanager
+def written_gradually(path: FilePath) -> Iterator[IO[bytes]]:
+    """A binary file to write to bit by bit: it takes its name at the end, and after an error nothing is left behind.
+
+    A pipe or device gets the content at once.
+
+    Raises
+    ------
+    InvalidInputError
+        As by `write_atomically`.
+    """
+    check_writable(path)
+    number = 1 if path == STDOUT else _standard_stream(path)
+    if number is None and not is_stream(path):
+        with _replacing(path) as file:
+            yield file
+        return
+    stream = sys.stdout if number == 1 else sys.stderr
+    if number is not None and stream is not None:
+        stream.flush()
+    with open(path, "wb", 0) if number is None else os.fdopen(os.dup(number), "wb", 0) as file:
+        yield file
+
+
+@contextmanager
+def _replacing(path: FilePath) -> Iterator[IO[bytes]]:
+    """A new file beside another one, which it replaces when it is written."""
     target = os.path.realpath(path)
     name = ""
     try:
         handle, name = _create(target)
         with os.fdopen(handle, "wb") as file:
-            writer(file)
+            yield file
             # flush before the renaming: after a crash of the machine the name must not stand for an empty file
             file.flush()
             os.fsync(file.fileno())
@@ -108,6 +139,8 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
     except BaseException as error:
         if name:
             temporary.remove(name)
+        if isinstance(error, AssocError):
+            raise
         # on a full disk closing the archive fails, too; the disk's error is that error's context
         cause: BaseException | None = error
         while cause is not None and not isinstance(cause, OSError):

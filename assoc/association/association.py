@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from array import array
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -51,59 +52,12 @@ class Association:
         return [scan.solution for scan in self.scans]
 
     def totals(self) -> dict[str, Any]:
-        """Sums over the scans: number of scans, of targets found, costs, bounds, seconds of solver and compiler.
-
-        ``optimal`` counts the scans whose status is "optimal"; ``true_tuples``, ``correct_tuples`` and
-        their ratio ``share_correct`` are over the scans with known truth, None where there is none.
-        ``gate_loss`` is there only where it was asked for.
-        """
-        solutions = self.solutions
-        losses = [scan.gate_loss for scan in self.scans if scan.gate_loss is not None]
-        gate_loss = math.fsum(losses) if losses else None
-        known = [scan for scan in self.scans if scan.true_tuples is not None]
-        true = sum(scan.true_tuples or 0 for scan in known) if known else None
-        correct = sum(scan.correct_tuples or 0 for scan in known) if known else None
-        return {
-            "scans": len(self.scans),
-            "measurements": sum(sum(scan.sizes) for scan in self.scans),
-            "targets": sum(len(scan.targets) for scan in self.scans),
-            "false_alarms": sum(scan.false_alarms for scan in self.scans),
-            "cost": math.fsum(solution.cost for solution in solutions),
-            "lower_bound": plain(math.fsum(solution.lower_bound for solution in solutions)),
-            "gap": plain(math.fsum(solution.gap for solution in solutions)),
-            "optimal": sum(solution.status == "optimal" for solution in solutions),
-            "runtime": math.fsum(solution.runtime for solution in solutions),
-            "compile_time": math.fsum(scan.compile_time for scan in self.scans),
-            **({} if gate_loss is None else {"gate_loss": plain(gate_loss)}),
-            "true_tuples": true,
-            "correct_tuples": correct,
-            "share_correct": correct / true if true and correct is not None else None,
-        }
+        """Sums over the scans; see `Totals.sums`."""
+        return Totals(self.scans).sums()
 
     def summary(self) -> str:
         """Return the results in a few lines: targets, cost, and gap to the optimum."""
-        total = self.totals()
-        median = 1e3 * float(np.median([s.runtime for s in self.solutions])) if self.scans else 0.0
-        lines = [
-            f"{total['scans']} scans, {total['measurements']} measurements: "
-            f"{total['targets']} targets, {total['false_alarms']} false alarms",
-            f"cost {total['cost']:.6g}, lower bound {_text(total['lower_bound'])}, gap {_text(total['gap'])}",
-            f"{self.solver}: {total['optimal']} of {total['scans']} scans certified optimal, "
-            f"median {median:.3g} ms a scan",
-        ]
-        if "gate_loss" in total:
-            bound = total["gate_loss"]
-            lines.append("gating loss: unknown" if bound is None else f"gating loss: at most {bound:.3g}")
-        if total["share_correct"] is not None:
-            lines.append(
-                f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "
-                f"({100 * total['share_correct']:.1f} %)"
-            )
-        if total["compile_time"] >= _WORTH_A_LINE:
-            lines.append(
-                f"{total['compile_time']:.1f} s more for compiling (once after installation) and loading compiled code"
-            )
-        return "\n".join(lines)
+        return Totals(self.scans).summary(self.solver)
 
     def to_frame(self) -> pd.DataFrame:
         """One row for each target of each scan.
@@ -117,20 +71,7 @@ class Association:
         count = max((len(scan.sizes) for scan in self.scans), default=0)
         names = [f"sensor_{s + 1}" for s in range(count)]
         names += ["x", "y", "z", "sigma_x", "sigma_y", "sigma_z"]
-        parts = []
-        for scan in self.scans:
-            number = len(scan.targets)
-            position, sigma = np.full((number, 3), np.nan), np.full((number, 3), np.nan)
-            if scan.positions is not None and scan.covariances is not None:
-                position, sigma = scan.positions, np.sqrt(np.diagonal(scan.covariances, axis1=1, axis2=2))
-            part = pd.DataFrame({"scan": scan.scan, "time": scan.time, "target": np.arange(number)})
-            values = [
-                *scan.targets.T,
-                *[np.zeros(number, np.int32)] * (count - len(scan.sizes)),
-                *position.T,
-                *sigma.T,
-            ]
-            parts.append(part.assign(**dict(zip(names, values, strict=True))))
+        parts = [frame_of_scan(scan, count) for scan in self.scans]
         if not parts:
             return pd.DataFrame(columns=["scan", "time", "target", *names])
         return pd.concat(parts, ignore_index=True)
@@ -172,6 +113,97 @@ class Association:
         rest = len(self.scans) - _SHOWN
         more = f"<p>... and {rest} more scans</p>" if rest > 0 else ""
         return f"<p>{lines}</p>{table(headers, cells, numbers=numbers)}{more}"
+
+
+class Totals:
+    """Sums over scans that are added one after the other and not kept."""
+
+    def __init__(self, scans: Iterable[ScanAssociation] = ()) -> None:
+        self._sums = dict.fromkeys(("scans", "measurements", "targets", "false_alarms", "optimal"), 0)
+        self._true = self._correct = self._known = 0
+        # all values: sums of them are exact
+        self._values = {name: array("d") for name in ("cost", "lower_bound", "gap", "runtime", "compile_time")}
+        self._losses = array("d")
+        for scan in scans:
+            self.add(scan)
+
+    def add(self, scan: ScanAssociation) -> None:
+        """Add a scan."""
+        solution = scan.solution
+        counts = 1, sum(scan.sizes), len(scan.targets), scan.false_alarms, solution.status == "optimal"
+        for name, count in zip(self._sums, counts, strict=True):
+            self._sums[name] += int(count)
+        values = solution.cost, solution.lower_bound, solution.gap, solution.runtime, scan.compile_time
+        for found, value in zip(self._values.values(), values, strict=True):
+            found.append(value)
+        if scan.gate_loss is not None:
+            self._losses.append(scan.gate_loss)
+        if scan.true_tuples is not None:
+            self._known += 1
+            self._true += scan.true_tuples
+            self._correct += scan.correct_tuples or 0
+
+    def sums(self) -> dict[str, Any]:
+        """Number of scans, of targets found, costs, bounds, seconds of solver and compiler.
+
+        ``optimal`` counts the scans whose status is "optimal"; ``true_tuples``, ``correct_tuples`` and
+        their ratio ``share_correct`` are over the scans with known truth, None where there is none.
+        ``gate_loss`` is there only where it was asked for.
+        """
+        optimal = self._sums["optimal"]
+        values = {name: math.fsum(found) for name, found in self._values.items()}
+        return {
+            **{name: count for name, count in self._sums.items() if name != "optimal"},
+            "cost": values["cost"],
+            "lower_bound": plain(values["lower_bound"]),
+            "gap": plain(values["gap"]),
+            "optimal": optimal,
+            "runtime": values["runtime"],
+            "compile_time": values["compile_time"],
+            **({"gate_loss": plain(math.fsum(self._losses))} if self._losses else {}),
+            "true_tuples": self._true if self._known else None,
+            "correct_tuples": self._correct if self._known else None,
+            "share_correct": self._correct / self._true if self._true else None,
+        }
+
+    def summary(self, solver: str) -> str:
+        """The sums in a few lines."""
+        total = self.sums()
+        runtimes = self._values["runtime"]
+        median = 1e3 * float(np.median(runtimes)) if runtimes else 0.0
+        lines = [
+            f"{total['scans']} scans, {total['measurements']} measurements: "
+            f"{total['targets']} targets, {total['false_alarms']} false alarms",
+            f"cost {total['cost']:.6g}, lower bound {_text(total['lower_bound'])}, gap {_text(total['gap'])}",
+            f"{solver}: {total['optimal']} of {total['scans']} scans certified optimal, median {median:.3g} ms a scan",
+        ]
+        if "gate_loss" in total:
+            bound = total["gate_loss"]
+            lines.append("gating loss: unknown" if bound is None else f"gating loss: at most {bound:.3g}")
+        if total["share_correct"] is not None:
+            lines.append(
+                f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "
+                f"({100 * total['share_correct']:.1f} %)"
+            )
+        if total["compile_time"] >= _WORTH_A_LINE:
+            lines.append(
+                f"{total['compile_time']:.1f} s more for compiling (once after installation) and loading compiled code"
+            )
+        return "\n".join(lines)
+
+
+def frame_of_scan(scan: ScanAssociation, count: int) -> pd.DataFrame:
+    """The rows of `Association.to_frame` of a scan, with columns for `count` sensors."""
+    import pandas as pd
+
+    number, width = scan.targets.shape
+    position, sigma = np.full((number, 3), np.nan), np.full((number, 3), np.nan)
+    if scan.positions is not None and scan.covariances is not None:
+        position, sigma = scan.positions, np.sqrt(np.diagonal(scan.covariances, axis1=1, axis2=2))
+    names = [*(f"sensor_{s + 1}" for s in range(count)), "x", "y", "z", "sigma_x", "sigma_y", "sigma_z"]
+    values = [*scan.targets.T, *[np.zeros(number, np.int32)] * (count - width), *position.T, *sigma.T]
+    part = pd.DataFrame({"scan": scan.scan, "time": scan.time, "target": np.arange(number)})
+    return part.assign(**dict(zip(names, values, strict=True)))
 
 
 def _text(value: float | None) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assoc._parameters import whole_seed
 from assoc._system.compile_time import compile_seconds
-from assoc._system.processes import parallel_map
+from assoc._system.engine import spread
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
 from assoc.association.gate_loss import bound_without_gates
@@ -33,6 +33,8 @@ from assoc.solvers.assign import assign
 GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tuples")
 """Options of ``assoc.build_problem``."""
 
+# most scans that are sent to a process at once
+_TOGETHER = 64
 # tuples whose pheromone is kept
 _NODES = 30
 
@@ -152,11 +154,15 @@ class Plan:
         counts = [source.num_scans if isinstance(source, Scene) else 1 for source in self.sources]
         return [(number, k) for number, count in enumerate(counts) for k in range(count)]
 
-    def run(self, items: Sequence[tuple[int, int]], jobs: int = 1) -> Iterator[ScanAssociation]:
-        """Associate scans one after the other, or several at once in processes; results in order."""
+    def run(
+        self, items: Sequence[tuple[int, int]], jobs: int = 1, scheduler: str | None = None
+    ) -> Iterator[ScanAssociation]:
+        """Associate scans one after the other, or several at once in processes or on a cluster; results in order."""
         if isinstance(jobs, bool) or not isinstance(jobs, (int, np.integer)) or jobs < 1:
             raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
-        return parallel_map(self, items, int(jobs))
+        # enough batches that processes end at about the same time
+        together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
+        return spread(self, items, jobs=int(jobs), scheduler=scheduler, together=together)
 
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""

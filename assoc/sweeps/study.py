@@ -9,12 +9,13 @@ from functools import partial
 from typing import Any
 
 from assoc._parameters import checked_time_limit, is_whole, whole_seed
+from assoc._system.cluster import LostError
 from assoc._system.door import doors
-from assoc._system.processes import parallel_map
+from assoc._system.engine import spread
 from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.sweeps.backends.batches import Batches, RunNumbers
+from assoc.sweeps.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import study_sources
@@ -192,8 +193,6 @@ class Study(Shown):
         batch_seconds: float | None = None,
     ) -> Counts:
         """Do the same as `run` with an open store; ``on_result`` is called with each saved result."""
-        from assoc.sweeps.backends.dask import dask_map
-
         missing = sum(1 for _ in self.missing(store))
         counts = Counts(self.size, self.size - missing)
         if progress is not None:
@@ -203,10 +202,7 @@ class Study(Shown):
         job = Job(tuple(self.sources), whole_seed(self.seed), self.time_limit, self.gating, __version__, code_digest())
         batches = Batches(self.settings, self.missing(store), batch_seconds or (0.2 if scheduler is None else 0.5))
         work = partial(run_batch, job)
-        if scheduler is None:
-            results = parallel_map(work, batches, jobs, ordered=False)
-        else:
-            results = dask_map(work, batches, scheduler)
+        results = spread(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
         try:
             for result in results:
                 counts.new += store.append(result.batch.settings, result.columns)
@@ -216,8 +212,8 @@ class Study(Shown):
                     on_result(result)
                 if progress is not None:
                     progress(counts)
-        except LimitExceededError as error:
-            raise LimitExceededError(f"{error}; {KEPT}") from None
+        except (LimitExceededError, LostError) as error:
+            raise type(error)(f"{error}; {KEPT}") from None
         finally:
             results.close()
         return counts

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+import pandas as pd
 import pytest
 
 import assoc
@@ -59,6 +60,48 @@ def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
         results.append(content(path))
     assert results[0] == results[1]
     assert results[0]["seed"] == 3 and results[0]["parameters"]["mode"] == "paper"
+
+
+def test_scans_are_written_as_they_come(scene_file, tmp_path, capsys):
+    from assoc.association.association import Association
+    from assoc.solve import main
+
+    expected = assoc.associate(assoc.Scene.load(scene_file), "greedy")
+    for name in ("o.jsonl", "o.parquet"):
+        assert main([str(scene_file), "--solver", "greedy", "--lines", str(tmp_path / name)]) == 0
+        assert expected.summary().splitlines()[1] in capsys.readouterr().out
+    lines = [json.loads(line) for line in (tmp_path / "o.jsonl").read_text().splitlines()]
+    whole = expected.to_dict()["scans"]
+    for one in (*lines, *whole):
+        del one["runtime"], one["compile_time"]
+    assert lines == whole
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "o.parquet"), expected.to_frame())
+    # two files, and scans whose rows fill no group
+    assert main([*[str(scene_file)] * 2, "--solver", "greedy", "--lines", str(tmp_path / "two.parquet")]) == 0
+    assert len(pd.read_parquet(tmp_path / "two.parquet")) == 2 * len(expected.to_frame())
+    assert Association((), "greedy").totals()["scans"] == 0
+
+
+def test_scans_that_were_written_are_not_kept(scene_file, tmp_path, monkeypatch):
+    import weakref
+
+    from assoc.association.plan import Plan
+    from assoc.solve import main
+
+    living = weakref.WeakSet()
+    run = Plan.run
+
+    def watched(self, items, *rest):
+        for scan in run(self, items, *rest):
+            living.add(scan)
+            most.append(len(living))
+            yield scan
+
+    most = []
+    monkeypatch.setattr(Plan, "run", watched)
+    monkeypatch.setattr("assoc.solve._items", lambda plan, given: plan.items() * 10)
+    assert main([str(scene_file), "--solver", "greedy", "--lines", str(tmp_path / "o.jsonl"), "-q"]) == 0
+    assert len(most) == 60 and max(most) <= 22
 
 
 @pytest.mark.slow

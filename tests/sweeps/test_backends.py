@@ -10,7 +10,7 @@ import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.backends.batches import Batches
+from assoc.sweeps.batches import Batches
 from assoc.sweeps.store import Store
 
 DASK = [sys.executable, "-m", "dask"]
@@ -210,7 +210,7 @@ def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, start_wor
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://", "127.0.0.1:9"])
 def test_no_scheduler_is_one_clear_line(address):
-    from assoc.sweeps.backends.dask import connect
+    from assoc._system.cluster import connect
 
     with pytest.raises(InvalidInputError, match="--scheduler: no scheduler answers at") as raised:
         connect(address, timeout=1.0)

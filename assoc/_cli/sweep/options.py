@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.options import COMMON, Given, Option, Parser, flag_of, read_config, verbosity
+from assoc._cli.options import COMMON, Given, Option, Parser, check_scheduler, flag_of, read_config, verbosity
 from assoc._cli.program import command
 from assoc._cli.values import OneOf, csv_table, html_page, scan_range, whole
 from assoc._parameters import parameters_of
@@ -36,7 +36,7 @@ _OF_FILE = (
     *(COMMON[name] for name in ("seed", "time_limit", "gate_probability", "max_tuples")),
     Option("output", "FOLDER", "folder of the study", short="-o"),
     COMMON["jobs"],
-    Option("scheduler", "ADDRESS", "run on a dask cluster: tcp://host:port"),
+    COMMON["scheduler"],
     Option("tune", "N", "search for good parameters in the ranges of --grid, with N trials", whole(1)),
     Option("target", "NAME", "what --tune minimises: gap (mean gap, default) or time (time to optimum)",
            OneOf(("gap", "time"))),
@@ -48,7 +48,7 @@ _OF_SUMMARY = (
     Option("report", "FILE", "write an HTML page: table, heat maps, convergence (needs assoc[report])", html_page),
     Option("plot", "", "draw heatmap.png and convergence.png into the folder"),
 )
-_EXTRAS = {"plot": ("matplotlib", "plot"), "tune": ("optuna", "tune"), "scheduler": ("distributed", "dask")}
+_EXTRAS = {"plot": ("matplotlib", "plot"), "tune": ("optuna", "tune")}
 """By option: the package that it needs, and the extra that installs it."""
 
 
@@ -119,8 +119,7 @@ def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:
         raise InvalidInputError("no scene.npz or problem.npz is given")
     if given["output"] is None:
         raise InvalidInputError("--output: missing, expected the folder of the study")
-    if given["scheduler"] and given["jobs"]:
-        raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
+    check_scheduler(given)
     if given["target"] is not None and given["tune"] is None:
         raise InvalidInputError(f"{given.label('target')}: can be given only with --tune")
     if given["tune"] is not None and (tables or given["random"] or len(_solvers(given)) != 1):

@@ -10,9 +10,13 @@ from typing import Any
 
 from assoc.errors import AssocError, InvalidInputError
 
-_LOST = "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
+_LOST = "--scheduler: the connection is lost"
 _ATTEMPTS = 5
 _ITEMS_PER_THREAD = 3
+
+
+class LostError(InvalidInputError):
+    """The scheduler is lost, or workers were lost again and again."""
 
 
 def connect(address: str, timeout: float = 10.0) -> Any:
@@ -98,9 +102,9 @@ class _Workers:
         except (FutureCancelledError, KilledWorker) as error:
             # the workers that held the task are lost, or the item killed them
             if attempt == _ATTEMPTS:
-                raise InvalidInputError(
+                raise LostError(
                     f"--scheduler: {attempt} attempts at a batch ended with the loss of workers "
-                    f"({' '.join(str(error).split())[:160]}); the same command goes on from there"
+                    f"({' '.join(str(error).split())[:160]})"
                 ) from None
             self._check_scheduler()
             self._wait_for_workers()
@@ -116,36 +120,50 @@ class _Workers:
 
     def _check_scheduler(self) -> None:
         if self._client.status != "running":
-            raise InvalidInputError(_LOST)
+            raise LostError(_LOST)
 
     def _wait_for_workers(self) -> None:
         announced = False
         while not self._client.nthreads():
             self._check_scheduler()
             if not announced:
-                print("assoc.sweep: the scheduler has no workers yet; waiting for one", file=sys.stderr)
+                print("assoc: the scheduler has no workers yet; waiting for one", file=sys.stderr)
                 announced = True
             time.sleep(0.2)
 
 
-def _call(task: Callable[[Any], Any], item: Any) -> Any:
-    return task(item)
+def _call(task: Callable[[Any], Any], item: tuple[int, Any]) -> tuple[int, Any]:
+    return item[0], task(item[1])
 
 
-def dask_map(task: Callable[[Any], Any], items: Iterable[Any], address: str) -> Generator[Any]:
-    """Yield ``task(item)`` for each item as results arrive, from the workers of the scheduler at ``address``.
+def dask_map(task: Callable[[Any], Any], items: Iterable[Any], address: str, *, ordered: bool = True) -> Generator[Any]:
+    """Yield ``task(item)`` for each item, from the workers of the scheduler at ``address``.
 
     The task is sent to every worker once. Workers may come and go: the items of a lost worker are repeated by another.
+
+    Parameters
+    ----------
+    task, items, ordered
+        As for `assoc._system.engine.spread`.
+    address : str
 
     Raises
     ------
     InvalidInputError
-        See `connect`; the connection is lost, or workers were lost in several attempts at an item.
+        See `connect`; or a worker cannot do the work.
+    LostError
+        The connection is lost, or workers were lost in several attempts at an item.
     """
     client = connect(address)
+    arrived: dict[int, Any] = {}
+    given = 0
     try:
-        yield from _Workers(client, task).map(iter(items))
+        for number, value in _Workers(client, task).map(enumerate(items)):
+            arrived[number if ordered else given] = value
+            while given in arrived:
+                yield arrived.pop(given)
+                given += 1
     except OSError:  # includes timeouts and closed connections
-        raise InvalidInputError(_LOST) from None
+        raise LostError(_LOST) from None
     finally:
         client.close(timeout=2)

@@ -1,0 +1,75 @@
+"""Tables written row by row: CSV, or Parquet by the ending of the name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import IO, TYPE_CHECKING, Any
+
+from assoc._files.output import FilePath, written_gradually
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# rows that are written at once: few row groups make Parquet small
+_ROWS = 50_000
+
+
+class TableWriter:
+    """Takes parts of a table; see `table_writer`."""
+
+    def __init__(self, file: IO[bytes], parquet: bool) -> None:
+        self._file, self._parquet = file, parquet
+        self._parts: list[pd.DataFrame] = []
+        self._waiting = 0
+        self._writer: Any = None
+        self._begun = False
+        self.rows = 0
+        """Rows so far."""
+
+    def add(self, part: pd.DataFrame) -> None:
+        """Write some rows; all parts have the same columns."""
+        self._parts.append(part)
+        self._waiting += len(part)
+        self.rows += len(part)
+        if self._waiting >= _ROWS:
+            self._write()
+
+    def _write(self) -> None:
+        import pandas as pd
+
+        # parts without rows may have columns of other types
+        full = [part for part in self._parts if len(part)] or self._parts[:1]
+        frame = pd.concat(full, ignore_index=True)
+        self._parts, self._waiting = [], 0
+        if not self._parquet:
+            self._file.write(frame.to_csv(index=False, header=not self._begun).encode("utf-8", "backslashreplace"))
+        else:
+            import pyarrow as pa
+            from pyarrow import parquet
+
+            table = pa.Table.from_pandas(frame, preserve_index=False)
+            if self._writer is None:
+                self._writer = parquet.ParquetWriter(self._file, table.schema)
+            self._writer.write_table(table)
+        self._begun = True
+
+    def end(self) -> None:
+        """Write the rest."""
+        if self._parts and (self._waiting or not self._begun):
+            self._write()
+        if self._writer is not None:
+            self._writer.close()
+
+
+@contextmanager
+def table_writer(path: FilePath) -> Iterator[TableWriter]:
+    """A table that takes its name at the end: Parquet if it ends in .parquet (needs pyarrow), else CSV.
+
+    At least one part, which may be empty, must be added.
+    """
+    with written_gradually(path) as file:
+        writer = TableWriter(file, os.fspath(path).lower().endswith(".parquet"))
+        yield writer
+        writer.end()

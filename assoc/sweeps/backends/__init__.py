@@ -1,1 +1,0 @@
-"""Backends that compute the runs of a study: processes or a cluster."""
