@@ -15,7 +15,7 @@ from assoc.errors import InvalidInputError
 from assoc.metrics import tracks_of_one_identity
 from assoc.recordings import Window
 from assoc.scene import Scene
-from assoc.sensors import Platform, Radar3D
+from assoc.sensors import Platform, PositionSensor, Radar3D
 from assoc.simulation import observe, simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
 from assoc.tracking.live.kept_identities import KeptIdentities
@@ -149,6 +149,23 @@ def test_without_turns_a_sensor_looks_when_it_speaks():
     tracker, told = live(still, turns=None)
     pictures = fed(tracker, replayed(still, 0.0))
     assert len(pictures[-1].tracks) == 5 and not told
+
+
+def test_reports_miss_nothing_where_the_sectors_say_so():
+    seen = radar(crossing(0))
+    ais = PositionSensor(position=np.zeros(3), noise=[10.0, 10.0], field_of_view=[[-2e4, 2e4]] * 2,
+                         detection_probability=0.9, false_alarm_rate=0.1, name="AIS")  # fmt: skip
+    for sectors, best in ((None, False), ([[(-math.pi, math.pi), (0.0, 0.0)]], True)):
+        scene = Scene([seen, ais], [0.0], [[[], []]], region=[[-2e4, 2e4], [-2e4, 2e4], [0, 1]], sectors=sectors)
+        tracker, _ = live(scene, turns=None)
+        pictures = []
+        for k in range(40):
+            # the radar sees one target every four seconds, the reports are of another
+            if k % 4 == 0:
+                pictures += tracker.take("1", k, [6e3, 0.3 + 1e-4 * k])
+            pictures += tracker.take("AIS", k + 0.5, [-6e3, 1e3 + k])
+        tracks = [track for track in pictures[-1].tracks if track.position[0] > 0.0]
+        assert any(track.reported for track in tracks) == best, tracks
 
 
 def test_what_is_refused(scene):

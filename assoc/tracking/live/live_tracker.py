@@ -53,7 +53,8 @@ class LiveTracker:
     Parameters
     ----------
     scene : Scene
-        Sensors and region; its measurements are not used.
+        Sensors and region; its measurements are not used. A sensor that never looks by its `sectors` (all without
+        width), as AIS, does not look here either: it misses nothing.
     make : callable () -> Tracker
         Makes a new tracker for them.
     interval : float
@@ -371,7 +372,8 @@ class LiveTracker:
                     )
             sent = any(plot.time <= end and plot.sensor in settings.parts[s] for plot in state.pending)
             heading = 0.0 if sensor.platform is None else float(sensor.platform.poses(np.array([end]))[1][0])
-            sectors[s] = np.add(antenna.sector(end, interval, turn, sent), heading)
+            if not settings.reporting[s]:
+                sectors[s] = np.add(antenna.sector(end, interval, turn, sent), heading)
         state.pending = [plot for plot in state.pending if plot.time > end]
         begin, step = clock.perf_counter(), None
         try:

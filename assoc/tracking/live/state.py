@@ -54,6 +54,14 @@ class LiveSettings:
         same = range(len(names))
         return [tuple(r for r in same if r == s or (stems[r] == stems[s] and names[r] != names[s])) for s in same]
 
+    @cached_property
+    def reporting(self) -> list[bool]:
+        """For each sensor whether it never looks by the scene's sectors, as AIS: what it does not report is no miss."""
+        sectors = self.scene.sectors
+        if sectors is None:
+            return [False] * len(self.scene.sensors)
+        return [bool(never) for never in (sectors[..., 0] == sectors[..., 1]).all(axis=0)]
+
     def turn_of(self, s: int) -> float | None:
         """Seconds for a turn of a sensor's antenna; None where it does not turn."""
         turns = "azimuth" in self.scene.sensors[s].components
