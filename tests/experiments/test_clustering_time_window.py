@@ -70,6 +70,16 @@ def test_the_baseline_deletes_by_its_rule(settings, tracks):
     assert len(np.unique(taken.tracks)) == tracks
 
 
+def test_the_thesis_tracker_forgets_lost_tracks():
+    recording = simulate_recording("rotating-radar", 5, duration=200.0).recording
+    groups = traffic.irregular_groups(recording, np.random.default_rng(0), traffic.MEAN_GROUP)
+    taken = [
+        run(traffic.METHODS[f"Reid's MHT, irregular groups{how}"][1](recording), groups) for how in ("", ", taking up")
+    ]
+    thesis, ours = (len(np.unique(one.tracks[one.confirmed])) for one in taken)
+    assert thesis > 1.5 * ours
+
+
 def test_window_and_stamps_are_worth_what_is_claimed():
     recording = simulate_recording("rotating-radar", 5).recording
     groups = {

@@ -18,6 +18,7 @@ class HypothesisTracker:
     clock: Seconds from window to window; without it each plot has its own time stamp.
     kind: `TrackOrientedMHT` or `HypothesisOrientedMHT`.
     process_noise: m/s^1.5.
+    taking_up: Whether a new track takes up a lost one that it continues, as our trackers do; the thesis's does not.
     options: Further settings of the tracker.
     """
 
@@ -27,6 +28,7 @@ class HypothesisTracker:
         clock: float | None = None,
         kind: type[TrackOrientedMHT | HypothesisOrientedMHT] = TrackOrientedMHT,
         process_noise: float = 5.0,
+        taking_up: bool = True,
         **options: Any,
     ) -> None:
         reach = float(radar.field_of_view[0, 1])
@@ -43,6 +45,7 @@ class HypothesisTracker:
         settings |= options
         motion = ConstantVelocity(process_noise, kind="continuous", dimensions=2)
         self.tracker = kind([radar], ExtendedKalmanFilter(motion), **settings)
+        self.forgotten: dict[str, Any] = {} if taking_up else {"lost": self.tracker.state.lost}
         self.clock = clock
         self.rows: list[Array] = []
         self.final: list[Decision] = []
@@ -50,6 +53,7 @@ class HypothesisTracker:
     def take(self, window: Window) -> tuple[Array, Array]:
         """Take a window; return the track of each plot (-1: a false plot) and whether it is confirmed then."""
         self.rows.append(window.rows)
+        self.tracker.state = self.tracker.state._replace(**self.forgotten)
         if self.clock is None:
             done = self.tracker.step(float(window.times[-1]), [window.measurements], times=[window.times])
         else:

@@ -34,10 +34,13 @@ def nearest(recording: Recording, **settings: Any) -> NearestNeighbourTracker:
     return NearestNeighbourTracker(float(noise[0]), float(noise[1]), NearestSettings(**settings))
 
 
-def reid(recording: Recording, clock: float | None = None, misses: int = MISSES) -> HypothesisTracker:
+def reid(
+    recording: Recording, clock: float | None = None, misses: int = MISSES, taking_up: bool = False
+) -> HypothesisTracker:
     """Reid's MHT; with a clock, a fixed time passes from group to group and tracks are deleted by their misses."""
     options = {} if clock is None else {"life_cycle": replace(_BY_COUNT, deletion_count=misses)}
-    return HypothesisTracker(radar_of(recording), clock, kind=HypothesisOrientedMHT, **options)
+    radar = radar_of(recording)
+    return HypothesisTracker(radar, clock, kind=HypothesisOrientedMHT, taking_up=taking_up, **options)
 
 
 def decided_by_reid(
@@ -68,10 +71,13 @@ METHODS: dict[str, tuple[str, Callable[[Recording], TakesWindows]]] = {
     "Reid's MHT, CTW": ("window", lambda r: reid(r, ROTATION)),
     "Reid's MHT, irregular groups, time stamps": ("irregular", lambda r: reid(r)),
     "Reid's MHT, CTW, time stamps": ("window", lambda r: reid(r)),
+    "Reid's MHT, irregular groups, taking up": ("irregular", lambda r: reid(r, MEAN_GROUP, taking_up=True)),
+    "Reid's MHT, CTW, taking up": ("window", lambda r: reid(r, ROTATION, taking_up=True)),
 }
 """Name -> grouping and tracker. Without time stamps: a fixed time from group to group, deletion after three misses.
 
-"MHT" is the track-oriented form, "Reid's MHT" the thesis's own: Reid's hypotheses, of which Murty's m best are kept."""
+"MHT" is the track-oriented form, "Reid's MHT" the thesis's own: Reid's hypotheses, of which Murty's m best are kept.
+It forgets lost tracks, as the thesis's does, but for "taking up"."""
 
 STRONG = "nearest neighbour, irregular groups, time stamps"
 BEST = "MHT, CTW, time stamps"
