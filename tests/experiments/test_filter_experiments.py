@@ -14,7 +14,7 @@ from experiments.filters.b1 import Setting
 from experiments.papers.dubins_enkf import __main__ as dubins_enkf
 from experiments.papers.dubins_enkf import along_path, flight_paths
 from experiments.papers.fuzzy_ekf import __main__ as fuzzy_ekf
-from experiments.papers.fuzzy_ekf import other_models
+from experiments.papers.fuzzy_ekf import other_models, published, tuned_once
 from experiments.papers.modified_ekf import __main__ as modified_ekf
 from experiments.papers.modified_ekf import beyond
 from tests.sizes import few_or_all
@@ -22,7 +22,7 @@ from tests.sizes import few_or_all
 
 def test_what_the_papers_leave_open_in_small(monkeypatch):
     rng = np.random.default_rng(0)
-    judged = beyond.about_samples(20_000, rng) + beyond.about_filters(40, rng)
+    judged = beyond.about_samples(20_000, rng) + beyond.about_filters(40, rng) + beyond.about_matrices(rng)
     assert [claim.quantity for claim in judged if claim.holds is False] == []
     # without noise an aircraft that steers by its estimate stays on its path
     for name in ("Q", "R"):
@@ -34,6 +34,13 @@ def test_what_the_papers_leave_open_in_small(monkeypatch):
     monkeypatch.setattr(other_models, "SCENARIOS", {})
     found = {claim.quantity: claim.ours for claim in other_models.experiment(True, rng)}
     assert found["Singer: standard deviation"] == fine[0][1] and len(found) == 10
+
+
+def test_the_fuzzy_filter_is_equations_21_to_36_but_for_r_in_alpha():
+    batch = manoeuvres.Batch.draw([manoeuvres.SCENARIOS["E"]], 2, np.random.default_rng(0))
+    found = manoeuvres.errors(published.published_filter(published.tuned()), batch)
+    assert found == pytest.approx(tuned_once.by_equations(published.tuned(), batch, current=False), rel=1e-6)
+    assert found != pytest.approx(tuned_once.by_equations(published.tuned(), batch, current=True), rel=1e-3)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 What it prints are the ends: (-500, 100) to (0, 200) without an obstacle, (-407.7151, 149.8384) to (-5.6824, 126.9565)
 with one at (-250, 150) of radius 30; turning radius 100, headings pi/3 and 0. Its path around the obstacle (SRS,
 figures 1 and 3) is a straight line to a tangent point of the obstacle, an arc along it, a straight line to the goal.
+Equations 5 to 7 allow a radius at each end, where the package's paths have one: the paper's steps are done here.
 """
 
 import math
@@ -19,6 +20,7 @@ FIRST = Pose(-500.0, 100.0, math.pi / 3)
 LAST = Pose(0.0, 200.0, 0.0)
 PRINTED = (Pose(-407.7151, 149.8384, math.pi / 3), Pose(-5.6824, 126.9565, 0.0))
 RADIUS = 100.0
+FOUR = ("RSR", "LSR", "RSL", "LSL")
 OBSTACLE = (-250.0, 150.0, 30.0)
 
 
@@ -42,6 +44,23 @@ def srs(start: Pose, goal: Pose, circle: tuple[float, float, float]) -> tuple[Ar
     return first, second, legs + r * (turn % (2 * math.pi))
 
 
+def by_steps(start: Pose, goal: Pose, radii: tuple[float, float], word: str) -> float | None:
+    """Length of LSL, LSR, RSL or RSR by the steps of section c: centres (5), tangent, arcs (6); None by equation 7."""
+    senses = [1.0 if letter == "L" else -1.0 for letter in (word[0], word[2])]
+    first, second = (
+        np.array([pose.x, pose.y]) + sense * r * np.array([-math.sin(pose.heading), math.cos(pose.heading)])
+        for pose, sense, r in zip((start, goal), senses, radii, strict=True)
+    )
+    c = float(np.hypot(*(second - first)))
+    off = (senses[0] * radii[0] - senses[1] * radii[1]) / c
+    if abs(off) > 1:
+        return None
+    line = _angle(second - first) + math.asin(off)
+    turns = (senses[0] * (line - start.heading), senses[1] * (goal.heading - line))
+    arcs = sum(r * (turn % (2 * math.pi)) for r, turn in zip(radii, turns, strict=True))
+    return c * math.sqrt(1 - off**2) + arcs
+
+
 def _angle(vector: Array) -> float:
     return math.atan2(vector[1], vector[0])
 
@@ -58,6 +77,13 @@ def judge() -> tuple[list[Claim], dict[str, Any]]:
         Claim("without obstacle: shortest of the paper's four words, less RSR", "m", None,
               best.length - by_word["RSR"].length, None, (0.0, 0.0), source="figure 2: RSR is the optimum")
     )  # fmt: skip
+    off = [abs((by_steps(FIRST, LAST, (RADIUS, RADIUS), word) or math.inf) - by_word[word].length) for word in FOUR]
+    claims.append(Claim("r_s = r_f: largest difference of the four lengths by the paper's steps from ours", "m", None,
+                        max(off), None, (None, 1e-9), source="equations 5 and 6"))  # fmt: skip
+    claims += [
+        Claim(f"r_s 100, r_f 50 m: length of {word} by the paper's steps", "m", None, length, source=chosen)
+        for word in FOUR if (length := by_steps(FIRST, LAST, (RADIUS, RADIUS / 2), word)) is not None
+    ]  # fmt: skip
     # where the printed points come from: tangent points of another goal, found by the reading of heading and radius
     second = path(FIRST, Pose(0.0, 100.0 + 100.0 * math.tan(math.radians(15.0)), 0.0), RADIUS, "RSL")
     assert second is not None
@@ -72,6 +98,8 @@ def judge() -> tuple[list[Claim], dict[str, Any]]:
                       figure, value, None, (figure - 5e-5, figure + 5e-5),
                       source="figure 3, start and end of the path; the RSL path is our explanation")
             )  # fmt: skip
+    claims.append(Claim("with obstacle: heading of that path at the printed points", "deg", None,
+                        math.degrees(second.segments[1].start.heading), source="section d: pi / 3 and 0"))  # fmt: skip
     start, goal = PRINTED
     first, last, length = srs(start, goal, OBSTACLE)
     kinks = (

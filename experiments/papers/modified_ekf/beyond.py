@@ -3,9 +3,10 @@
     python -m experiments.papers.modified_ekf.beyond [--quick] [--seed N] [--json FILE] [--publish]
 
 Equations 2.16 to 2.24 (debiased measurements, which the filter does not use) against samples at 100 km, elevation
-30 deg, 30 m and 1.5 deg, in units of the stated standard deviation. Suggestion 5.2, other measurements: benchmark B1
-in the plane with a radar of range and azimuth; and B1 with measurements missed, where a filter only predicts. Full
-size: a million samples, 1,000 runs.
+30 deg, 30 m and 1.5 deg, in units of the stated standard deviation. The matrices of section 4.1, which depend on the
+state, against equations 4.7 to 4.14 and the Jacobian, at starts around table 4.1. Suggestion 5.2, other measurements:
+benchmark B1 in the plane with a radar of range and azimuth; and B1 with measurements missed, where a filter only
+predicts. Full size: a million samples, 1,000 runs.
 """
 
 import math
@@ -16,12 +17,20 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, ModifiedEKF, UnscentedKalmanFilter
+from assoc.filters import (
+    ConstantVelocity,
+    ExtendedKalmanFilter,
+    Gaussian,
+    ModifiedEKF,
+    UnitRates,
+    UnscentedKalmanFilter,
+)
 from assoc.filters.base import Filter
 from assoc.sensors import Radar2D
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.filters.b1 import Runs, Setting, ratio_interval
+from experiments.papers.modified_ekf.paper_setting import DT, START
 
 CHOSEN = "chosen by us"
 P_D = 0.7
@@ -64,6 +73,45 @@ def about_samples(count: int, rng: np.random.Generator) -> list[Claim]:
               (None, 10.0 / count**0.5), source="equation 2.24; seven standard errors, chosen by us"),
         Claim("debiased measurements: bias of the plain conversion, in standard deviations", "", None,
               float(np.linalg.norm(L @ mean)), source="equation 2.23"),
+    ]  # fmt: skip
+
+
+def matrices(state: Array) -> tuple[Array, Array]:
+    """Section 4.1: the matrix of the continuous state space (6, 6), and that of section 4.1.1 for a step of DT."""
+    x, y, z = state[:3]
+    s = math.hypot(x, y)
+    r = math.hypot(s, z)
+    rates, step = np.zeros((6, 6)), np.eye(6)
+    rates[:2, :2] = [[1 / r - z / s, -1.0], [1.0, 1 / r - z / s]]
+    rates[2, 2], rates[5, 2] = 1 / r + s / z, 2 * s / (z * r) - 1.0
+    rates[3:5, :3] = [[-2 - 2 * z / (r * s), -2 / r, 2 * y / s], [2 / r, -2 - 2 * z / (r * s), -2 * x / s]]
+    step[:2, :3] += DT * np.array([[1 / r, -1.0, -x / s], [1.0, 1 / r, -y / s]])
+    step[2, 0], step[2, 2] = DT * s / x, DT / r + 1.0
+    step[3:5, :3] = DT * rates[3:5, :3]
+    step[5, 0], step[5, 2] = DT * 2 * s / (x * r), -DT
+    return rates, step
+
+
+def about_matrices(rng: np.random.Generator) -> list[Claim]:
+    """Compare the products of the matrices of section 4.1 with the model, and the second with its Jacobian."""
+    motion = UnitRates(np.eye(6))
+    states = START + rng.standard_normal((1000, 6))
+    both = [matrices(one) for one in states]
+    rates, steps = (np.array(one) for one in zip(*both, strict=True))
+    moved, jacobian = motion.propagate(states, DT), motion.jacobian(states, DT)
+    flown, turned = (np.einsum("bij,bj->bi", one, states) for one in (rates, steps))
+    # a step changes a state by little: what counts is the change
+    least = np.abs(moved - states).max()
+    grown, derived = (one - np.eye(6) for one in (steps, jacobian))
+    rounding = (None, 1e-9)
+    return [
+        Claim("state-space matrices: largest difference of the continuous one's rates, relative", "", None,
+              float(np.abs(flown - motion.rates(states)).max() / np.abs(flown).max()), None, rounding,
+              source="section 4.1, equations 4.7 to 4.12"),
+        Claim("state-space matrices: largest difference of the discrete one's steps, relative", "", None,
+              float(np.abs(turned - moved).max() / least), None, rounding, source="section 4.1.1, equation 4.14"),
+        Claim("state-space matrices: A of section 4.1.2 less the Jacobian, relative to the Jacobian less 1", "", None,
+              float(np.linalg.norm(grown - derived) / np.linalg.norm(derived)), source="sections 4.1.2 and 4.2"),
     ]  # fmt: skip
 
 
@@ -119,7 +167,8 @@ def about_filters(count: int, rng: np.random.Generator) -> list[Claim]:
 
 def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Judge the debiased measurements and the filter; --quick has fewer samples and runs."""
-    return about_samples(20_000 if quick else 1_000_000, rng) + about_filters(40 if quick else 1000, rng)
+    claims = about_samples(20_000 if quick else 1_000_000, rng) + about_filters(40 if quick else 1000, rng)
+    return claims + about_matrices(rng)
 
 
 program = partial(main, "papers.modified_ekf.beyond", experiment, __doc__)
