@@ -11,7 +11,7 @@ import pytest
 
 from experiments.__main__ import programs
 from experiments.common.results import RESULTS, Results, number
-from experiments.pages import commands, prose
+from experiments.pages import commands, coverage, prose
 from experiments.pages.__main__ import FOLDER, TABLES, main
 
 BY_HAND = ("registration",)
@@ -153,11 +153,10 @@ def test_tables_are_those_of_the_results_and_each_stands_on_a_page(capsys):
 def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monkeypatch, capsys):
     programs: dict[str, set[tuple[str, ...]]] = {}
     text = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("papers-*.md"))
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in rows if row[0] not in ("element", "---")]
-    assert len(rows) > 100
-    for row in rows:
-        element, result, command = row[0], row[2], row[3] if len(row) > 3 else ""
+    assert len(rows) > 100 and {row[3].strip() for row in rows} == {"", *coverage.CHANGES}
+    for element, _, result, _, command in rows:
         assert re.match("holds|does not hold|absent", result), element
         shown = re.findall(r"`(pytest|python -m) ([^`]+)`", command)
         # where something is absent there may be nothing to show it with
