@@ -307,6 +307,23 @@ def readings() -> str:
     return table(["reading", "mean cycles", "95 % interval"], rows)
 
 
+def extras() -> str:
+    """What each extra adds on the disk."""
+    r = Results("extra_sizes")
+    alone = number(r["stonesoup without what it requires"].ours, 1)
+    brings = {
+        "plot": "figures by matplotlib",
+        "report": "interactive HTML pages by plotly",
+        "parquet": "Parquet files by pyarrow",
+        "stonesoup": f"the [adapter](stonesoup.md); Stone Soup itself takes {alone} MB",
+        "asterix": "ASTERIX [recordings](recordings.md#asterix)",
+        "dask": "parameter [studies](sweeps.md) on a cluster",
+        "tune": "tuning of parameters by optuna",
+    }
+    rows = [[f"`assoc[{name}]`", number(r[f"extra {name}"].ours), what] for name, what in brings.items()]
+    return table(["extra", "on disk, MB", "for"], rows, lambda column: column == 1)
+
+
 def prior() -> str:
     """What a certified optimum of bearings is worth, with and without a prior of positions."""
     r = Results("ambiguous_bearings")
@@ -341,5 +358,6 @@ TABLES = {
     "ghost-rankings": ghost_rankings,
     "probabilities": probabilities,
     "sizes": sizes,
+    "extras": extras,
     "prior": prior,
 }
