@@ -315,9 +315,9 @@ def extras() -> str:
         "plot": "figures by matplotlib",
         "report": "interactive HTML pages by plotly",
         "parquet": "Parquet files by pyarrow",
-        "stonesoup": f"the [adapter](stonesoup.md); Stone Soup itself takes {alone} MB",
-        "asterix": "ASTERIX [recordings](recordings.md#asterix)",
-        "dask": "parameter [studies](sweeps.md) on a cluster",
+        "stonesoup": f"the adapter for Stone Soup, which itself takes {alone} MB",
+        "asterix": "ASTERIX recordings",
+        "dask": "parameter studies on a cluster",
         "tune": "tuning of parameters by optuna",
     }
     rows = [[f"`assoc[{name}]`", number(r[f"extra {name}"].ours), what] for name, what in brings.items()]
