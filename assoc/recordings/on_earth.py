@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from assoc.recordings.recording import Recording
-from assoc.scene.geodesy import Origin, east_north_up
+from assoc.recordings.several import heights_above
+from assoc.scene.geodesy import Origin, east_north_up, geodetic
 from assoc.sensors import Radar2D
+
+_USUAL_ALTITUDE = 6_000.0
 
 
 def placed(
@@ -31,12 +33,21 @@ def placed(
     Returns
     -------
     recording, radar
-        Azimuths from the scene's east: where the radar stands, north has another direction than at the origin.
+        Azimuths in the scene's plane: where the radar stands, north and up have other directions than at the origin.
+        Of plots without an altitude, that of the others (their median) is assumed.
     """
-    latitude, longitude, height = place
-    longitudes = np.array([longitude, longitude + 1e-6])
-    here, east = east_north_up(np.full(2, latitude), longitudes, np.full(2, height), origin)
-    turn = math.atan2(east[1] - here[1], east[0] - here[0])
+    latitude, longitude, height = (np.array([value]) for value in place)
+    here = east_north_up(latitude, longitude, height, origin)[0]
+    altitudes = recording.trusted_altitudes
+    known = np.isfinite(altitudes)
+    altitudes = np.where(known, altitudes, np.median(altitudes[known]) if known.any() else _USUAL_ALTITUDE)
+    up = heights_above(recording.measurements, altitudes, replace(radar, position=np.zeros(3)), place)
+    # an altitude above the plot's range cannot be right: straight above
+    up = np.clip(up, -recording.ranges, recording.ranges)
+    ground = np.sqrt(recording.ranges**2 - up**2)
+    local = np.column_stack([ground * np.cos(recording.azimuths), ground * np.sin(recording.azimuths), up])
+    latitude, longitude, height = geodetic(local, place).T
+    away = east_north_up(latitude, longitude, height, origin) - here
     radar = replace(radar, position=here)
     if height_noise is not None:
         reach = float(radar.field_of_view[0, 1]) + float(np.hypot(*here[:2]))
@@ -46,4 +57,4 @@ def placed(
             noise=np.sqrt([*np.diagonal(radar.covariance), height_noise**2]),
             field_of_view=np.vstack([radar.field_of_view, heights]),
         )
-    return replace(recording, azimuths=recording.azimuths + turn), radar
+    return replace(recording, azimuths=np.arctan2(away[:, 1], away[:, 0])), radar
