@@ -11,16 +11,18 @@ from assoc._parameters import is_number
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.registration.terms import AXES, Term
+from assoc.registration.terms import AXES, Term, owners
 from assoc.scene.scene import Scene
-from assoc.sensors import BearingSensor, PositionSensor, Sensor
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
 from assoc.sensors.base import wrap_angle
 
 
-def sensor_biases(terms: Sequence[Term], biases: Array, sensor: int) -> dict[str, float]:
-    """Biases of one sensor by component."""
-    pairs = zip(terms, biases.tolist(), strict=True)
-    return {term.component: value for term, value in pairs if term.sensor == sensor}
+def biases_of_sensors(sensors: Sequence[Sensor], terms: Sequence[Term], biases: Array) -> list[dict[str, float]]:
+    """Biases of each sensor by component."""
+    found: list[dict[str, float]] = [{} for _ in sensors]
+    for term, value in zip(terms, biases.tolist(), strict=True):
+        found[term.sensor][term.component] = value
+    return [found[owner] for owner in owners(sensors)]
 
 
 def corrected_sensor(sensor: Sensor, biases: Mapping[str, float]) -> Sensor:
@@ -98,6 +100,9 @@ def pointed_at(sensor: Sensor, z: Array) -> Array:
         heights = z[:, 2] if sensor.dim == 3 else np.zeros(len(z))
         return np.stack([z[:, 0], z[:, 1], heights], axis=1)
     elevation = z[:, 2] if sensor.dim >= 3 else np.zeros(len(z))
+    if isinstance(sensor, Radar2D):
+        above = z[:, 2] - sensor.position[2] if sensor.dim == 3 else 0.0
+        elevation = np.arcsin(np.clip(above / np.maximum(z[:, 0], 1.0), -1.0, 1.0))
     ground = z[:, 0] * np.cos(elevation)
     along = [ground * np.cos(z[:, 1]), ground * np.sin(z[:, 1]), z[:, 0] * np.sin(elevation)]
     return sensor.position + np.stack(along, axis=1)

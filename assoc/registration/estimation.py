@@ -10,7 +10,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.arrays import sensor_arrays
 from assoc.costs.gating import chi_square_quantiles
-from assoc.registration.correction import sensor_biases
+from assoc.registration.correction import biases_of_sensors
 from assoc.registration.normal_equations import NormalEquations, normal_equations
 from assoc.registration.pairing import (
     Chosen,
@@ -21,7 +21,7 @@ from assoc.registration.pairing import (
     widened,
 )
 from assoc.registration.parameters import RegistrationParameters
-from assoc.registration.terms import Term, term_arrays
+from assoc.registration.terms import Term, owners, term_arrays
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 
@@ -75,12 +75,26 @@ class Problem:
         """Normal equations of chosen tuples around biases, with the sensors' own noise or that of another scene."""
         limits = chi_square_quantiles(_LIMIT, 3 * len(self.sensors))
         scene = self.scene(epochs, biases)
-        clocks = np.array([sensor_biases(self.terms, biases, s).get("time", 0.0) for s in range(len(self.sensors))])
+        by_sensor = biases_of_sensors(self.sensors, self.terms, biases)
+        clocks = np.array([one.get("time", 0.0) for one in by_sensor])
         tuples = tuple_arrays(scene, epochs, chosen, clocks)
         sensors = sensor_arrays(scene)
         if noise is not None:
             sensors = sensors._replace(weight=sensor_arrays(noise).weight)
-        return normal_equations(sensors, tuples, term_arrays(self.terms, self.sensors), limits)
+        # each sensor has terms of its own in the sums, which are then those of whose they are
+        each = [
+            (j, term._replace(sensor=s))
+            for s, owner in enumerate(owners(self.sensors))
+            for j, term in enumerate(self.terms)
+            if term.sensor == owner
+        ]
+        sums = normal_equations(sensors, tuples, term_arrays([term for _, term in each], self.sensors), limits)
+        fold = np.eye(len(self.terms))[[j for j, _ in each]]
+        return sums._replace(
+            information=fold.T @ sums.information @ fold,
+            gradient=fold.T @ sums.gradient,
+            scatter=fold.T @ sums.scatter @ fold,
+        )
 
 
 def estimate(problem: Problem, epochs: Sequence[Epoch]) -> Estimate:

@@ -12,7 +12,7 @@ import numpy as np
 from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.registration.correction import corrected_measurements, sensor_biases
+from assoc.registration.correction import biases_of_sensors, corrected_measurements
 from assoc.registration.epochs import epoch_of
 from assoc.registration.estimation import Estimate, estimate
 from assoc.registration.pairing import Chosen, Epoch, choose_tuples, widened
@@ -99,9 +99,10 @@ class OnlineRegistration:
         checked = checked_measurements(measurements, self.sensors, "measurements")
         if not self.significant:
             return list(measurements)
+        by_sensor = biases_of_sensors(self.sensors, self.terms, self.biases)
         return [
-            corrected_measurements(sensor, z, sensor_biases(self.terms, self.biases, s))
-            for s, (sensor, z) in enumerate(zip(self.sensors, checked, strict=True))
+            corrected_measurements(sensor, z, own)
+            for sensor, z, own in zip(self.sensors, checked, by_sensor, strict=True)
         ]
 
     def after(self, time: float, measurements: Sequence[Array]) -> OnlineRegistration:

@@ -18,7 +18,7 @@ from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances
 from assoc.errors import AssocWarning, LimitExceededError
-from assoc.registration.correction import corrected_measurements, corrected_sensor, sensor_biases
+from assoc.registration.correction import biases_of_sensors, corrected_measurements, corrected_sensor
 from assoc.registration.normal_equations import Tuples
 from assoc.registration.parameters import RegistrationParameters
 from assoc.registration.terms import AXES, Term
@@ -88,7 +88,7 @@ def corrected_scene(
     sensors: Sequence[Sensor], epochs: Sequence[Epoch], terms: Sequence[Term], biases: Array, region: Array
 ) -> Scene:
     """All epochs as a scene without biases and range rates, each measurement moved to its epoch's time."""
-    by_sensor = [sensor_biases(terms, biases, s) for s in range(len(sensors))]
+    by_sensor = biases_of_sensors(sensors, terms, biases)
     measurements = []
     for epoch in epochs:
         row = []
@@ -105,8 +105,9 @@ def corrected_scene(
 def widened(scene: Scene, terms: Sequence[Term], deviations: Array) -> Scene:
     """The scene with noise that includes the biases' standard deviations (n,)."""
     sensors = []
-    for s, sensor in enumerate(scene.sensors):
-        by_sensor = sensor_biases(terms, deviations, s)
+    for s, (sensor, by_sensor) in enumerate(
+        zip(scene.sensors, biases_of_sensors(scene.sensors, terms, deviations), strict=True)
+    ):
         away = _USUAL_SPEED * by_sensor.get("time", 0.0)
         if isinstance(sensor, PositionSensor):
             more = [np.hypot(by_sensor.get(axis, 0.0), away) for axis in AXES[: sensor.dim]]
@@ -119,6 +120,7 @@ def widened(scene: Scene, terms: Sequence[Term], deviations: Array) -> Scene:
                 "range": math.hypot(aside, by_sensor.get("gain", 0.0) * distance),
                 "azimuth": aside / distance,
                 "elevation": above / distance,
+                "height": 0.0,
             }
             more = [np.hypot(by_sensor.get(name, 0.0), lengths[name]) for name in sensor.components[: sensor.dim]]
         most = [1.0 if name in ANGLES else np.inf for name in sensor.components[: sensor.dim]]

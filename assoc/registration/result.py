@@ -15,7 +15,7 @@ from assoc._system.door import doors
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.registration.correction import sensor_biases, without_biases
+from assoc.registration.correction import biases_of_sensors, without_biases
 from assoc.registration.observability import describe, observed_shares, open_directions
 from assoc.registration.terms import Term, label_of
 from assoc.scene.scene import Scene
@@ -111,7 +111,7 @@ class Registration(Shown):
         """Biases of one sensor by component; metres, radians, seconds."""
         if not 0 <= sensor < len(self.sensors):
             raise InvalidInputError(f"sensor {sensor} does not exist, there are 0 to {len(self.sensors) - 1}")
-        return sensor_biases(self.terms, self.biases, sensor)
+        return biases_of_sensors(self.sensors, self.terms, self.biases)[sensor]
 
     def correct(self, scene: Scene) -> Scene:
         """Take the biases off a scene of the same sensors; unchanged if none is significant.

@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.recordings.several import NO_HEIGHT
 from assoc.registration.parameters import RegistrationParameters
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D, Sensor
 from assoc.sensors.base import ANGLES
@@ -49,6 +50,14 @@ def label_of(sensors: Sequence[Sensor], number: int) -> str:
     return sensors[number].name or f"sensor {number + 1}"
 
 
+def owners(sensors: Sequence[Sensor]) -> list[int]:
+    """Whose biases each sensor has: a radar's plots without heights those of its plots with heights."""
+    names = [sensor.name for sensor in sensors]
+    stems = [name.removesuffix(NO_HEIGHT) for name in names]
+    return [names.index(stem) if stem != name and stem in names else s
+            for s, (stem, name) in enumerate(zip(stems, names, strict=True))]  # fmt: skip
+
+
 def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) -> tuple[Term, ...]:
     """List the biases of sensors that parameters name.
 
@@ -62,7 +71,7 @@ def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) ->
         if not any(name in names for names in known):
             every = ", ".join(label_of(sensors, s) for s in range(len(sensors)))
             raise InvalidInputError(f"reference: no sensor {name!r}; there are {every}")
-    terms = []
+    terms, owner = [], owners(sensors)
     for s, sensor in enumerate(sensors):
         if type(sensor) not in CODES:
             raise InvalidInputError(f"sensor {s}: biases of a {type(sensor).__name__} cannot be registered")
@@ -71,7 +80,7 @@ def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) ->
                 f"sensor {s}: positions relative to a platform with headings cannot be registered, those in the axes "
                 "of the scene can"
             )
-        if not known[s] & {*parameters.reference}:
+        if owner[s] == s and not known[s] & {*parameters.reference}:
             terms += [Term(s, component) for component in _components(sensor, parameters.components)]
     if not terms:
         raise InvalidInputError("components: no sensor has a bias to estimate")

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from assoc._types import Array
 from assoc.registration.correction import pointed_at
 from assoc.sensors import BearingSensor, Sensor
+from assoc.sensors.base import ANGLES
 
 FASTEST = 700.0
 """Largest speed of a target, m/s."""
@@ -70,7 +71,8 @@ def _sigma(sensor: Sensor, positions: Sequence[Array]) -> float:
     if "range" not in sensor.components:
         return float(deviations.max())
     distance = float(np.percentile(np.linalg.norm(every - sensor.position, axis=1), 90))
-    return float(max(deviations[0], distance * deviations[1:].max()))
+    scales = [distance if name in ANGLES else 1.0 for name in sensor.components[: sensor.dim]]
+    return float((deviations * scales).max())
 
 
 def _fill(

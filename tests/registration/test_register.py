@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 
 from assoc import Scene, build_problem
 from assoc.errors import InvalidInputError
+from assoc.recordings.several import NO_HEIGHT
 from assoc.registration import RegistrationParameters, Term, register, with_biases
 from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
@@ -16,7 +17,8 @@ from assoc.registration.observability import describe
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
 from assoc.simulation.observation import observe
-from assoc.simulation.radars import radar_over
+from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.turning import Path, observe_in_turns
 from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
 
 
@@ -250,6 +252,40 @@ def test_measurements_with_times_of_their_own():
     off = result.biases - truth_of(result, BIASES)
     assert (np.abs(off) < 4.5 * result.deviations).all() and result.deviations[0] < 8.0
     assert result.noise < 1.2
+
+
+def heard_scene(seed=3, share=0.75):
+    """Turning secondary radars: of each, a quarter of the plots has no height, and is a sensor of its own."""
+    sensors, biases = [], []
+    for number, place in enumerate(on_circle(np.zeros(3), 60e3, 3)):
+        both = {"position": place, "false_alarm_rate": 1.0}
+        view = np.array([[0.0, 150e3], [-np.pi, np.pi], [-1e3, 2e4]])
+        sensors += [
+            Radar2D(noise=[50.0, 1e-3, 30.0], detection_probability=0.9 * share, name=f"r{number}",
+                    field_of_view=view, **both),
+            Radar2D(noise=[50.0, 1e-3], detection_probability=0.9 * (1 - share), name=f"r{number}{NO_HEIGHT}",
+                    field_of_view=view[:2], **both),
+        ]  # fmt: skip
+        biases += [{"range": (150.0, -200.0, 100.0)[number], "azimuth": (number - 1) * 3e-3, "gain": 1e-3}] * 2
+    rng = np.random.default_rng(seed)
+    times, where, velocity = paths(seed, 61, interval=1.0)
+    flights = [Path(k, times, where[:, k], np.tile(velocity[k], (len(times), 1))) for k in range(where.shape[1])]
+    scene = observe_in_turns(sensors, [4.0, 4.0, 5.0, 5.0, 5.5, 5.5], 0.0, times[2::2], flights, rng, region=REGION)
+    return with_biases(scene, biases), biases
+
+
+def test_radars_whose_plots_have_heights_or_not():
+    """Heights are heights, and no elevations; both sensors of a radar have its biases."""
+    scene, biases = heard_scene()
+    result = register(scene, components=("range", "azimuth", "gain"))
+    assert len(result.terms) == 9 and {term.sensor for term in result.terms} == {0, 2, 4}
+    off = result.biases - truth_of(result, biases)
+    assert (np.abs(off) < 4.5 * result.deviations).all() and result.observed.all()
+    assert all(result.of(s) == result.of(s + 1) for s in (0, 2, 4)) and result.noise < 1.2
+    clean, corrected = with_biases(scene, [{k: -v for k, v in one.items()} for one in biases]), result.correct(scene)
+    for s in range(6):
+        parts = [np.concatenate([scan[s][:, :2] for scan in one.measurements]) for one in (corrected, clean)]
+        assert np.abs(parts[0] - parts[1]).mean(axis=0) @ [1.0, 1e5] < 60.0
 
 
 def test_false_alarms_do_not_disturb():
