@@ -113,6 +113,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
         print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),
+        (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
         (given["output"], lambda: _write_tracks(given["output"], found.table)),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
@@ -168,8 +169,8 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=known),
     )
     if given["smooth"]:
-        names, tracks = tracks.targets, smoothed(tracker, scene, decisions)
-        tracks.targets = names
+        named, tracks = tracks, smoothed(tracker, scene, decisions)
+        tracks.take_names(named)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
     return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
@@ -209,6 +210,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
 
 def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     from assoc.recordings import radar_of, with_heights
+    from assoc.tracking import TrackTable
     from assoc.tracking.plots import track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
@@ -237,6 +239,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
         done = done._replace(rates=None, kept=None)
+        done.table.take_names(TrackTable())
     return _Tracked(tracker, done.table, None, done, len(done.windows), len(windows))
 
 
@@ -305,6 +308,17 @@ def _write_map(path: str, tracks: TrackTable) -> None:
     from assoc.exports.maps import write_map
 
     write_map(path, tracks.to_frame())
+
+
+def _write_asterix(path: str, found: _Tracked) -> None:
+    from assoc.integrations.asterix import write_tracks
+
+    frame = found.table.to_frame()
+    if found.table.identities:
+        # aircraft with a transponder have heights by Mode C, if any sensor has heights by it
+        mode_c = found.plots or any("height" in one.components[: one.dim] for one in found.tracker.sensors)
+        frame["barometric"] = bool(mode_c) & ((frame["address_hex"] != "") | (frame["mode3_oct"] != ""))
+    write_tracks(path, frame)
 
 
 def _write_tracks(path: str, tracks: TrackTable) -> None:

@@ -138,6 +138,7 @@ def track_plots(
         ids = np.concatenate(step.assigned)[order]
         takers.append(np.where(ids > 0, ids, -1))
         sure.append(np.concatenate(step.confirmed)[order])
+        table.count_identities(ids, np.stack([window.identities, window.addresses], axis=1))
         known = (ids > 0) & np.isfinite(window.altitudes)
         altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
         ends.append(float(step.time))
@@ -147,10 +148,12 @@ def track_plots(
         decisions += step.final
         qualities.after(tracker, before, step, *scans[-1])
         table.add(listed, tracker.filter.motion.position, altitudes, qualities)
+    table.name_by_identities()
     if smooth and done:
         plots, times = zip(*scans, strict=True)
         scene = Scene(tracker.sensors, np.array(ends), plots, tracker.settings.place.region, measurement_times=times)
-        table = smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=altitudes)
+        named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=altitudes)
+        table.take_names(named)
     tracks = np.concatenate(takers)
     aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
     rates = kept = None

@@ -54,7 +54,11 @@ class TrackTable(Shown):
     Attributes
     ----------
     targets : dict of int to str
-        Name of the target that each track followed most, where the truth has names: column target.
+        Name of the target that each track followed most, where the truth has names, else address or code: column
+        target.
+    identities : dict of int to (str, str)
+        Address (hexadecimal) and Mode 3/A code (octal) that most plots of each track had, empty where none had one:
+        columns address_hex and mode3_oct.
     """
 
     def __repr__(self) -> str:
@@ -63,6 +67,8 @@ class TrackTable(Shown):
     def __init__(self, origin: Origin | None = None) -> None:
         self.origin = origin
         self.targets: dict[int, str] = {}
+        self.identities: dict[int, tuple[str, str]] = {}
+        self._known: dict[int, tuple[Counter[str], Counter[str]]] = {}
         self._rows: list[tuple[Any, ...]] = []
         self._quality: list[dict[str, Any]] = []
 
@@ -114,6 +120,24 @@ class TrackTable(Shown):
         if scene.truth is not None and scene.truth.names:
             self.targets = followed_targets(*self.arrays(), scene)
 
+    def count_identities(self, ids: Array, known: Array) -> None:
+        """Count the codes and addresses (n, 2) of measurements by the tracks (n,) that took them."""
+        for number, (code, address) in zip(ids.tolist(), known.tolist(), strict=True):
+            for kind, known_as in enumerate((f"{address:06x}" if address else "", f"{code:04o}" if code else "")):
+                if known_as and number > 0:
+                    self._known.setdefault(number, (Counter(), Counter()))[kind][known_as] += 1
+
+    def name_by_identities(self) -> None:
+        """Take the codes and addresses that were counted most."""
+        for number, counted in self._known.items():
+            address, code = ("".join(name for name, _ in one.most_common(1)) for one in counted)
+            self.identities[number] = address, code
+            self.targets.setdefault(number, address or code)
+
+    def take_names(self, other: TrackTable) -> None:
+        """Take targets and identities of a table of the same tracks."""
+        self.targets, self.identities = other.targets, other.identities
+
     def __len__(self) -> int:
         return len(self._rows)
 
@@ -139,6 +163,9 @@ class TrackTable(Shown):
             frame = frame.join(pd.DataFrame.from_records(self._quality))
         if self.targets:
             frame["target"] = [self.targets.get(number, "") for number in frame["track_id"].tolist()]
+        if self.identities:
+            names = [self.identities.get(number, ("", "")) for number in frame["track_id"].tolist()]
+            frame["address_hex"], frame["mode3_oct"] = zip(*names, strict=True) if names else ((), ())
         return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
@@ -237,7 +264,6 @@ def track_scene(
     """
     table = TrackTable(scene.origin)
     decisions: list[Decision] = []
-    names: dict[int, tuple[Counter[str], Counter[str]]] = {}
     qualities = Qualities(len(tracker.sensors))
     for k in range(scene.num_scans) if scans is None else scans:
         scan, before = scene.scan(k), tracker.state
@@ -251,15 +277,11 @@ def track_scene(
             raise
         decisions += step.final
         for ids, codes in zip(step.assigned, known or (), strict=False):
-            for number, (code, address) in zip(ids.tolist(), codes.tolist(), strict=True):
-                for kind, known_as in enumerate((f"{address:06x}" if address else "", f"{code:04o}" if code else "")):
-                    if known_as and number > 0:
-                        names.setdefault(number, (Counter(), Counter()))[kind][known_as] += 1
+            table.count_identities(ids, codes)
         qualities.after(tracker, before, step, scan.measurements, scan.times)
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
         truth = None if scene.truth is None else scene.truth.positions[k]
         table.add(listed, tracker.filter.motion.position, qualities=qualities, truth=truth)
     table.name_targets(scene)
-    for number, (addresses, modes) in names.items():
-        table.targets.setdefault(number, (addresses or modes).most_common(1)[0][0])
+    table.name_by_identities()
     return table, [*decisions, *tracker.flush()]

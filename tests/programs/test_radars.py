@@ -11,8 +11,9 @@ from assoc import inspect, live, track
 from assoc._cli.track.plot_lines import parse_line
 from assoc._cli.track.radars_file import read_radars
 from assoc.plotting.live import LivePage
-from assoc.recordings import read_plots
-from assoc.scene.geodesy import earth_centered, geodetic
+from assoc.recordings import Recording, radar_of, read_plots
+from assoc.recordings.on_earth import placed
+from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
 
 pytest.importorskip("pyarrow")
 PLACES = {"north": (47.5, 8.0, 450.0), "south": (46.2, 9.0, 600.0)}
@@ -96,6 +97,21 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
     capsys.readouterr()
 
 
+def test_azimuths_in_the_frame_of_another_place():
+    """A radar's vertical is another one than the frame's: of high aircraft that turns azimuths, too."""
+    rng, origin = np.random.default_rng(3), (np.radians(47.5), np.radians(8.0), 450.0)
+    where = rng.uniform([45.5, 7.0, 1e3], [47.0, 11.0, 12e3], (50, 3)).T
+    ranges, bearings = seen_from("south", where)
+    place = tuple(np.radians(PLACES["south"][:2])) + PLACES["south"][2:]
+    altitudes = np.where(np.arange(50) < 40, where[2], np.nan)
+    plots = Recording(np.arange(50.0), ranges, np.pi / 2 - bearings, altitudes=altitudes)
+    told, radar = placed(plots, radar_of(plots, range_noise=40.0, azimuth_noise=1e-3), place, origin, 30.0)
+    exact = radar.measure(east_north_up(*np.radians(where[:2]), where[2], origin))
+    off = np.abs(np.angle(np.exp(1j * (told.azimuths - exact[:, 1]))))
+    # without an altitude one is assumed
+    assert off[:40].max() < 1e-6 and 1e-5 < off[40:].max() < 2.5e-3
+
+
 def test_asterix_beside_tables(tmp_path, capsys):
     """Its times are of the day, its codes and addresses are kept, and tracks are named by addresses."""
     asterix = pytest.importorskip("assoc.integrations.asterix")
@@ -110,9 +126,18 @@ def test_asterix_beside_tables(tmp_path, capsys):
     assert inspect.main([file]) == 0
     said = capsys.readouterr().out
     assert re.search(r"south: .*2021-07-12 14:00:0.*7\d % with an address", said) and "nothing looks wrong" in said
-    assert track.main([file, "-o", str(tmp_path / "tracks.csv"), "-q"]) == 0
-    found = pd.read_csv(tmp_path / "tracks.csv", dtype={"target": str})
+    sent = tmp_path / "tracks.ast"
+    assert track.main([file, "-o", str(tmp_path / "tracks.csv"), "--asterix", str(sent), "-q"]) == 0
+    found = pd.read_csv(tmp_path / "tracks.csv", dtype={"target": str, "mode3_oct": str})
     assert {f"{0x3C6440 + code % 64:06x}" for code in CODES} == {*found[found.time > 1626098460].target}
+    # both in one order: the category has times of day, addresses, and heights by Mode C as flight levels
+    there, here = asterix.read_tracks(sent), found.sort_values("time", kind="stable", ignore_index=True)
+    np.testing.assert_allclose(there.time, here.time % 86_400, atol=1 / 128)
+    assert there.address_hex.str.lower().fillna("").tolist() == here.address_hex.fillna("").tolist()
+    assert there.mode3_oct.fillna("").tolist() == here.mode3_oct.fillna("").tolist()
+    named = there[there.address_hex.notna()]
+    assert named.barometric.all() and not there[there.address_hex.isna() & there.mode3_oct.isna()].barometric.any()
+    np.testing.assert_allclose(there.altitude, here.altitude, atol=4.0)
 
 
 def test_what_is_understood_and_what_looks_wrong(tmp_path, capsys):

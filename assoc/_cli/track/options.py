@@ -102,6 +102,8 @@ TRACK = (
            short="-o", rest={"required": True}),
     Option("map", "FILE", "write the tracks for a map as well (.geojson or .kml); needs an origin",
            kinds.Output(".geojson", ".kml", ".json", strict=True, streams=False)),
+    Option("asterix", "FILE", "write the tracks as ASTERIX category 062 as well (.ast; needs assoc[asterix])",
+           kinds.Output(".ast", ".asterix", strict=True, streams=False, extras={"": ("asterix", "asterix")})),
     Option("origin", "LAT,LON[,H]", "where x = y = 0 is on the earth, degrees and metres (if not in FILE)",
            kinds.position_on_earth),
     Option("report", "FILE", "write an HTML page: tracks over time, metric, table (needs assoc[report])",
