@@ -21,7 +21,7 @@ def irregular_groups(
 ) -> list[Window]:
     """Group plots by intervals of irregular length, as the paper's data come without a window.
 
-    The paper has 183 groups in about 1,130 s, some shorter and some longer than a rotation, and does not explain
+    The paper has 183 groups for 119 rotations, some shorter and some longer than one, and does not explain
     their lengths. Here they are gamma-distributed.
 
     Parameters

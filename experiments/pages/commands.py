@@ -2,7 +2,8 @@
 
 python -m experiments.pages.commands [--folder FOLDER]
 
-FOLDER is that of the thesis's tables; without it the rows that need it are left out. Some ten minutes of one core.
+FOLDER is that of the thesis's tables; without it the rows that need it are left out. Some ten minutes of an idle
+core.
 """
 
 import argparse
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m experiments.pages.commands", description=about)
     parser.add_argument("--folder", metavar="FOLDER", help="the thesis's tables as CSV files")
     folder = parser.parse_args(arguments).folder
-    failed = 0
+    failed = run = 0
     with tempfile.TemporaryDirectory() as scratch:
         for command, rows in commands().items():
             words = small(command, folder and str(Path(folder).resolve()), Path(scratch))
@@ -59,11 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             start = time.perf_counter()
             env = {**os.environ, "PYTHONPATH": str(ROOT)}
             done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False, env=env)
-            failed += done.returncode != 0
+            failed, run = failed + (done.returncode != 0), run + 1
             word = "failed" if done.returncode else "done"
             print(f"{word:9} {rows:3} rows {time.perf_counter() - start:6.0f} s {command}", flush=True)
             if done.returncode:
                 print(done.stdout[-2000:], done.stderr[-2000:], flush=True)
+    print(f"{run} commands run, {failed} failed")
     return 1 if failed else 0
 
 

@@ -81,8 +81,8 @@ def ant_colony() -> str:
         f"{ABSENT}, not shown either way: {number(greater.ours, 2)} cycles, {interval(greater)}; from alpha = 1 alone",
         f"{ABSENT}, nothing to show: all settings find the optimum of every scan; so does greedy on "
         f"{greedy.ours:.0f} of 100",
-        f"{verdict(quick)}: place {number(quick.ours, 2)} of 24 by time, as the paper means it, "
-        f"{number(rank.ours, 2)} by cycles",
+        f"{verdict(quick)}: place {number(quick.ours, 2)} of 24 by time ({interval(quick)}), as the paper means it, "
+        f"{number(rank.ours, 2)} by cycles ({interval(rank)})",
         f"{verdict(alone)}: {number(alone.ours)} % of the false alarms are left alone; of the targets that all 3 "
         f"radars saw {number(all_saw.ours)} % are found with just these measurements",
         f"{verdict(seen)}: {number(seen.ours)} % of the targets that only 2 radars saw are found with just these "
