@@ -54,7 +54,8 @@ def page(name: str) -> str:
     text = ITEM.sub(_filled, (FOLDER / f"{name}.md").read_text(encoding="utf-8")).rstrip("\n")
     if "{{" in text:
         raise ValueError(f"{name}.md: not filled: {text[text.index('{{') :][:80]!r}")
-    return text
+    title, rest = text.split("\n", 1)
+    return f"{title}\n\n<!-- written by python -m experiments.pages from experiments/pages/prose/{name}.md -->\n{rest}"
 
 
 def _filled(item: re.Match[str]) -> str:
