@@ -119,6 +119,11 @@ def test_every_figure_of_a_page_names_its_claim(name):
     assert {one for part in parts(name) for one in unnamed(part)} == {*FIXED.get(name, "").split()}
 
 
+def test_each_page_that_names_an_experiment_is_tested():
+    named = {path.stem for path in DOCS.glob("*.md") if sources(path.read_text(encoding="utf-8"))}
+    assert {"papers", "registration"} < named <= {*prose.PAGES, *BY_HAND}
+
+
 def test_a_figure_that_is_written_by_hand_is_found():
     (part,) = (one for one in parts("solvers_measured") if prose.SLOT.search(one))
     slots = list(prose.SLOT.finditer(part))
