@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from assoc.simulation.dubins.paths import shortest
+from assoc.simulation.dubins.paths import Pose, path, shortest
 from experiments.common.claims import load_json
 from experiments.common.results import Results
 from experiments.filters import benchmark, consistency, manoeuvres
@@ -41,6 +41,19 @@ def test_the_fuzzy_filter_is_equations_21_to_36_but_for_r_in_alpha():
     found = manoeuvres.errors(published.published_filter(published.tuned()), batch)
     assert found == pytest.approx(tuned_once.by_equations(published.tuned(), batch, current=False), rel=1e-6)
     assert found != pytest.approx(tuned_once.by_equations(published.tuned(), batch, current=True), rel=1e-3)
+
+
+@pytest.mark.parametrize(("word", "backwards"), [("RSR", "LSL"), ("LSR", "LSR"), ("RSL", "RSL"), ("LSL", "RSR")])
+def test_dubins_lengths_by_the_papers_steps(word, backwards):
+    first, last = flight_paths.FIRST, flight_paths.LAST
+    one = path(first, last, 100.0, word)
+    assert flight_paths.by_steps(first, last, (100.0, 100.0), word) == pytest.approx(one.length)
+    # the same way flown from its end, with another radius at each end
+    back = [Pose(pose.x, pose.y, pose.heading + np.pi) for pose in (last, first)]
+    there = flight_paths.by_steps(first, last, (100.0, 50.0), word)
+    assert there == pytest.approx(flight_paths.by_steps(*back, (50.0, 100.0), backwards)) != pytest.approx(one.length)
+    # equation 7: no tangent passes between circles that meet
+    assert (flight_paths.by_steps(Pose(0, 0, 0), Pose(50, 0, np.pi), (100, 50), word) is None) == (word[0] != word[2])
 
 
 @pytest.mark.slow
