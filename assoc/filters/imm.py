@@ -158,7 +158,8 @@ class InteractingMultipleModel(Filter[Mixture]):
             raise InvalidInputError("transition must have probabilities in its rows that sum to 1")
         self.interval = positive(interval, "interval")
         self.rates = transition_rates(self.transition, self.interval)
-        self._known = {self.interval: self.transition}
+        self._exact = {0.0: np.eye(m), self.interval: self.transition}
+        self._known = self._exact.copy()
         self._eigen: tuple[Array, Array, Array | None] | None = None
         if weights is None:
             values, vectors = np.linalg.eig(self.transition.T)
@@ -186,8 +187,8 @@ class InteractingMultipleModel(Filter[Mixture]):
         if known is None:
             dt = positive(dt, "dt", zero=True)
             if len(self._known) > _MOST_STEPS:
-                self._known = {self.interval: self.transition}
-            known = self._known[dt] = expm(self.rates * dt)
+                self._known = self._exact.copy()
+            known = self._known[dt] = self._transitions(np.array([dt]))[0]
         return known
 
     def _transitions(self, dt: Array) -> Array:
@@ -201,8 +202,9 @@ class InteractingMultipleModel(Filter[Mixture]):
             )
         values, vectors, inverse = self._eigen
         if inverse is None:
-            return np.stack([self.transition_over(step) for step in dt.tolist()])
-        return np.asarray(np.real((vectors * np.exp(values * dt[:, None])[:, None]) @ inverse))
+            return np.stack([expm(self.rates * step) for step in dt.tolist()])
+        # much quicker than expm, which plots with times of their own would call once each
+        return np.maximum(np.real((vectors * np.exp(values * dt[:, None])[:, None]) @ inverse), 0.0)
 
     def predict(self, state: Mixture, dt: float) -> Mixture:
         """Mix the models and predict each; see `Filter.predict`."""
