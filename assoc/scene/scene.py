@@ -106,6 +106,7 @@ class Scene:
         put(self, "region", self._checked_region())
         if self.measurement_times is not None:
             put(self, "measurement_times", self._checked_measurement_times(self.measurement_times))
+        self._check_platforms()
         if self.sectors is not None:
             shape = (self.num_scans, len(self.sensors), 2)
             given = finite_array(self.sectors, "sectors", shape)
@@ -148,6 +149,19 @@ class Scene:
             checked_measurements(scan, self.sensors, f"measurements of scan {k}")
             for k, scan in enumerate(self.measurements)
         )
+
+    def _check_platforms(self) -> None:
+        """Refuse scans, and times of measurements, outside of a platform's times; those of a plan alone may be."""
+        if not any(len(z) for scan in self.measurements for z in scan):
+            return
+        for s, sensor in enumerate(self.sensors):
+            if sensor.platform is None:
+                continue
+            own = () if self.measurement_times is None else [scan[s] for scan in self.measurement_times]
+            try:
+                sensor.platform.poses(np.concatenate([self.times, *own]))
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{sensor.label(s)}: {error}") from None
 
     def _checked_region(self) -> Array:
         region = finite_array(default_region(self.sensors) if self.region is None else self.region, "region", (3, 2))

@@ -9,7 +9,7 @@ import numpy as np
 
 from assoc._system.door import doors
 from assoc._types import Array
-from assoc.errors import InvalidInputError, warn
+from assoc.errors import InvalidInputError
 from assoc.sensors.arrays import finite_array
 
 # a step is taken for a jump if it is faster than this (m/s) and so many times as fast as nine in ten steps
@@ -37,11 +37,6 @@ class Platform:
     ------
     InvalidInputError
         One line that names the argument and what was expected.
-
-    Warns
-    -----
-    AssocWarning
-        A step is much faster than the others.
     """
 
     times: Array
@@ -57,10 +52,15 @@ class Platform:
         put(self, "positions", finite_array(self.positions, "platform: positions", (len(times), 3)))
         if self.headings is not None:
             put(self, "headings", checked_headings(finite_array(self.headings, "platform: headings", times.shape)))
-        speeds = np.linalg.norm(np.diff(self.positions, axis=0), axis=1) / np.diff(times)
+
+    @property
+    def doubt(self) -> str:
+        """One line if a step is much faster than the others, "" else; sensors warn of it."""
+        speeds = np.linalg.norm(np.diff(self.positions, axis=0), axis=1) / np.diff(self.times)
         k = int(np.argmax(speeds)) if len(speeds) else 0
         if len(speeds) > 1 and speeds[k] > max(FAST, FASTER * float(np.quantile(np.delete(speeds, k), 0.9))):
-            warn(f"platform: jumps at {times[k]:g} s, with {speeds[k]:.4g} m/s to its next position")
+            return f"platform jumps at {self.times[k]:g} s, with {speeds[k]:.4g} m/s to its next position"
+        return ""
 
     def poses(self, times: Array) -> tuple[Array, Array]:
         """Positions (n, 3) and headings (n,), 0 where they are not given, at times (n,).

@@ -14,7 +14,7 @@ from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import Filter
 from assoc.filters.state import Gaussian
 from assoc.registration.online import OnlineRegistration
@@ -86,6 +86,11 @@ class Tracker:
     ------
     InvalidInputError
         An argument is not as described.
+
+    Warns
+    -----
+    AssocWarning
+        A closed area of `initiation` lies outside of the region.
     """
 
     name: ClassVar[str]
@@ -125,6 +130,9 @@ class Tracker:
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
             max_tuples=max_tuples, registration=online, identity=identity, adapt=bool(adapt),
         )  # fmt: skip
+        doubt = settings.initiation.doubt(place.region)
+        if doubt:
+            warn(doubt)
         self.settings = with_nursery(settings)
         self.state = first_state(self.settings)
 

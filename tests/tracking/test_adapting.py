@@ -7,7 +7,7 @@ import pytest
 
 from assoc import simulation
 from assoc._files.npz import save_npz
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocWarning, InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
 from assoc.scene.own_times import looked_at
@@ -285,8 +285,17 @@ def test_corners_of_closed_areas():
     bent = Initiation(closed=[[[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]]])
     points = np.array([[2.0, 0.5, 9.0], [2.0, 2.0, 0.0], [0.5, 2.0, 0.0], [5.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     assert bent.opens(points).tolist() == [False, True, False, True, True]
-    with pytest.raises(InvalidInputError, match="at least 3 corners"):
-        Initiation(closed=[[[0, 0], [1, 1]]])
+    for wrong in ([[0, 0], [1, 1]], [[0, 0], [1, 1], [1, np.nan]]):
+        with pytest.raises(InvalidInputError, match="at least 3 finite corners"):
+            Initiation(closed=[wrong])
+
+
+def test_a_closed_area_of_another_frame_is_told():
+    here, there = [[45e3, 0], [15e3, 0], [15e3, 9e3]], [[6e5, 5.2e6], [6.1e5, 5.2e6], [6.1e5, 5.3e6]]
+    make = TRACKERS["multi-sensor"]
+    make(radars(), region=REGION, initiation=Initiation(closed=[here]))
+    with pytest.warns(AssocWarning, match="closed: area 2 lies outside of the region"):
+        make(radars(), region=REGION, initiation=Initiation(closed=[here, there]))
 
 
 def test_traffic_is_no_clutter():

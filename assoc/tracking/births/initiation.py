@@ -49,7 +49,9 @@ class Initiation:
         corners = [numbers(area, "closed: an area") for area in self.closed]
         for area in corners:
             if area.ndim != 2 or area.shape[1:] != (2,) or len(area) < 3 or not np.isfinite(area).all():
-                raise InvalidInputError(f"closed: an area must be at least 3 corners x, y, got shape {area.shape}")
+                raise InvalidInputError(
+                    f"closed: an area must be at least 3 finite corners x, y, got shape {area.shape}"
+                )
         object.__setattr__(self, "closed", tuple(tuple(map(tuple, area.tolist())) for area in corners))
         for name in ("rest", "birth_rate", "widest"):
             positive(getattr(self, name), name)
@@ -60,6 +62,14 @@ class Initiation:
             positive(speed, "speed")
         if not isinstance(self.speed, (int, float, tuple, list)):
             object.__setattr__(self, "speed", float(self.speed))  # a number of numpy's
+
+    def doubt(self, region: Array) -> str:
+        """One line if a closed area lies outside of the region, "" else."""
+        for number, area in enumerate(self.closed, 1):
+            low, high = np.min(area, axis=0), np.max(area, axis=0)
+            if (high < region[:2, 0]).any() or (low > region[:2, 1]).any():
+                return f"closed: area {number} lies outside of the region: of another frame, or not in metres?"
+        return ""
 
     def opens(self, positions: Array) -> Array:
         """Which positions (K, 3) are outside of the closed areas, bool (K,)."""
