@@ -185,6 +185,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     given["filter"] = given["filter"] or "imm-cv"
     settings |= given.some(("registration",))
     scene = Scene.load(file)
+    scene.check_platforms(file)
     if given["cutoff"] is not None and scene.truth is None:
         raise InvalidInputError(f"--cutoff: {file} has no truth with which tracks are compared")
     if given["smooth"]:

@@ -106,7 +106,6 @@ class Scene:
         put(self, "region", self._checked_region())
         if self.measurement_times is not None:
             put(self, "measurement_times", self._checked_measurement_times(self.measurement_times))
-        self._check_platforms()
         if self.sectors is not None:
             shape = (self.num_scans, len(self.sensors), 2)
             given = finite_array(self.sectors, "sectors", shape)
@@ -150,19 +149,6 @@ class Scene:
             for k, scan in enumerate(self.measurements)
         )
 
-    def _check_platforms(self) -> None:
-        """Refuse scans, and times of measurements, outside of a platform's times; those of a plan alone may be."""
-        if not any(len(z) for scan in self.measurements for z in scan):
-            return
-        for s, sensor in enumerate(self.sensors):
-            if sensor.platform is None:
-                continue
-            own = () if self.measurement_times is None else [scan[s] for scan in self.measurement_times]
-            try:
-                sensor.platform.poses(np.concatenate([self.times, *own]))
-            except InvalidInputError as error:
-                raise InvalidInputError(f"{sensor.label(s)}: {error}") from None
-
     def _checked_region(self) -> Array:
         region = finite_array(default_region(self.sensors) if self.region is None else self.region, "region", (3, 2))
         if (region[:, 0] > region[:, 1]).any() or (region[:, 0] == region[:, 1]).all():
@@ -189,6 +175,30 @@ class Scene:
     def num_scans(self) -> int:
         """Number of scans, K."""
         return len(self.times)
+
+    def check_platforms(self, what: str = "scene") -> None:
+        """Refuse scans, and times of measurements, at which a sensor's platform has no position.
+
+        Live, platforms send their positions meanwhile: a scene need not have them.
+
+        Parameters
+        ----------
+        what : str
+            What the message begins with.
+
+        Raises
+        ------
+        InvalidInputError
+            There is such a time.
+        """
+        for s, sensor in enumerate(self.sensors):
+            if sensor.platform is None:
+                continue
+            own = () if self.measurement_times is None else [scan[s] for scan in self.measurement_times]
+            try:
+                sensor.platform.poses(np.concatenate([self.times, *own]))
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{what}: {sensor.label(s)}: {error}") from None
 
     def scan(self, k: int) -> Scan:
         """Scan number `k`, counted from 0 (negative: from the end).
