@@ -12,7 +12,8 @@
 # make test-uncompiled  a part of the tests with numba switched off
 # make test-cold        the same bytes with a cold cache of kernels, a warm one, and on 1, 2 and 4 processes
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
-# make check-dist       builds them, checks what they hold, that they work in an empty environment, and compile nothing
+# make check-dist       the same, and checks what they hold, that they work in an empty environment, and compile nothing;
+#                       of another Python: make check-dist VENV=.venv-3.12 PYTHON=python3.12
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size, some hours (python -m experiments.benchmarks --brief: everything in 25 minutes)
 # make bench-quick      a minute: has something become twice as slow, beside HiGHS in the same process?
@@ -94,7 +95,7 @@ dist: $(VENV)/.installed-release
 	$(PY) -m tests.release.build dist
 
 check-dist: $(VENV)/.installed-release
-	$(PY) -m tests.release.distribution
+	$(PY) -m tests.release.distribution dist
 
 audit: $(VENV)/.installed-release
 	$(PY) -m pip freeze --exclude-editable > $(VENV)/frozen.txt

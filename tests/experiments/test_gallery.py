@@ -1,6 +1,7 @@
 """The pictures of the documentation: each is committed, small, and drawn by a command that works."""
 
 import io
+import re
 
 import numpy as np
 import pytest
@@ -23,6 +24,14 @@ def test_every_picture_is_on_a_page_and_sharp():
         if path.suffix == ".png":
             with Image.open(path) as image:
                 assert image.width >= 1_250, path.name
+
+
+def test_the_gallery_has_twelve_pictures_each_with_its_code():
+    page = (gallery.FOLDER.parent / "gallery.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[.+\]\(images/([\w-]+)\.png\)\n\n```.*gallery\.py\n:pyobject: (\w+)\n```", page)
+    assert len(shown) == len(dict(shown)) == page.count("](images/") == 12
+    assert {name: gallery.PICTURES[name].__name__ for name, _ in shown} == dict(shown)
+    assert all(hasattr(gallery, name) for name in re.findall(r":pyobject: (\w+)", page))
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ installs today gets. The second wheel is for this Python and this system. Both a
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -86,7 +87,7 @@ def build(folder: Path) -> Built:
         run(sys.executable, *how, source, cwd=place, ASSOC_KERNELS=str(kernels))
         (compiled,) = (place / "compiled").glob("*.whl")
         folder.mkdir(parents=True, exist_ok=True)
-        done = [path.replace(folder / path.name) for path in (sdist, plain, compiled)]
+        done = [Path(shutil.move(path, folder / path.name)) for path in (sdist, plain, compiled)]
         added = [f"assoc/_kernels/{path.relative_to(kernels)}" for path in kernels.rglob("*") if path.is_file()]
     return Built(*done, added)
 

@@ -1,14 +1,16 @@
 """What is given away: sdist and wheels, built, looked through, installed into empty environments and tried.
 
-    python -m tests.release.distribution      (make check-dist)
+    python -m tests.release.distribution FOLDER     (make check-dist; FOLDER is dist)
 
-takes some minutes and a network (or an index that pip knows): each environment gets all dependencies anew. With the
+leaves them in FOLDER. It takes some minutes and a network (or an index that pip knows): each environment gets all dependencies anew. With the
 wheel that ships compiled kernels nothing may be compiled; where they do not fit, the same answers must come from
 kernels that are compiled on the spot.
 """
 
+import argparse
 import getpass
 import pickle
+import platform
 import socket
 import subprocess
 import sys
@@ -226,13 +228,19 @@ def check(done: Built, folder: Path) -> None:
 
 def main() -> int:
     """Run the program; exit code 1 if something is wrong."""
+    parser = argparse.ArgumentParser(description="Build the sdist and the wheels, and try them.")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where to put them")
+    dist = parser.parse_args().folder
     with tempfile.TemporaryDirectory(prefix="assoc-dist-") as name:
         folder = Path(name)
         try:
-            check(build(folder / "dist"), folder)
+            done = build(dist)
+            check(done, folder)
         except WrongError as error:
             print(error, file=sys.stderr)
             return 1
+    size, kernels = done.compiled.stat().st_size / 1e6, sum(name.endswith(".nbc") for name in done.kernels)
+    print(f"Python {platform.python_version()}: {size:.2f} MB with {kernels} compiled kernels; wheel and sdist work")
     return 0
 
 
