@@ -5,13 +5,12 @@
 Each run starts from an empty cache of its own, as a fresh clone does, and is followed by a second, warm one with the
 cache that the first left. ``--wheel`` names a wheel, such as one with compiled kernels (``make dist``): it is installed
 with its dependencies into an empty environment (this needs a network, or an index that pip knows; nothing comes from
-pip's cache), each package is weighed, and the same commands run there. Commands run at a terminal, where a row is
+pip's cache), and the same commands run there. Commands run at a terminal, where a row is
 printed as each scan is finished. Wall seconds say what a user feels on two idle cores; processor seconds are of the
 command and the processes that it started.
 """
 
 import argparse
-import json
 import os
 import pty
 import re
@@ -28,6 +27,7 @@ from typing import NamedTuple
 from assoc.simulation import simulate
 from experiments.common.claims import Claim, save_json
 from experiments.common.results import result_file
+from experiments.installation import install, wheel_of
 
 COMMANDS = {
     "solve, exact, three radars": ["-m", "assoc.solve", "easy.npz", "--solver", "exact"],
@@ -45,18 +45,6 @@ FIRST = 5.0
 # the row of scan 0, without the colours
 _ROW = re.compile(rb"[\r\n]\s*0\s+\d")
 _COLOURS = re.compile(rb"\x1b\[[0-9;?]*[a-zA-Z]")
-
-
-# bytes of each installed package, what came with the environment left out
-_WEIGH = """
-import json
-from importlib import metadata
-sizes = {}
-for one in metadata.distributions():
-    files = [one.locate_file(name) for name in one.files or ()]
-    sizes[f"{one.name} {one.version}"] = sum(path.stat().st_size for path in files if path.is_file())
-print(json.dumps({name: size for name, size in sizes.items() if name.split()[0] not in ("pip", "setuptools")}))
-"""
 
 
 class Seconds(NamedTuple):
@@ -108,36 +96,12 @@ def runs_of(python: str, words: list[str], folder: Path, runs: int) -> dict[str,
     return found
 
 
-def installation(wheel: Path, folder: Path) -> tuple[str, list[Claim]]:
-    """Install a wheel into an empty environment: its Python, how long that took, and what each package weighs.
-
-    Raises RuntimeError: It cannot be installed.
-    """
-    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    python = str(folder / "bin" / "python")
-    started = time.perf_counter()
-    command = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-cache-dir", str(wheel)]
-    if subprocess.run(command, check=False).returncode:
-        raise RuntimeError(f"{wheel} cannot be installed")
-    seconds = time.perf_counter() - started
-    weighed = subprocess.run([python, "-c", _WEIGH], check=True, capture_output=True, text=True).stdout
-    sizes = sorted(json.loads(weighed).items(), key=lambda item: -item[1])
-    claims = [Claim("pip install, wall", "s", ours=seconds), Claim("wheel", "MB", ours=wheel.stat().st_size / 1e6)]
-    claims += [Claim("installed, all", "MB", ours=sum(size for _, size in sizes) / 1e6)]
-    claims += [Claim(f"installed, {name}", "MB", ours=size / 1e6) for name, size in sizes]
-    for claim in claims:
-        print(f"{claim.quantity:38s} {claim.ours:8.1f} {claim.unit}", flush=True)
-    return python, claims
-
-
 def experiment(runs: int, wheel: Path | None) -> list[Claim]:
     """Measure all commands; prints a row for each."""
-    claims = []
+    claims: list[Claim] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        installed = None
-        if wheel is not None:
-            installed, claims = installation(wheel, folder / "env")
+        installed = None if wheel is None else install(wheel, folder / "env")
         print(f"{'median seconds of ' + str(runs):38s} {'wall':>8} {'cpu':>8} {'first scan':>12}")
         simulate("three-radar", seed=0).save(folder / "easy.npz")
         simulate("bearing-only", seed=0, targets=20, scans=1).save(folder / "hard.npz")
@@ -176,16 +140,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m experiments.cold_start", description="What a user waits for after an installation."
     )
-    parser.add_argument("--wheel", type=Path, metavar="FILE", help="a wheel: installed, weighed, and measured as well")
+    parser.add_argument("--wheel", type=Path, metavar="FILE", help="a wheel: installed, and measured as well")
     parser.add_argument("--runs", type=int, default=3, metavar="N", help="runs of each command (default 3)")
     parser.add_argument("--json", metavar="FILE", help="write the seconds here")
     parser.add_argument("--publish", action="store_true", help="write the result file that the pages are made from")
     chosen = parser.parse_args(arguments)
     if chosen.runs < 1:
         parser.error("--runs must be at least 1")
-    if chosen.wheel is not None and not (chosen.wheel.suffix == ".whl" and chosen.wheel.is_file()):
-        parser.error(f"--wheel: {chosen.wheel} is no wheel, expected a file that ends with .whl")
-    claims = experiment(chosen.runs, chosen.wheel)
+    claims = experiment(chosen.runs, chosen.wheel and wheel_of(parser, chosen.wheel))
     for path in (chosen.json, str(result_file("cold_start")) if chosen.publish else None):
         if path:
             save_json(path, claims, "cold_start", 0, " ".join((__doc__ or "").split()))

@@ -17,6 +17,9 @@ from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitEx
 DONE, NOTHING_FEASIBLE, INTERRUPTED = 0, 3, 130
 """Exit codes; the last one is that of shells for Ctrl-C."""
 
+_MAY_BE_MISSING = ("ortools", "pandas")
+"""Dependencies that an installation may be without (docs/dependencies.md)."""
+
 
 @dataclass(frozen=True)
 class Program:
@@ -71,6 +74,11 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
         return NOTHING_FEASIBLE
     except AssocError as error:
         print(f"{name}: error: {one_line(error)}", file=sys.stderr)
+        return BAD_INPUT
+    except ModuleNotFoundError as error:
+        if error.name not in _MAY_BE_MISSING:
+            raise
+        print(f"{name}: error: {error.name} is not installed: python -m pip install {error.name}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:
         print(f"{name}: out of memory", file=sys.stderr)

@@ -4,10 +4,23 @@ from experiments.common.claims import Claim
 from experiments.common.results import Results, number, result_file, table
 
 SCENARIOS = tuple("CDEFGH")
-# packages of so many MB have a row of their own
-_LARGE = 5.0
-# ortools, and what is installed for it alone
-_FOR_MILP = ("ortools", "absl-py", "immutabledict", "protobuf", "typing_extensions")
+_FOR = {
+    "llvmlite": "the compiler of the kernels",
+    "numba": "kernels: costs, solvers, filters, trackers",
+    "numpy": "arrays",
+    "scipy": "sparse graphs, matchings, linear programs, nearest neighbours, distributions",
+    "ortools": "the solver `milp`",
+    "pandas": "tables: `to_frame`, tracks, CSV and Parquet files, studies, reports",
+    "rich": "progress at a terminal",
+    "Pygments": "needed by rich",
+    "cloudpickle": "your own functions in other processes",
+    "shtab": "completion of names and options",
+    "assoc": "the package, its kernels compiled",
+}
+"""What each part of an installation is for; a small package that one of these needs is not named."""
+_SPARED = ("ortools", "absl-py", "immutabledict", "protobuf", "typing_extensions", "pandas", "python-dateutil", "six",
+           "tzdata")  # fmt: skip
+"""ortools, pandas, and what is installed for them alone."""
 
 
 def _judged(claim: Claim, digits: int = 3) -> str:
@@ -215,21 +228,23 @@ def first_call() -> str:
 
 
 def sizes() -> str:
-    """What an installation takes on the disk, package by package."""
-    found = Results("cold_start").claims if result_file("cold_start").exists() else []
-    weights = {c.quantity.removeprefix("installed, "): c.ours for c in found if c.quantity.startswith("installed, ")}
-    if not weights:
-        return "`python -m experiments.cold_start --wheel FILE` weighs the packages on your machine."
-    whole = weights.pop("all")
-    small = [size for size in weights.values() if size < _LARGE]
-    spared = [size for name, size in weights.items() if name.split()[0] in _FOR_MILP]
-    rows = [[name, number(size)] for name, size in weights.items() if size >= _LARGE]
-    rows += [
-        [f"{len(small)} others", number(sum(small))],
-        ["all", number(whole)],
-        [f"all but ortools and the {len(spared) - 1} that only it needs", number(whole - sum(spared))],
-    ]
-    return table(["package", "on disk, MB"], rows)
+    """What an installation takes on the disk, and what each package is for."""
+    if not result_file("installation").exists():
+        return "`python -m experiments.installation WHEEL` weighs the packages on your machine."
+    r = Results("installation")
+    names = [c.quantity.removeprefix("installed, ") for c in r.starting("installed, ")]
+    named = [name for name in names if name.split()[0] in _FOR]
+    kept = [name for name in names if name.split()[0] not in _SPARED]
+
+    def row(name: str, use: str, of: list[str]) -> list[str]:
+        kinds = ("installed", "without bytecode")
+        return [name, use, *(number(sum(r[f"{kind}, {one}"].ours for one in of)) for kind in kinds)]
+
+    rows = [row(name, _FOR[name.split()[0]], [name]) for name in named]
+    others = [name for name in names if name not in named]
+    rows.append(row(f"{len(others)} others", "needed by ortools, pandas, rich", others))
+    rows += [row("all", "", names), row("all but ortools, pandas and what only they need", "", kept)]
+    return table(["package", "for", "MB on the disk", "without bytecode"], rows)
 
 
 def traffic() -> str:

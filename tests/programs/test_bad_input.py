@@ -2,11 +2,14 @@
 
 import os
 import pickle
+import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 import assoc
+from assoc._cli.program import run_program
 from assoc.simulation import simulate
 from assoc.solve import main
 from tests.sizes import sample
@@ -217,3 +220,12 @@ def test_options_of_scenes_are_refused_for_problems(tmp_path, monkeypatch, capsy
     )
     # beside a scene they are of use
     assert main(["p.npz", "s.npz", *words]) == 0
+
+
+def test_a_dependency_that_was_left_out_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert run_program(lambda: import_module("pandas"), "assoc.track") == 2
+    said = "assoc.track: error: pandas is not installed: python -m pip install pandas\n"
+    assert capsys.readouterr().err == said
+    with pytest.raises(ModuleNotFoundError, match="no_such_module"):
+        run_program(lambda: import_module("no_such_module"), "assoc.track")

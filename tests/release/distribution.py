@@ -2,9 +2,9 @@
 
     python -m tests.release.distribution FOLDER     (make check-dist; FOLDER is dist)
 
-leaves them in FOLDER. It takes some minutes and a network (or an index that pip knows): each environment gets all dependencies anew. With the
-wheel that ships compiled kernels nothing may be compiled; where they do not fit, the same answers must come from
-kernels that are compiled on the spot.
+leaves them in FOLDER. It takes some minutes and a network (or an index that pip knows): each environment gets all
+dependencies anew. With the wheel that ships compiled kernels nothing may be compiled; where they do not fit, the same
+answers must come from kernels that are compiled on the spot.
 """
 
 import argparse
@@ -51,6 +51,9 @@ from assoc.simulation import simulate
 found = assoc.associate(simulate("three-radar", 1, scans=2), "greedy")
 assert len(found.solutions) == 2
 """
+
+WITHOUT = "import sys; sys.modules.update(dict.fromkeys(('ortools', 'pandas')))"
+"""Put before a script: what may be left out of an installation cannot be imported (docs/dependencies.md)."""
 
 
 def tracked() -> set[str]:
@@ -127,7 +130,8 @@ def smoke(python: Path, folder: Path) -> None:
     """Try what is installed, from an empty folder: the package, and the help of its programs."""
     place = folder / "empty"
     place.mkdir()
-    run(python, "-W", "error", "-c", SMOKE, cwd=place)
+    for before in ("", WITHOUT):
+        run(python, "-W", "error", "-c", before + SMOKE, cwd=place)
     for program in _PROGRAMS:
         if f"python -m {program}" not in run(python, "-W", "error", "-m", program, "--help", cwd=place):
             raise WrongError(f"{program} --help: does not say how it is called")
