@@ -1,4 +1,8 @@
-"""What sensors can see: the share of a target's density in a sensor's view, and what a miss then says."""
+"""What sensors can see: the share of a target's density in a sensor's view, and what a miss then says.
+
+Where the detection probability is known by bands of range, a sensor's is the largest of them, and the share of a
+target in a band is lowered by what the band has less.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +17,15 @@ from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.base import Filter
 from assoc.filters.imm import Mixture
-from assoc.sensors import Sensor
+from assoc.sensors import PositionSensor, Sensor
 from assoc.sensors.codes import CODES
 from assoc.sensors.kernels.dispatch import linearise
 
 # shares nearer to 0 or 1 than this are 0 or 1
 _SURE = 1e-6
 _FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
+BANDS = 10
+"""Bands of range, equally wide, up to a sensor's reach."""
 # places along each axis of a region at which a view is tried
 _TRIED = (9, 9, 5)
 
@@ -87,26 +93,37 @@ class Views:
     sensors : sequence of Sensor
     axes : sequence of int
         Components of a state that are the position.
+    by_range : array (S, BANDS), optional
+        See `assoc.costs.tracks.scores.ScoreTerms`.
     """
 
-    def __init__(self, sensors: Sequence[Sensor], axes: Sequence[int]) -> None:
+    def __init__(self, sensors: Sequence[Sensor], axes: Sequence[int], by_range: Array | None = None) -> None:
         self._sensors, self._axes = tuple(sensors), np.array(axes, dtype=np.int64)
-        self._bounds = np.stack([_bounds(sensor) for sensor in sensors])
+        self._by_range = np.ones((len(self._sensors), BANDS)) if by_range is None else by_range
+        rows = zip(self._sensors, self._by_range, strict=True)
+        self._bounds = np.stack([np.append(_bounds(sensor), [reach(sensor), *bands]) for sensor, bands in rows])
 
     def shares(self, states: Any, sensors: slice = slice(None)) -> Array:
-        """`share_in_view` of B targets for these sensors, (B, S)."""
+        """`share_in_view` of B targets for these sensors, less in bands that detect less, (B, S)."""
         shares = self._looked(states, self._bounds[sensors], True)
         for column, sensor in self._users(sensors):
             shares[:, column] = share_in_view(sensor, *_places(states, self._axes))
+            shares[:, column] *= self._at(states, sensors, column)
         return shares
 
-    def seen(self, states: Any) -> Array:
-        """Which of B targets are in which sensors' fields of view by their means, bool (B, S)."""
-        seen = self._looked(states, self._bounds, False) > 0.0
+    def at_means(self, states: Any) -> Array:
+        """`shares` as if B targets were where their means are, (B, S): 0 out of view."""
+        shares = self._looked(states, self._bounds, False)
         for s, sensor in self._users(slice(None)):
             view = sensor.position_part
-            seen[:, s] = view.in_view(view.measure(_places(states, self._axes)[0]))
-        return np.asarray(seen)
+            shares[:, s] = view.in_view(view.measure(_places(states, self._axes)[0]))
+            shares[:, s] *= self._at(states, slice(None), s)
+        return shares
+
+    def _at(self, states: Any, sensors: slice, column: int) -> Array:
+        """Relative detection probability of targets by one of these sensors, (B,)."""
+        band = bands_of(self._sensors[sensors][column], _places(states, self._axes)[0])
+        return np.asarray(self._by_range[sensors][column, band])
 
     def _users(self, sensors: slice) -> list[tuple[int, Sensor]]:
         """Sensors of users' own classes, which have no compiled model."""
@@ -136,8 +153,8 @@ def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axe
 
     Parameters
     ----------
-    bounds : array (S, 14)
-        See `_bounds`.
+    bounds : array (S, 15 + BANDS)
+        See `_bounds`; then reach and relative detection probability in each band.
     weights, means, covariances : arrays (B, m), (B, m, n), (B, m, n, n)
     axes : int64 array
         Components that are the position.
@@ -178,8 +195,43 @@ def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axe
                         variance += H[a, i] * spread[i, k] * H[a, k]
                 unit = math.sqrt(2.0) * max(math.sqrt(max(variance, 0.0)), 1e-12)
                 share *= 0.5 * (math.erfc(-high / unit) - math.erfc(-low / unit))
-            result[b, s] = 0.0 if share < _SURE else 1.0 if share > 1.0 - _SURE else share
+            share = 0.0 if share < _SURE else 1.0 if share > 1.0 - _SURE else share
+            if bounds[s, 14] > 0.0:
+                away = math.hypot(math.hypot(place[0] - bounds[s, 2], place[1] - bounds[s, 3]), place[2] - bounds[s, 4])
+                share *= bounds[s, 15 + min(int(BANDS * away / bounds[s, 14]), BANDS - 1)]
+            result[b, s] = share
     return result
+
+
+def reach(sensor: Sensor) -> float:
+    """How far a sensor sees, metres; 0 where its measurements have no range or place."""
+    view = sensor.field_of_view
+    if sensor.components[0] == "range":
+        return float(view[0, 1])
+    if isinstance(sensor, PositionSensor):
+        # to the farthest corner
+        return float(np.linalg.norm(np.abs(view - sensor.position[: sensor.dim, None]).max(axis=1)))
+    return 0.0
+
+
+def bands_of(sensor: Sensor, positions: Array) -> Array:
+    """Band of range of positions (B, 3), or of the x and y of them; int (B,)."""
+    far = reach(sensor)
+    if not far:
+        return np.zeros(len(positions), dtype=np.int64)
+    away = positions - sensor.position[: positions.shape[1]]
+    return _bands(np.sqrt(np.einsum("bi,bi->b", away, away)), far)
+
+
+def bands_of_measured(sensor: Sensor, measured: Array) -> Array:
+    """Band of range of measurements (n, d), int (n,)."""
+    if sensor.components[0] == "range":
+        return _bands(measured[:, 0], reach(sensor))
+    return bands_of(sensor, measured)
+
+
+def _bands(distance: Array, far: float) -> Array:
+    return np.clip((BANDS / far * distance).astype(np.int64), 0, BANDS - 1)
 
 
 def places_of(filter: Filter[Any], states: Any) -> tuple[Array, Array]:

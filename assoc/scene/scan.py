@@ -34,8 +34,8 @@ class Scan:
     paths : tuple over sensors of Platform or None
         Where sensors were that moved while they measured; see `aligned`.
     clutter : tuple over sensors of arrays (n_s,), or None
-        Logarithm of the density of false alarms at each measurement, relative to that of its sensor; None: the same
-        everywhere. Trackers that adapt find it.
+        Logarithm of the density of false alarms over the detection probability at each measurement, relative to those
+        of its sensor; None: the same everywhere. Trackers that adapt find it.
     """
 
     index: int

@@ -27,7 +27,7 @@ from assoc.tracking.state import Nursery, TrackerState
 from assoc.tracking.track_batch import one_state
 
 FORMAT = "assoc.tracker"
-VERSION = 3
+VERSION = 4
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
@@ -174,9 +174,10 @@ def _estimates(model: Estimates, saved: Saved) -> Estimates:
         shape = (count, *shape[1:]) if name in PER_TRACK else shape
         good = saved[name].shape == shape and np.isfinite(saved[name]).all()
         saved.require(good, name, f"finite numbers of the shape {shape}")
-    for name in ("factors", "used", "manoeuvres"):
+    for name in ("factors", "used", "manoeuvres", "bands"):
         saved.require((saved[name] > 0).all(), name, "numbers above 0")
     saved.require((saved["used"][:, DETECTION] < 1).all(), "used", "probabilities below 1 in its second column")
+    saved.require((saved["bands"] < 1).all(), "bands", "probabilities below 1")
     saved.require((np.linalg.eigvalsh(saved["weights"]) > 0).all(), "weights", "a positive definite matrix")
     arrays: dict[str, Any] = {**saved, "manoeuvres": float(saved["manoeuvres"])}
     return Estimates(**arrays)

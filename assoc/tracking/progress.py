@@ -76,6 +76,8 @@ class Progress(NamedTuple):
     """Set for measurements with times of their own; None if all sensors looked everywhere at one instant."""
     before: TrackBatch | None = None
     """The tracks that association began with, of a tracker that adapts."""
+    dense: Sequence[Array] = ()
+    """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
     found: Association | None = None
     step: Step | None = None
 

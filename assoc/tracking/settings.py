@@ -44,6 +44,8 @@ class TrackerSettings:
         Its state before the first scan.
     adapt : bool
         Whether to estimate what is declared of the sensors, and the manoeuvres.
+    by_range : array (S, B) or None
+        Detection probabilities by bands of range, relative to the sensors'; see `assoc.costs.tracks.scores.ScoreTerms`.
     nursery : TrackerSettings or None
         Of the nursery, if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
     """
@@ -63,6 +65,7 @@ class TrackerSettings:
     registration: OnlineRegistration | None
     identity: IdentityParameters | None
     adapt: bool = False
+    by_range: Any = None
     nursery: TrackerSettings | None = None
 
     def __post_init__(self) -> None:
@@ -130,12 +133,12 @@ class TrackerSettings:
     @cached_property
     def terms(self) -> ScoreTerms:
         """Scores of detections and misses of each sensor."""
-        return score_terms(self.sensors)
+        return score_terms(self.sensors, self.by_range)
 
     @cached_property
     def views(self) -> Views:
         """What the sensors can see of tracks."""
-        return Views(self.sensors, self.filter.motion.position)
+        return Views(self.sensors, self.filter.motion.position, self.by_range)
 
     @cached_property
     def births(self) -> NewTracks:

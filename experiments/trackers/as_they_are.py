@@ -25,6 +25,7 @@ from assoc.metrics import Trajectories, gospa_over_time, identity
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Track, Tracker
 from assoc.tracking.adapting.clutter import ClutterMap
+from assoc.tracking.adapting.estimates import Estimates
 from experiments.common.claims import Claim
 from experiments.common.command import add_only, make_parser, run, whole
 from experiments.trackers.judging import CUTOFF, goal, mean_claim
@@ -124,7 +125,12 @@ def judge(name: str, case: Case, scene: Scene) -> Judged:
     """Run a tracker, or the oracle, over the scene of a case, as declared or as known."""
     if name.endswith("without views"):
         scene = untold_views(scene)
-    truth, tracks = Trajectories.from_scene(scene), through(make(name, scene, case.options), scene).tracks
+    if case.bands is not None and scene is case.known:
+        told = Estimates.declared(scene.sensors)._replace(bands=case.bands)
+        tracker: Any = Forgetful(make(ADAPTING, scene, case.options), {"estimates": told})
+    else:
+        tracker = make(name, scene, case.options)
+    truth, tracks = Trajectories.from_scene(scene), through(tracker, scene).tracks
     if case.level:
         truth, tracks = (Trajectories(one.times, one.ids, one.positions * [1, 1, 0]) for one in (truth, tracks))
     values, unit = gospa_over_time(truth, tracks, CUTOFF)[1], CUTOFF**2 / 2

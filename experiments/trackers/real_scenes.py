@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.views import BANDS
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.registration import register
 from assoc.scene import Scene, Truth
@@ -30,6 +31,8 @@ class Case(NamedTuple):
     declared: Its measurements and the sensors that trackers are told of.
     known: The same with sensors as they are; left out where there is nothing to be known.
     options: Of every tracker and the oracle.
+    bands: Detection probabilities by bands of range, (S, BANDS), of trackers that are told; left out where sensors
+        detect alike at all ranges.
     level: Whether tracks are judged by their horizontal places alone.
     """
 
@@ -37,6 +40,7 @@ class Case(NamedTuple):
     known: Scene | None = None
     options: Mapping[str, Any] = {}
     level: bool = False
+    bands: Array | None = None
 
 
 Make = Callable[[int], Case]
@@ -46,6 +50,28 @@ def short_radars(seed: int, detection_probability: float = 0.9) -> Case:
     """Six radars that reach 17 km each; all know it."""
     sensors = [_short(one, 17e3, detection_probability) for one in on_circle(np.zeros(3), 16e3, 6)]
     return Case(simulate(SEPARATE, seed, sensors=sensors))
+
+
+def farther_seen_less(seed: int) -> Case:
+    """Six radars that detect 95 % of what is near, half at 17 km; they are said to detect 90 % up to 40 km."""
+    told = [_short(one, 40e3, 0.9) for one in on_circle(np.zeros(3), 16e3, 6)]
+    full = simulate(SEPARATE, seed, sensors=[replace(one, detection_probability=_NEAR) for one in told])
+    assert full.truth is not None and full.truth.sources is not None
+    rng, middles = np.random.default_rng([seed, 1]), (np.arange(BANDS) + 0.5) * 40e3 / BANDS
+    kept = [
+        [(who < 0) | (rng.random(len(z)) * _NEAR < _at_range(z[:, 0])) for z, who in zip(*scan, strict=True)]
+        for scan in zip(full.measurements, full.truth.sources, strict=True)
+    ]
+    scene = replace(_left(full, kept), sensors=told)
+    return Case(scene, replace(scene), bands=np.tile(_at_range(middles), (len(told), 1)))
+
+
+_NEAR = 0.95
+
+
+def _at_range(away: Array) -> Array:
+    """Detection probabilities at distances, metres."""
+    return np.asarray(_NEAR / (1.0 + np.exp((away - 17e3) / 2e3)))
 
 
 def _short(place: Array, reach: float, detection_probability: float) -> Sensor:
@@ -69,7 +95,14 @@ def dark_band(seed: int) -> Case:
 def _without(scene: Scene, hidden: Sequence[Array]) -> Scene:
     """The scene without measurements of these targets, scan by scan."""
     assert scene.truth is not None and scene.truth.sources is not None
-    kept = [[~np.isin(one, gone) for one in scan] for scan, gone in zip(scene.truth.sources, hidden, strict=True)]
+    return _left(
+        scene, [[~np.isin(one, gone) for one in scan] for scan, gone in zip(scene.truth.sources, hidden, strict=True)]
+    )
+
+
+def _left(scene: Scene, kept: Sequence[Sequence[Array]]) -> Scene:
+    """The scene with these measurements alone, bool (n_s,) each."""
+    assert scene.truth is not None and scene.truth.sources is not None
 
     def left(arrays: Any) -> list[list[Array]]:
         return [[a[k] for a, k in zip(scan, keep, strict=True)] for scan, keep in zip(arrays, kept, strict=True)]
@@ -386,6 +419,7 @@ ROWS: dict[str, Row] = {
     "six radars of 17 km, P_d 0.6": Row(
         lambda seed: short_radars(seed, 0.6), without=("views",), goals={"gospa": 300.0}
     ),
+    "six radars, P_d falling with range": Row(farther_seen_less, without=("estimates",)),
     "ships, radar alone": Row(lambda seed: ships(seed, reports=False)),
     "ships, radar and AIS": Row(ships, without=("views",)),
     "three 2-D radars": Row(flat_radars, without=("heights",), goals={"gospa": 170.0}),

@@ -7,6 +7,7 @@ import pytest
 
 from assoc import simulation
 from assoc._files.npz import save_npz
+from assoc.costs.views import BANDS, bands_of
 from assoc.errors import AssocWarning, InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
@@ -101,6 +102,49 @@ def test_detection_probabilities_are_in_their_intervals(declared):
     assert sum(shares) >= 20
 
 
+def thinned(scene, share, beyond):
+    """The scene with this share of its detections beyond a range (m), and all nearer ones."""
+    rng = np.random.default_rng(1)
+    kept = [
+        [(z[:, 0] < beyond) | (rng.random(len(z)) < share) | (who < 0) for z, who in zip(*scan, strict=True)]
+        for scan in zip(scene.measurements, scene.truth.sources, strict=True)
+    ]
+    left = [[z[k] for z, k in zip(*scan, strict=True)] for scan in zip(scene.measurements, kept, strict=True)]
+    return Scene(scene.sensors, scene.times, left, scene.region)
+
+
+@sample("name", sorted(TRACKERS), every=3)
+def test_detection_probabilities_by_range_are_found_and_used(name):
+    tracker = tracked(thinned(scene_of(radars(), 1), 0.4, 40e3), radars(), name)
+    by_range = [(end, seen) for sensor in tracker.health.sensors for end, seen in sensor.by_range]
+    near, far = (
+        np.mean([seen.seen for end, seen in by_range if low < end < high]) for low, high in ((0, 34e3), (48e3, 1e6))
+    )
+    assert near > 0.75 and far < 0.5
+    assert sum("by range " in sensor.verdict for sensor in tracker.health.sensors) >= 2
+    assert in_use(tracker.settings, tracker.state.estimates).by_range.min() < 0.6
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_misses_and_detections_count_by_range(at_once):
+    scene = scene_of(radars(), 1, scans=8)
+    bands = np.repeat(np.linspace(0.9, 0.3, BANDS)[None], 3, axis=0)
+    scores = []
+    for told in (False, True):
+        tracker = tracked(scene, radars())
+        if told:
+            tracker.state = tracker.state._replace(estimates=tracker.state.estimates._replace(bands=bands))
+        before = {track.track_id: track.score for track in tracker.tracks}
+        measured, sectors = scene.measurements[-1], None if at_once else np.array([[-np.pi, np.pi]] * 3)
+        tracker.step(32.0, [z[:0] for z in measured], sectors=sectors)
+        scores.append([track.score - before[track.track_id] for track in tracker.tracks if track.confirmed])
+        assert len(scores[-1]) == TARGETS
+    where = np.array([track.position for track in tracker.tracks if track.confirmed])
+    missed = [np.log1p(-bands[s, bands_of(sensor, where)]) for s, sensor in enumerate(radars())]
+    np.testing.assert_allclose(scores[0], 3 * np.log(0.1), rtol=1e-9)
+    np.testing.assert_allclose(scores[1], np.sum(missed, axis=0), rtol=1e-9)
+
+
 def test_right_declarations_are_left_as_they_are():
     for seed in range(3):
         tracker = tracked(scene_of(radars(), seed), radars())
@@ -169,7 +213,15 @@ def test_a_restored_tracker_goes_on_identically(name, tmp_path):
 
 @pytest.mark.parametrize(
     "field, lie",
-    [("used", -1.0), ("used", np.nan), ("weights", -1.0), ("factors", 0.0), ("ids", 3), ("open_hits", np.inf)],
+    [
+        ("used", -1.0),
+        ("used", np.nan),
+        ("weights", -1.0),
+        ("factors", 0.0),
+        ("ids", 3),
+        ("open_hits", np.inf),
+        ("bands", 1.0),
+    ],
 )
 def test_estimates_that_lie_are_named(field, lie, tmp_path):
     tracker, path = tracked(scene_of(radars(), 6, scans=6), radars()), tmp_path / "bad.npz"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc.costs.views import Views, log_missed, share_in_view
+from assoc.costs.views import BANDS, Views, bands_of, log_missed, reach, share_in_view
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian
 from assoc.filters.imm import Mixture
 from assoc.filters.state import gaussian
@@ -93,12 +93,16 @@ def test_views_of_all_sensors_at_once_are_those_of_each():
     covariances = root @ root.transpose(0, 1, 3, 2)
     mixture = Mixture(means, covariances, rng.dirichlet([1.0, 1.0], 300))
     for states in (mixture, gaussian(means[:, 0].copy(), covariances[:, 0].copy()), mixture[:0]):
-        views = Views(sensors, (1, 3, 5))
+        views, by_range = Views(sensors, (1, 3, 5)), rng.uniform(0.3, 1.0, (len(sensors), BANDS))
+        uneven = Views(sensors, (1, 3, 5), by_range)
         where, spread = states.mean[:, [1, 3, 5]], states.covariance[:, [1, 3, 5]][:, :, [1, 3, 5]]
-        found, seen = views.shares(states), views.seen(states)
+        found, seen = views.shares(states), views.at_means(states) > 0.0
         for s, sensor in enumerate(sensors):
             np.testing.assert_allclose(found[:, s], share_in_view(sensor, where, spread), rtol=1e-9, atol=1e-12)
             np.testing.assert_array_equal(views.shares(states, slice(s, s + 1))[:, 0], found[:, s])
+            relative = by_range[s, bands_of(sensor, where)] if reach(sensor) else 1.0
+            np.testing.assert_allclose(uneven.shares(states)[:, s], found[:, s] * relative, rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(uneven.at_means(states)[:, s], seen[:, s] * relative, rtol=1e-9)
             part = sensor.position_part
             np.testing.assert_array_equal(seen[:, s], part.in_view(part.measure(where)))
 

@@ -20,7 +20,7 @@ from assoc._types import Array
 from assoc.costs.tracks.gating import angular_components, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import gate_of, require_states
-from assoc.costs.views import log_missed, places_of, share_in_view
+from assoc.costs.views import bands_of, log_missed, places_of, share_in_view
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
@@ -246,6 +246,8 @@ class TimedScan:
         result = np.empty((len(points), len(self.sensors)))
         for s, sensor in enumerate(self.sensors):
             share = share_in_view(sensor, points, spreads, None if self.sectors is None else self.sectors[s])
+            if terms.by_range is not None:
+                share = share * terms.by_range[s, bands_of(sensor, points)]
             # a sensor covers its own measurements, in spite of rounding
             share[self.offsets[s] : self.offsets[s + 1]] = 1.0
             result[:, s] = log_missed(terms.miss[s], share)

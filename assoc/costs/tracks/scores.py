@@ -40,9 +40,12 @@ class ScoreTerms(NamedTuple):
     birth: Array
     """ln(P_D / beta_FA) - 1/2 ln det(2 pi R) of the components that depend on the position, (S,): with `log_birth` of
     the position's covariance the score of a single measurement as a new target."""
+    by_range: Array | None = None
+    """P_D in each band of range over the sensor's, (S, B), at most 1; None: the same everywhere. See
+    `assoc.costs.views`."""
 
 
-def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
+def score_terms(sensors: Sequence[Sensor], by_range: Array | None = None) -> ScoreTerms:
     """Terms of the score."""
     P = np.array([sensor.detection_probability for sensor in sensors])
     density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in sensors])
@@ -50,7 +53,7 @@ def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
     located = [sensor.position_part for sensor in sensors]
     there = np.array([part.false_alarm_rate / part.volume for part in located])
     spread = np.array([np.linalg.slogdet(2.0 * math.pi * part.covariance)[1] for part in located])
-    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread)
+    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread, by_range)
 
 
 def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:

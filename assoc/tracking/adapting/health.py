@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
@@ -55,6 +56,9 @@ class SensorHealth:
     noise : Quantity
         Standard deviations relative to those declared.
     detection_probability, false_alarm_rate : Quantity
+    by_range : tuple of (float, Quantity)
+        Ends of bands of range (m) with targets in them, and the detection probability there; declared is what was seen
+        at all ranges.
     verdict : str
     """
 
@@ -62,6 +66,7 @@ class SensorHealth:
     noise: Quantity
     detection_probability: Quantity
     false_alarm_rate: Quantity
+    by_range: tuple[tuple[float, Quantity], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -70,9 +75,14 @@ class SensorHealth:
         found = [
             *([f"noise about {_times(noise.seen)} the declared"] if noise.differs else []),
             *([f"detects {seen.seen:.0%} of targets, declared {seen.declared:.0%}"] if seen.differs else []),
+            *([self._ranges] if any(one.differs for _, one in self.by_range) else []),
             *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
         ]
         return "; ".join(found) or "as declared"
+
+    @property
+    def _ranges(self) -> str:
+        return "by range " + ", ".join(f"{one.seen:.0%} up to {end / 1e3:.3g} km" for end, one in self.by_range)
 
 
 @dataclass(frozen=True)
@@ -122,11 +132,17 @@ def _times(factor: float) -> str:
 def health(sensors: Sequence[Sensor], estimates: Estimates) -> Health:
     """Compare estimates with what was declared of these sensors."""
     values, spreads = estimates.found(sensors)
-    declared = declared_values(sensors)
+    declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
-    for s, sensor in enumerate(sensors):
-        quantities = [_quantity(declared[s, c], values[s, c], spreads[s, c], c) for c in (NOISE, DETECTION, ALARMS)]
-        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", *quantities))
+    for s, (sensor, (seen, unsure)) in enumerate(zip(sensors, by_range, strict=True)):
+        noise, P, alarms = (
+            _quantity(declared[s, c], values[s, c], spreads[s, c], c) for c in (NOISE, DETECTION, ALARMS)
+        )
+        bands = [
+            ((b + 1) * reach(sensor) / BANDS, _quantity(values[s, DETECTION], seen[b], unsure[b], DETECTION))
+            for b in (np.flatnonzero(estimates.dwells[s] >= 1.0).tolist() if reach(sensor) else ())
+        ]
+        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands)))
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
     return Health(tuple(rows), manoeuvres)
 

@@ -14,25 +14,36 @@ from assoc.filters import ExtendedKalmanFilter, InteractingMultipleModel, Kalman
 from assoc.filters.base import Filter
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
-from assoc.tracking.adapting.estimates import Estimates
+from assoc.tracking.adapting.estimates import DETECTION, Estimates
 from assoc.tracking.settings import TrackerSettings
 
+# a band detects at least this share of what the best one does: tracks of false alarms wait long where misses say little
+_LEAST = 0.25
 _SCALABLE = (ExtendedKalmanFilter, KalmanFilter, ModifiedEKF)
 
 
 def in_use(settings: TrackerSettings, estimates: Estimates) -> TrackerSettings:
     """The settings by the estimates in use; the same object while nothing has changed."""
     declared = Estimates.declared(settings.sensors)
-    if estimates.manoeuvres == 1.0 and np.array_equal(estimates.used, declared.used):
+    used, bands = estimates.used, estimates.bands
+    alike = np.array_equal(bands, np.broadcast_to(used[:, DETECTION, None], bands.shape))
+    if estimates.manoeuvres == 1.0 and alike and np.array_equal(used, declared.used):
         return settings
-    return _with(settings, tuple(estimates.used.ravel().tolist()), estimates.manoeuvres)
+    return _with(settings, used.tobytes(), None if alike else bands.tobytes(), estimates.manoeuvres)
 
 
 @lru_cache(maxsize=16)
-def _with(settings: TrackerSettings, used: tuple[float, ...], manoeuvres: float) -> TrackerSettings:
-    sensors = [_seen(*both) for both in zip(settings.sensors, np.reshape(used, (-1, 3)).tolist(), strict=True)]
+def _with(settings: TrackerSettings, used: bytes, bands: bytes | None, manoeuvres: float) -> TrackerSettings:
+    values, by_range = np.frombuffer(used).reshape(-1, 3).copy(), None
+    if bands is not None:
+        by_range = np.frombuffer(bands).reshape(len(values), -1)
+        # the sensor's is the largest, so that each band detects a share of it
+        values[:, DETECTION] = by_range.max(axis=1)
+        by_range = np.maximum(by_range / values[:, DETECTION, None], _LEAST)
+    sensors = [_seen(*both) for both in zip(settings.sensors, values.tolist(), strict=True)]
     nursery = settings.nursery
     changed: dict[str, Any] = {"place": _place(sensors, settings.place), "filter": noisier(settings.filter, manoeuvres)}
+    changed["by_range"] = by_range
     if nursery is not None:
         nursery = replace(nursery, **changed)
     # registration goes on with the sensors as declared

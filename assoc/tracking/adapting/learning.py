@@ -10,6 +10,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.gating import angular_components, near_pairs
 from assoc.costs.tracks.tuples import gate_of
+from assoc.costs.views import bands_of, bands_of_measured, places_of
 from assoc.filters.base import Expected, predict_each
 from assoc.filters.imm import Mixture
 from assoc.scene.own_times import FULL_TURN
@@ -33,7 +34,12 @@ def use_estimates(progress: Progress) -> Progress:
     densities = clutter.densities(progress.settings.sensors, progress.scan)
     shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
     densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
-    return progress._replace(settings=settings, scan=replace(progress.scan, clutter=densities))
+    dense = tuple(found > 0.0 for found in densities)
+    if settings.by_range is not None:
+        bands = map(bands_of_measured, progress.settings.sensors, progress.scan.measurements)
+        seen = zip(densities, settings.by_range, bands, strict=True)
+        densities = tuple(found - np.log(share[band]) for found, share, band in seen)
+    return progress._replace(settings=settings, scan=replace(progress.scan, clutter=densities), dense=dense)
 
 
 def remember_tracks(progress: Progress) -> Progress:
@@ -55,17 +61,19 @@ def learn(progress: Progress) -> Progress:
     if len(tracks):
         _seek(progress, late, rows, looks)
     # tracks in dense clutter say little about sensors
-    plain = progress.scan.crowding(rows) == 0.0
+    plain = ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
     hits = (rows > 0) & plain[:, None]
     looks = hits | (looks & plain[:, None])
-    turns, crowds = _turns(progress), progress.scan.clutter or ()
+    turns = _turns(progress)
     # where false alarms are dense they are no part of the usual ones
-    usual = zip(step.confirmed, crowds, strict=True)
-    alarms = np.array([np.count_nonzero(~taken & (crowd == 0.0)) for taken, crowd in usual])
+    usual = zip(step.confirmed, progress.dense, strict=True)
+    alarms = np.array([np.count_nonzero(~taken & ~dense) for taken, dense in usual])
     # before tracks are confirmed, targets look like false alarms
     if state.scan >= 3:
         estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
-    estimates = estimates.counted(tracks.track_id, looks, hits)
+    where = places_of(settings.filter, late.states)[0]
+    bands = np.stack([bands_of(sensor, where) for sensor in settings.sensors], axis=1)
+    estimates = estimates.counted(tracks.track_id, looks, hits, bands)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
     if len(fresh):
         estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))

@@ -69,7 +69,9 @@ class NewTracks:
         # a target that first appears at a sensor was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
         self._blind = blind_somewhere(place.sensors, place.region)
-        self._views = Views(place.sensors, (0, 1, 2))
+        # those that miss less of some targets than of others; `problem` makes candidates as if only blind ones did
+        self._uneven = self._blind if terms.by_range is None else self._blind | (terms.by_range < 1.0).any(axis=1)
+        self._views = Views(place.sensors, (0, 1, 2), terms.by_range)
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
@@ -100,7 +102,7 @@ class NewTracks:
         as dense at each measurement as they are there.
         """
         problem = build_problem(self._place, scan, speed=self._initiation.speed, blind=self._blind, **self._limits)
-        views = self._blind.any() and scan.at_once
+        views = self._uneven.any() and scan.at_once
         if not views and scan.clutter is None:
             return problem
         costs = problem.costs + scan.crowding(problem.tuples)
@@ -111,7 +113,7 @@ class NewTracks:
     def overlooked(self, rows: Array, positions: Array, covariances: Array) -> Array:
         """What equation 5 counts too much for misses of sensors that cannot see tuples (K, S), (K,)."""
         total = np.zeros(len(rows))
-        for s in np.flatnonzero(self._blind).tolist():
+        for s in np.flatnonzero(self._uneven).tolist():
             here = np.flatnonzero(rows[:, s] == 0)
             if not len(here):
                 continue
@@ -133,7 +135,7 @@ class NewTracks:
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
         scores = self._appears[s] + self._log_birth(covariances)
-        if self._blind[:s].any():
+        if self._uneven[:s].any():
             later = np.broadcast_to(np.arange(len(self._blind)) >= s, (len(positions), len(self._blind)))
             scores += self.overlooked(later, positions, covariances)
         scores = scores - scan.crowd(s, numbers[fit])

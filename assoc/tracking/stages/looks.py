@@ -58,7 +58,7 @@ def _inside(settings: TrackerSettings, states: Any) -> Array:
 
 def in_view(progress: Progress, states: Any) -> Array:
     """Which tracks are in which sensors' fields of view by their means, bool (T, S)."""
-    return progress.settings.views.seen(states)
+    return np.asarray(progress.settings.views.at_means(states) > 0.0)
 
 
 def detected_or_in_view(progress: Progress, states: Any, detected: Array) -> Array:
@@ -94,7 +94,9 @@ def misses_of(progress: Progress, states: Any, s: int) -> Array:
 
 def looked(progress: Progress, misses: Array) -> Array:
     """Whether any sensor looked at tracks, by their scores of a miss (T, S); bool (T,)."""
-    return np.asarray((misses <= log_missed(progress.settings.terms.miss, np.array(_LOOKED))).any(axis=1))
+    terms = progress.settings.terms
+    least = _LOOKED * (np.array(1.0) if terms.by_range is None else terms.by_range.min(axis=1))
+    return np.asarray((misses <= log_missed(terms.miss, least)).any(axis=1))
 
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
@@ -108,12 +110,16 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
     patience, rows = np.full(len(tracks), np.inf), np.flatnonzero(tracks.last_detection < time)
     if len(rows):
         states = tracks.states[rows]
-        seen = in_view(progress, states)
-        dark = np.flatnonzero(~seen.any(axis=1))
+        share = settings.views.at_means(states)
+        if settings.by_range is not None:
+            # where little is detected, tracks of false alarms would wait long for a second detection
+            usual = np.maximum(share, settings.by_range.mean(axis=1))
+            share = np.where(tracks.confirmed[rows, None] | (share == 0.0), share, usual)
+        dark = np.flatnonzero(~share.any(axis=1))
         if len(dark):
             # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
-            seen[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark]))[:, None]
-        miss = np.where(seen, settings.terms.miss, 0.0) * (state.turns / most)
+            share[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark]))[:, None]
+        miss = log_missed(settings.terms.miss, share) * (state.turns / most)
         patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
     gone = tracks.to_delete(settings.life_cycle, time, patience)
     # out of view for so long that nobody knows where it is
