@@ -1,1 +1,1 @@
-"""Adapters to other people's frameworks, one a folder; each asks for its extra when it is imported."""
+"""Adapters to other people's frameworks, one a file or folder; each asks for its extra when it is imported."""

@@ -39,6 +39,7 @@ _PURPOSES = {
     "report": "`assoc[report]`",
     "parquet": "`assoc[parquet]`",
     "asterix": "`assoc[asterix]`",
+    "motile": "`assoc[motile]`",
     "bench": "`assoc[bench]`, comparisons",
     "peers": "`assoc[peers]`, comparisons",
     "docs": "pages",
