@@ -72,7 +72,7 @@ class SystemTracks(NamedTuple):
         own = np.concatenate([np.array(motion.position), velocity_components(motion)]).astype(np.int64)
         axes = len(motion.position)
         place = np.concatenate([np.arange(axes), 3 + np.arange(len(own) - axes)])
-        mean, covariance = _open(len(tracks))
+        mean, covariance = open_states(len(tracks))
         for row, track in enumerate(tracks):
             mean[row, place] = track.mean[own]
             covariance[row, place[:, None], place] = track.covariance[own[:, None], own]
@@ -82,7 +82,7 @@ class SystemTracks(NamedTuple):
     @staticmethod
     def of_rows(rows: pd.DataFrame, sigma: float, sigma_velocity: float) -> SystemTracks:
         """Those of rows of a table; values that are missing are open, standard deviations that are missing as given."""
-        mean, covariance = _open(len(rows))
+        mean, covariance = open_states(len(rows))
         values = rows[list(_CSV[2:])].to_numpy(dtype=np.float64)
         sigmas = np.full(values.shape, sigma_velocity)
         sigmas[:, :3] = rows.reindex(columns=["sigma_x", "sigma_y", "sigma_z"]).fillna(sigma).to_numpy(dtype=np.float64)
@@ -109,8 +109,8 @@ class SystemTracks(NamedTuple):
         return self._replace(mean=mean, covariance=F @ self.covariance @ F.transpose(0, 2, 1) + noise**2 * Q)
 
 
-def _open(count: int) -> tuple[Array, Array]:
-    """Means and covariances of tracks of which nothing is known but that they are near the plane z = 0."""
+def open_states(count: int) -> tuple[Array, Array]:
+    """Means (n, 6) and covariances of tracks of which nothing is known but that they are near the plane z = 0."""
     covariance = np.zeros((count, 6, 6))
     covariance[:] = np.diag([0.0, 0.0, _OPEN_HEIGHT, *[_OPEN_VELOCITY] * 3]) ** 2
     return np.zeros((count, 6)), covariance
@@ -204,9 +204,14 @@ class TrackFusion:
         self.systems, self.solver = int(systems), solver
         self.parameters = FusionParameters() if parameters is None else parameters
         nothing = np.zeros(0, dtype=np.int64)
-        state = SystemTracks(nothing, *_open(0), np.zeros(0))
+        state = SystemTracks(nothing, *open_states(0), np.zeros(0))
         self._known = _Known(nothing, np.zeros((0, self.systems), np.int64), state, np.zeros(0), np.zeros(0), nothing)
         self._time, self._next_id = -np.inf, 1
+
+    @property
+    def ids(self) -> Array:
+        """Ids of the fused tracks that are there, or may come back."""
+        return self._known.ids
 
     def step(self, time: float, tracks: Sequence[SystemTracks]) -> FusedPicture:
         """Fuse the tracks that the systems have at this time.

@@ -71,6 +71,20 @@ def fusion_in_stone_soup() -> str:
     return table(head, rows)
 
 
+def in_stone_soup() -> str:
+    """Every way to track of the examples of docs/stonesoup."""
+    r = Results("trackers.in_stone_soup")
+    rows, before = [], ""
+    for start in labels(r, ": GOSPA"):
+        name, _, way = start.partition(", ")
+        less, time = f"{start}: GOSPA less the first's", r[f"{start}: CPU time of a scan"]
+        shown = "" if name == before else f"`{name}.py`"
+        rows.append([shown, way, mean(r[f"{start}: GOSPA"]), mean(r[less]) if less in r else "", number(time.ours, 2)])
+        before = name
+    head = ["example", "way to track", "GOSPA, m", "less the first's, m", "CPU time of a scan, ms"]
+    return table(head, rows, lambda column: column > 1)
+
+
 def close_targets() -> str:
     """GOSPA and identity switches of every tracker where association is hard."""
     r = Results("trackers.close_targets")
@@ -234,4 +248,5 @@ TABLES = {
     "goals": goals,
     "biases": registration,
     "fusion": fusion_in_stone_soup,
+    "in-stone-soup": in_stone_soup,
 }

@@ -6,7 +6,9 @@ import pytest
 pytest.importorskip("stonesoup")
 
 from experiments.common.claims import load_json
+from experiments.common.results import Results
 from experiments.trackers import fusion_in_stone_soup as fusion
+from experiments.trackers import in_stone_soup
 
 
 @pytest.fixture
@@ -43,3 +45,17 @@ def test_same_seed_same_scene(small):
         return [sorted(np.asarray(d.state_vector, float).ravel().tolist() for d in found) for _, found in stream]
 
     assert vectors(4) == vectors(4) != vectors(5)
+
+
+def test_the_examples_are_measured_as_they_are_printed():
+    """Each way of each script has its GOSPA and time in the result file, and one of them is measured here."""
+    results = Results("trackers.in_stone_soup")
+    for name in in_stone_soup.EXAMPLES:
+        ways = [way for way, *_ in in_stone_soup.example(name).ways(0)]
+        for k, way in enumerate(ways):
+            assert f"{name}, {way}: CPU time of a scan" in results
+            assert (f"{name}, {way}: GOSPA less the first's" in results) == (k > 0)
+    known = {("Stone Soup's GNN", 0): (1.0, 2.0)}
+    (first, second) = in_stone_soup.measured("fusion", [0], known)
+    assert first == ("Stone Soup's GNN", pytest.approx(np.array([[1.0, 2.0]])))
+    assert second[0] == "fused" and 50.0 < second[1][0, 0] < 500.0

@@ -17,16 +17,22 @@ from assoc.integrations.stonesoup.fusion import FusionFeeder
 from assoc.integrations.stonesoup.initiator import AssignmentInitiator
 from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing, measurement_model
 from assoc.integrations.stonesoup.readers import SceneDetectionReader, SceneGroundTruthReader
+from assoc.integrations.stonesoup.registration import RegistrationFeeder
 from assoc.integrations.stonesoup.scenes import scene_from_detections
+from assoc.integrations.stonesoup.track_fusion import TrackFusionTracker
+from assoc.integrations.stonesoup.tracker import AssocTracker
 
 __all__ = [
     "AdaptedSensor",
     "AssignmentAssociator",
     "AssignmentInitiator",
+    "AssocTracker",
     "CartesianToSlantRangeBearing",
     "FusionFeeder",
+    "RegistrationFeeder",
     "SceneDetectionReader",
     "SceneGroundTruthReader",
+    "TrackFusionTracker",
     "adapt",
     "measurement_model",
     "scene_from_detections",

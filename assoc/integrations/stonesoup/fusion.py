@@ -68,9 +68,9 @@ class FusionFeeder(DetectionFeeder):  # type: ignore[misc]
     def data_gen(self) -> Iterator[tuple[datetime, OrderedSet[Detection]]]:
         """Yield the time and the fused detections of each scan."""
         zero: datetime | None = None
-        for k, (time, found) in enumerate(by_time(self.reader)):
+        for k, (time, sets) in enumerate(by_time(self.reader)):
             zero = zero or time
-            parts = self._frame.split(sorted_detections(found))
+            parts = self._frame.split(sorted_detections(d for found in sets for d in found))
             scan = Scan(k, (time - zero).total_seconds(), self._frame.measurements(parts))
             self.association = self._plan.associate(self._scene, scan)
             yield time, OrderedSet(_fused(self._frame, parts, self.association, time))

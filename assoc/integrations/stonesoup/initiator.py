@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 from stonesoup.hypothesiser.mfa import MFAHypothesiser
@@ -24,8 +25,16 @@ class AssignmentInitiator(MultiMeasurementInitiator):  # type: ignore[misc]
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         if not isinstance(self.data_associator, AssignmentAssociator):
-            hypothesiser = self.data_associator.hypothesiser
-            # it hypothesises on mixtures, and tentative tracks are not yet mixtures
-            if isinstance(hypothesiser, MFAHypothesiser):
-                hypothesiser = hypothesiser.hypothesiser
-            self.data_associator = AssignmentAssociator(hypothesiser)
+            self.data_associator = AssignmentAssociator(_of_one_state(self.data_associator.hypothesiser))
+
+
+def _of_one_state(hypothesiser: Any) -> Any:
+    """The hypothesiser, and those that it wraps, without the one of mixtures: tentative tracks are not yet mixtures."""
+    inner = getattr(hypothesiser, "hypothesiser", None)
+    if inner is None:
+        return hypothesiser
+    if isinstance(hypothesiser, MFAHypothesiser):
+        return _of_one_state(inner)
+    outer = copy(hypothesiser)
+    outer.hypothesiser = _of_one_state(inner)
+    return outer

@@ -62,9 +62,9 @@ def scene_from_detections(
     """
     frame = make_frame(sensors)
     moments, scans = [], []
-    for time, found in by_time(detections):
+    for time, sets in by_time(detections):
         moments.append(time)
-        scans.append(frame.split(sorted_detections(found)))
+        scans.append(frame.split(sorted_detections(d for found in sets for d in found)))
     if not scans:
         raise InvalidInputError("detections: the reader yielded none, expected at least one scan")
     zero = moments[0] if start is None else start
@@ -91,14 +91,20 @@ def _own_times(
     return [[np.array([(stamp - zero).total_seconds() for stamp in part]) for part in parts] for parts in stamps]
 
 
-def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[Any]]]:
-    """Join sets of the same time."""
-    previous: datetime | None = None
+def in_sets(detections: Iterable[tuple[datetime, Any]]) -> Iterator[tuple[datetime, list[Any]]]:
+    """Sets of detections that follow each other and have the same time."""
     for time, group in groupby(detections, key=lambda pair: pair[0]):
+        yield time, [found for _, found in group]
+
+
+def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[list[Any]]]]:
+    """The same in order of time."""
+    previous: datetime | None = None
+    for time, sets in in_sets(detections):
         if previous is not None and time < previous:
             raise InvalidInputError(f"detections: time {time} comes after {previous}, expected increasing times")
         previous = time
-        yield time, [detection for _, found in group for detection in found]
+        yield time, [list(found) for found in sets]
 
 
 def region_of(frame: Frame, region: ArrayLike | None) -> Array:
