@@ -14,7 +14,7 @@ import numpy as np
 from experiments.common.claims import Claim
 from experiments.common.command import main
 
-EXTRAS = ("plot", "report", "parquet", "stonesoup", "asterix", "dask", "tune")
+EXTRAS = ("plot", "report", "parquet", "stonesoup", "asterix", "motile", "dask", "tune")
 
 
 def brought(needs: list[str]) -> set[str]:

@@ -332,6 +332,7 @@ def extras() -> str:
         "parquet": "Parquet files by pyarrow",
         "stonesoup": f"the adapter for Stone Soup, which itself takes {alone} MB",
         "asterix": "ASTERIX recordings",
+        "motile": "motile's problems by our solvers; most of it is motile's own solver, SCIP",
         "dask": "parameter studies on a cluster",
         "tune": "tuning of parameters by optuna",
     }
