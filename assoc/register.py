@@ -8,12 +8,12 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
 from assoc._cli.options import COMMON, Given, Option, Parser, verbosity
 from assoc._cli.program import Program, command, write_all
 from assoc._cli.signals import EarlyEnd
-from assoc._cli.table import print_table
 from assoc._cli.values import Output, degrees, html_page, listed, number, text
 from assoc._files.output import STDOUT, is_stream
 from assoc._text.plain import printable
@@ -100,15 +100,7 @@ def parser() -> Parser:
 
 
 def _print(found: Registration, output: str, elapsed: float) -> None:
-    rows = [
-        [row["sensor"], row["component"], f"{row['bias']:.4g}", f"{row['sigma']:.2g}", row["unit"]]
-        + ["yes" if row["observed"] else "no"]
-        for row in found.rows()
-    ]
-    headers = ["sensor", "component", "bias", "sigma", "unit", "observed"]
-    print_table(headers, rows, keys=2, left=("sensor", "component", "unit"))
-    print()
-    print_lines(found.summary())
+    print_biases(found)
     print_lines(f"{printable(output)}: written; {elapsed:.2f} s")
 
 

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
 from assoc._cli.options import Given, Parser, flag_of
@@ -146,17 +147,15 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     """Track the radars of a description."""
     from assoc._cli.track.radars_file import read_radars
     from assoc.tracking import smoothed, track_scene
-    from assoc.tracking.smoothing import check_smoothable
 
     given.check_use((*OF_SCENES, *OF_PLOTS), input="radars")
     if given["origin"] is not None:
         raise InvalidInputError(f"--origin: {file} says where the radars stand")
     given["filter"] = given["filter"] or "imm-cv"
-    settings |= given.some(("registration",))
-    if given["smooth"]:
-        check_smoothable(corrects="registration" in settings)
+    if given["registration"] == "online":
+        raise InvalidInputError("--registration: online needs scans of one instant; take first")
     found = read_radars(file)
-    scene, scans = found.scene, range(found.scene.num_scans)
+    scene, scans = _registered(found.scene, given, settings), range(found.scene.num_scans)
     known = None if given["identity"] == "ignore" else found.identities
     tracker = make_tracker(
         given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, min(found.turns)
@@ -179,17 +178,14 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
-    from assoc.tracking.smoothing import check_smoothable
 
     given.check_use((*OF_SCENES, *OF_PLOTS), input="scenes")
     given["filter"] = given["filter"] or "imm-cv"
-    settings |= given.some(("registration",))
     scene = Scene.load(file)
     scene.check_platforms(file)
     if given["cutoff"] is not None and scene.truth is None:
         raise InvalidInputError(f"--cutoff: {file} has no truth with which tracks are compared")
-    if given["smooth"]:
-        check_smoothable(corrects="registration" in settings)
+    scene = _registered(scene, given, settings)
     if given["origin"] is not None:
         scene = replace(scene, origin=given["origin"])
     elif given["map"] and scene.origin is None:
@@ -207,6 +203,21 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         tracks = smoothed(tracker, scene, decisions)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
     return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
+
+
+def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
+    """The scene without the biases of its sensors, if they are to be found first."""
+    from assoc.registration import register
+    from assoc.tracking.smoothing import check_smoothable
+
+    if given["registration"] != "first":
+        settings |= given.some(("registration",))
+        if given["smooth"]:
+            check_smoothable(corrects="registration" in settings)
+        return scene
+    found = register(scene, components=("range", "azimuth", "elevation", "gain"), seed=settings.get("seed", 0))
+    print_biases(found)
+    return found.correct(scene)
 
 
 def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:

@@ -97,6 +97,32 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
     capsys.readouterr()
 
 
+def test_a_reference_trajectory_from_radar_files(tmp_path, capsys):
+    """One command: biases and gains taken off, tracks smoothed, accuracies, in both formats."""
+    asterix = pytest.importorskip("assoc.integrations.asterix")
+    pytest.importorskip("asterix")
+    file, out, sent = described(tmp_path), tmp_path / "reference.csv", tmp_path / "reference.ast"
+    north = pd.read_csv(tmp_path / "north.csv")
+    north["rho_m"], north["theta"] = 1.002 * north["rho_m"] + 250.0, (north["theta"] + 0.3) % 360
+    north.to_csv(tmp_path / "north.csv", index=False)
+    words = [file, "-o", str(out), "--asterix", str(sent), "--smooth"]
+    assert track.main([*words, "--registration", "online"]) == 2
+    assert "--registration: online needs scans of one instant; take first" in capsys.readouterr().err
+    errors = {}
+    for more in ((), ("--registration", "first")):
+        assert track.main([*words, *more]) == 0
+        found = pd.read_csv(out, dtype={"target": str})
+        own = found[(found.target == f"{CODES[0]:04o}") & (found.time > 1626098400 + 30)]
+        lat, lon, _ = place_of(0, own.time.to_numpy() - 1626098400)
+        error = np.stack([np.cos(np.radians(own.latitude)) * (own.longitude - lon), own.latitude - lat]) * 111_250
+        errors[more] = np.sqrt((error**2).sum(axis=0).mean())
+    said = capsys.readouterr().out
+    assert re.search(r"north +gain +\S+ +\S+ +m/km", said) and "no height" not in said
+    assert errors["--registration", "first"] < 0.5 * errors[()]
+    sent = asterix.read_tracks(sent)
+    assert len(sent) == len(found) and {"sigma_x", "sigma_y", "latitude", "barometric", "mode3_oct"} <= {*sent}
+
+
 def test_azimuths_in_the_frame_of_another_place():
     """A radar's vertical is another one than the frame's: of high aircraft that turns azimuths, too."""
     rng, origin = np.random.default_rng(3), (np.radians(47.5), np.radians(8.0), 450.0)
