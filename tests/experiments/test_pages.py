@@ -20,13 +20,13 @@ BY_HAND = ("choosing", "dependencies", "registration")
 FIXED = {
     "choosing": "0.5 0.7 0.87 0.95 0.98 1 2 12 87 100 128 300 4096",
     "concepts": "0.99 0.999 01 1 2",
-    "dependencies": "3.11 64",
+    "dependencies": "3.11 64 430",
     "probabilities": "0 0.02 1 12 80",
     "tracking_measured": "0 0.6 1 2 5 10 15 20 30 80 219 400 500",
     "which_solver": "0.001",
 }
 """Numbers that are no measurements, on pages of which every part is tested: those of definitions and formulas, of
-units and dates, defaults of options, what we advise and the examples of it."""
+units and dates, goals, defaults of options, what we advise and the examples of it."""
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NAMES = {*programs()}
