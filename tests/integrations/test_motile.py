@@ -11,7 +11,8 @@ import motile
 import networkx
 from motile import constraints, costs
 
-from assoc.integrations.motile import problem_of, solve
+from assoc.integrations.motile import problem_of, solve, values_of
+from assoc.ranking.kbest import kbest
 
 
 def tracking(seed, children=1, appear=True, points=12, frames=4):
@@ -59,6 +60,9 @@ def test_any_solver_and_its_bound():
     best = problem_of(solver), solve(solver).get_value()
     greedy = solve(solver, "greedy", time_limit=10.0)
     assert greedy.get_value() >= best[1] - 1e-9 >= greedy.native_status.lower_bound - 1e-6
+    second = kbest(best[0], 2)[1]
+    values = values_of(solver, second)
+    assert best[1] < second.cost == pytest.approx(float(values @ solver.costs), abs=1e-4)
     assert best[0].num_sensors == 2 and best[0].sizes.tolist() == [len(solver.graph.nodes)] * 2
 
 
