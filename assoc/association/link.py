@@ -17,6 +17,7 @@ from assoc.sensors.arrays import finite_array
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 
+_INCLUSIVE = 1e-9  # by what share a step of just the search range is worth a link
 _BYTES = 400.0  # of each candidate pair while its problem is built and solved
 
 
@@ -95,7 +96,7 @@ def _candidates(points: list[Array], reach: float, memory: int) -> tuple[Array, 
             memory_left.require(_BYTES * count, f"{count} pairs within search_range", "lower it, or memory")
             found = tree.sparse_distance_matrix(trees[later], reach, output_type="ndarray")
             pairs.append(np.column_stack([found["i"] + first[k], found["j"] + first[later]]))
-            costs.append(found["v"] ** 2 - reach**2)
+            costs.append(found["v"] ** 2 - (1.0 + _INCLUSIVE) * reach**2)
     joined, cost = np.concatenate(pairs), np.concatenate(costs)
     saves = cost < 0
     return joined[saves], cost[saves]

@@ -43,6 +43,13 @@ def test_particles_keep_their_numbers_where_one_is_missing():
     assert len(set(np.concatenate(assoc.link(frames, 1.0).ids))) == 3 + 4
 
 
+def test_a_step_as_long_as_the_search_range_is_a_link():
+    """As by trackpy: points on whole pixels often move by just so much."""
+    frames = np.array([[[0.0, 0.0], [50.0, 0.0]], [[3.0, 4.0], [50.0, 5.0]], [[3.0, 9.0], [46.0, 8.0]]])
+    assert [ids.tolist() for ids in assoc.link(frames, 5.0).ids] == [[0, 1]] * 3
+    assert len(set(np.concatenate(assoc.link(frames, 4.999).ids))) == 6
+
+
 def test_nothing_to_link():
     assert assoc.link([], 1.0).ids == []
     assert [list(ids) for ids in assoc.link([[], [[1.0, 2.0]], []], 1.0).ids] == [[], [0], []]
