@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,11 @@ VERSION = 1
 _MAX_DENSE_ELEMENTS = 200_000_000
 # a measurement needs a singleton of S indices, a cost and a name: half a gigabyte in all
 _MAX_SINGLETON_NUMBERS = 64_000_000
+_DENSE = (np.ndarray, list, tuple)
+_FROM_DENSE = (
+    "AssignmentProblem.from_dense(costs, dummy=False) takes a matrix as scipy's linear_sum_assignment does, "
+    "from_dense(costs) one whose row 0 and column 0 are the costs of leaving a measurement alone"
+)
 # larger sums of costs could overflow in a solver
 _MAX_TOTAL_COST = 1e300
 
@@ -373,12 +378,27 @@ def check_problem(problem: object) -> None:
     if isinstance(problem, AssignmentProblem):
         return
     line = f"problem: expected an AssignmentProblem, got {type(problem).__name__}"
-    if isinstance(problem, (np.ndarray, list, tuple)):
-        line += (
-            "; AssignmentProblem.from_dense(costs, dummy=False) takes a matrix as scipy's linear_sum_assignment does, "
-            "from_dense(costs) one whose row 0 and column 0 are the costs of leaving a measurement alone"
-        )
+    if isinstance(problem, _DENSE):
+        line += f"; {_FROM_DENSE}"
     raise InvalidInputError(line)
+
+
+def taken_problem(problem: object) -> AssignmentProblem:
+    """A problem as it is, and an array of costs as scipy takes it, with a warning that says so."""
+    if isinstance(problem, _DENSE):
+        costs = _numbers(problem, "problem")
+        if costs.ndim < 2:
+            found = f"an array of shape {costs.shape}"
+            raise InvalidInputError(
+                f"problem: expected an AssignmentProblem or costs of two or more dimensions, got {found}"
+            )
+        warn(
+            f"problem: an array of shape {costs.shape} is taken as by scipy's linear_sum_assignment, without dummies; "
+            f"{_FROM_DENSE}"
+        )
+        return AssignmentProblem.from_dense(costs, dummy=False)
+    check_problem(problem)
+    return cast(AssignmentProblem, problem)
 
 
 def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:

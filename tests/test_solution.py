@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 import assoc
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import AssocWarning, InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
@@ -106,14 +106,22 @@ def test_assign_refuses(arguments, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("shape", [(4, 4), (3, 5)])
-def test_assign_says_how_a_matrix_is_taken_as_by_scipy(shape):
+@pytest.mark.parametrize("shape", [(4, 4), (3, 5), (5, 3)])
+def test_assign_says_that_it_takes_a_matrix_as_scipy_does(shape):
     costs = np.random.default_rng(0).normal(size=shape)
-    with pytest.raises(InvalidInputError, match="expected an AssignmentProblem, got ndarray; .*dummy=False") as caught:
-        assign(costs)
-    assert "\n" not in str(caught.value)
-    solution = assign(AssignmentProblem.from_dense(costs, dummy=False))
+    with pytest.warns(
+        AssocWarning, match=rf"array of shape \({shape[0]}, {shape[1]}\) is taken as by scipy's"
+    ) as caught:
+        solution = assign(costs)
+    assert "\n" not in str(caught[0].message) and caught[0].filename == __file__
     assert np.array_equal(solution.tuples.T - 1, linear_sum_assignment(costs))
+    assert np.array_equal(assign(AssignmentProblem.from_dense(costs, dummy=False)).tuples, solution.tuples)
+    with pytest.warns(AssocWarning), pytest.raises(InfeasibleError):
+        assign(np.full(shape, np.inf).tolist())
+    with pytest.raises(
+        InvalidInputError, match="problem: expected an AssignmentProblem or costs of two or more dimens"
+    ):
+        assign(costs[0])
 
 
 def test_infeasible_says_why():

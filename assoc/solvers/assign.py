@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from assoc._files.output import FilePath, check_writable
 from assoc._parameters import Parameters, checked_time_limit, whole_seed
@@ -21,7 +21,7 @@ from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import Prepared, conditioned, prepare
 from assoc.packing.run import Callback, Outcome, Run, SolveFunction
-from assoc.problem import AssignmentProblem, check_problem
+from assoc.problem import AssignmentProblem, taken_problem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify, costs_of
@@ -35,7 +35,7 @@ _EARLY = ("time_limit", "callback", "interrupted", "memory_limit")
 
 @door
 def assign(
-    problem: AssignmentProblem,
+    problem: AssignmentProblem | ArrayLike,
     solver: str = "exact",
     *,
     seed: int | np.random.SeedSequence | np.random.Generator | None = 0,
@@ -51,8 +51,9 @@ def assign(
 
     Parameters
     ----------
-    problem : AssignmentProblem
-        The problem to solve.
+    problem : AssignmentProblem or array_like
+        The problem to solve. An array of costs is taken as by scipy's ``linear_sum_assignment``, whose rows and columns
+        are then ``solution.tuples.T - 1``.
     solver : str, default "exact"
         One of ``assoc.solvers.names()``.
     seed : int, SeedSequence, Generator or None, default 0
@@ -93,10 +94,11 @@ def assign(
     -----
     AssocWarning
         No tuple costs less than its measurements as false alarms, so that no target can be found. Or the proof could
-        not be written. Or costs are so large that rounding alone keeps the answer from being proved.
+        not be written. Or an array was given, which may be meant in another way. Or costs are so large that rounding
+        alone keeps the answer from being proved.
     """
     started, compiled = time.perf_counter(), compile_seconds()
-    check_problem(problem)
+    problem = taken_problem(problem)
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
