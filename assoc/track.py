@@ -6,10 +6,11 @@ This is a program: the package must not import it. Imports inside functions keep
 from __future__ import annotations
 
 import math
+import os
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -42,7 +43,9 @@ from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc.recordings import Recording, Window
+    from assoc.metrics import CtMtIt
+    from assoc.recordings import Window
+    from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker, TrackTable
     from assoc.tracking.plots import PlotTracks
@@ -101,6 +104,23 @@ class _Tracked(NamedTuple):
     plots: Any
     num_tracked: int
     total: int
+    whole: PlotTracks | None = None
+    """For reports."""
+    written: bool = False
+    """Whether the tracks are in their file already."""
+
+
+class _Judged(NamedTuple):
+    """Tracks of plots against the plots' identities."""
+
+    ends: Any
+    """The tracker's time after each window, seconds."""
+    sizes: list[int]
+    """Plots of each window."""
+    sourced: bool
+    """Whether the aircraft are known, and not only codes."""
+    rates: CtMtIt | None
+    kept: tuple[int, int] | None
 
 
 def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
@@ -115,7 +135,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),
         (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
-        (given["output"], lambda: _write_tracks(given["output"], found.table)),
+        (None if found.written else given["output"], lambda: _write_tracks(given["output"], found.table)),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
@@ -166,6 +186,7 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         scans,
         lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
         lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=known),
+        len(scans),
     )
     if given["smooth"]:
         named, tracks = tracks, smoothed(tracker, scene, decisions)
@@ -198,6 +219,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         range(scene.num_scans),
         lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
         lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans),
+        scene.num_scans,
     )
     if given["smooth"]:
         tracks = smoothed(tracker, scene, decisions)
@@ -221,9 +243,13 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
 
 
 def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+    import numpy as np
+
+    from assoc._files.tables import table_writer
     from assoc.recordings import radar_of, with_heights
-    from assoc.tracking import TrackTable
-    from assoc.tracking.plots import track_plots
+    from assoc.recordings.recording import joined
+    from assoc.tracking.plots import FORGET, TakenPlots, follow, may_return, track_plots
+    from assoc.tracking.track_table import WrittenTracks
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if _is_asterix(file) else "tables", given["identity"] or "score-only"
@@ -234,25 +260,48 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         raise InvalidInputError(f"--tracker: {name} takes scenes; for plots use one of {others}")
     if given["map"] and given["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    recording = _read_plots(file, given)
+    stored, notes = _stored_plots(file, given)
+    survey = stored.survey
     with _as_options():
-        windows = _windows(recording, given, settings.get("seed", 0))
-        print_lines(recording.summary())
-        radar = radar_of(recording, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
-    tracker = make_tracker(name, with_heights(radar, recording), given, settings, None)
-    done, _ = _watched(
-        given,
-        tracker,
-        windows,
-        lambda window: (window.times[-1], [len(window)]),
-        lambda scans: track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"]),
+        windows = _Windows(stored, given, settings.get("seed", 0))
+        print_lines(survey.summary(notes))
+        radar = radar_of(survey, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
+    tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
+    # these show all tracks at once
+    whole = bool(given["smooth"] or given["report"] or given["map"])
+
+    def track(scans: Iterator[Window]) -> tuple[Any, _Judged, PlotTracks | None]:
+        if whole:
+            recording = joined([*stored], notes, os.path.basename(file))
+            done = track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
+            done.table.origin = given["origin"]
+            sizes = [len(window) for window in done.windows]
+            return done.table, _Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
+        takers = TakenPlots(survey.named, stored.addressed)
+        ends, sizes = [], []
+        with table_writer(given["output"]) as writer:
+            table = WrittenTracks(writer, given["origin"])
+            for followed in follow(tracker, scans, forget=True):
+                takers.take(followed)
+                table.add(*followed.listed(not given["all"]))
+                ends.append(float(followed.step.time))
+                sizes.append(len(followed.window))
+                if len(ends) % FORGET == 0:
+                    takers.keep(may_return(tracker))
+            if not ends:
+                _EARLY_END.say("")
+            table.write()
+        return table, _Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
+
+    turns = 1 + (survey.last - survey.first) / windows.rotation
+    (table, judged, plots), count = _watched(
+        given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
     )
-    done.table.origin = given["origin"]
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
-        done = done._replace(rates=None, kept=None)
-        done.table.take_names(TrackTable())
-    return _Tracked(tracker, done.table, None, done, len(done.windows), len(windows))
+        judged = judged._replace(rates=None, kept=None)
+    total = sum(1 for _ in windows) if _EARLY_END.asked else count
+    return _Tracked(tracker, table, None, judged, count, total, plots, written=not whole)
 
 
 @contextmanager
@@ -272,44 +321,66 @@ def _as_options() -> Iterator[None]:
         raise InvalidInputError(f"{flag_of(flags[name])}: {rest}{usual}") from None
 
 
-def _read_plots(file: str, given: Given) -> Recording:
-    from assoc.recordings import read_plots
+def _stored_plots(file: str, given: Given) -> tuple[StoredPlots, Mapping[str, int]]:
+    """The plots of a file, read part by part, and what reading had to correct."""
+    from assoc.recordings.reading import PlotReader
+    from assoc.recordings.survey import StoredPlots
 
     if _is_asterix(file):
         content, source = read_asterix_plots(file, given["radar"], "--radar")
-        recording = content.plots[source]
+        stored, notes = StoredPlots([content.plots[source]]), content.plots[source].notes
     else:
-        recording = read_plots(file)
-    if given["rates"] and recording.aircraft is None:
+        reader = PlotReader(file)
+        stored, notes = StoredPlots(reader), reader.notes
+    if given["rates"] and not stored.survey.named:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
-    return recording
+    return stored, notes
 
 
-def _windows(recording: Recording, given: Given, seed: int) -> list[Window]:
-    """The plots, grouped into scans."""
-    import numpy as np
+class _Windows:
+    """The plots, grouped into scans, one after the other."""
 
-    from assoc.recordings import Window, clustering_time_window, irregular_groups
+    def __init__(self, stored: StoredPlots, given: Given, seed: int) -> None:
+        from assoc.recordings import estimate_rotation
 
-    window = given["window"]
-    if window == "none":
-        return [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
-    if window == "irregular":
-        return irregular_groups(recording, np.random.default_rng(seed))
-    return clustering_time_window(recording, given["rotation"], by="antenna" if window == "ctw" else "time")
+        self._stored, self._kind, self._seed = stored, given["window"], seed
+        self.rotation = given["rotation"] or 1.0
+        if self._kind in ("ctw", "ctw-time"):
+            self.rotation = given["rotation"] or estimate_rotation(stored)
+
+    def __iter__(self) -> Iterator[Window]:
+        import numpy as np
+
+        from assoc.recordings import Window, irregular_groups
+        from assoc.recordings.recording import joined
+        from assoc.recordings.windows import windows_in_turn
+
+        if self._kind == "none":
+            begin = 0
+            for part in self._stored:
+                for row in range(len(part)):
+                    window = Window.of(part, np.array([row]), begin + row)
+                    yield replace(window, rows=window.rows + begin)
+                begin += len(part)
+        elif self._kind == "irregular":
+            yield from irregular_groups(joined([*self._stored], {}, ""), np.random.default_rng(self._seed))
+        else:
+            by: Any = "antenna" if self._kind == "ctw" else "time"
+            yield from windows_in_turn(self._stored, self._stored.survey, self.rotation, by=by)
 
 
 def _watched(
     given: Given,
     tracker: Tracker,
-    scans: Sequence[Any],
+    scans: Iterable[Any],
     describe: Callable[[Any], tuple[float, Sequence[int]]],
     track: Callable[[Iterator[Any]], Any],
+    total: int,
 ) -> tuple[Any, int]:
     """Track the scans and show progress; returns the result, and how many of them were tracked."""
     bar = ProgressBar("tracking", "scans", shown=not given["quiet"])
     with _EARLY_END.work(_LAST_SCAN):
-        found = track(with_scan_table(with_progress(scans, len(scans), bar), tracker, describe))
+        found = track(with_scan_table(with_progress(scans, total, bar), tracker, describe))
     bar.close()
     if not bar.done:
         _EARLY_END.say("")
@@ -358,32 +429,30 @@ def _write_report(given: Given, found: _Tracked) -> None:
         settings=used,
         cutoff=given["cutoff"] or CUTOFF,
         words=given.words,
-        plots=found.plots,
+        plots=found.whole,
     )
 
 
-def _write_rates(path: str, plots: PlotTracks) -> None:
+def _write_rates(path: str, plots: _Judged) -> None:
     from assoc._files.output import write_text
 
     assert plots.rates is not None
     lines = ["window,time,plots,ct,mt,it"]
     for number_of, row in zip(plots.rates.windows.tolist(), plots.rates.per_window.tolist(), strict=True):
         cells = ["" if math.isnan(value) else f"{value:.2f}" for value in row]
-        lines.append(
-            f"{number_of + 1},{decimals(plots.ends[number_of], 6)},{len(plots.windows[number_of])},{','.join(cells)}"
-        )
+        lines.append(f"{number_of + 1},{decimals(plots.ends[number_of], 6)},{plots.sizes[number_of]},{','.join(cells)}")
     write_text(path, "\n".join(lines) + "\n")
 
 
-def _print_rates(plots: PlotTracks, identity: str | None) -> None:
+def _print_rates(plots: _Judged, identity: str | None) -> None:
     if plots.kept is not None:
         kept, judged = plots.kept
         # identities that made the tracks are no evidence of their quality
-        note = " (identities were used to make them)" if identity == "use" and plots.recording.sources is None else ""
+        note = " (identities were used to make them)" if identity == "use" and not plots.sourced else ""
         print_lines(f"{kept} of {judged} tracks with an identity kept one{note}")
     if plots.rates is None:
         return
-    rates, known = plots.rates, "aircraft" if plots.recording.sources is not None else "Mode 3"
+    rates, known = plots.rates, "aircraft" if plots.sourced else "Mode 3"
     figures = ", ".join(
         f"{name} {'-' if math.isnan(value) else f'{value:.1f} %'}"
         for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
@@ -395,9 +464,8 @@ def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float
     from assoc.tracking.filter_choice import height_note
 
     tracker, rows = found.tracker, found.table
-    _, ids, _ = rows.arrays()
     name = "stdout" if output == STDOUT else printable(output)
-    print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
+    print_lines(f"{name}: {len(rows.confirmed_ids())} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
     each = 1e3 * elapsed / max(found.num_tracked, 1)
     # several trackers never need the solver, or only for the rest of their own search
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"

@@ -9,7 +9,7 @@ import numpy as np
 from assoc._system.door import door
 from assoc._text.shown import Shown
 from assoc._types import Array
-from assoc.metrics.plot_identity import identity_after_each
+from assoc.metrics.plot_identity import LastPlots
 from assoc.metrics.trajectories import columns_of_rows
 
 
@@ -61,25 +61,51 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
     -------
     CtMtIt
     """
-    window, source, track, sure = columns_of_rows(windows=windows, sources=sources, tracks=tracks, confirmed=confirmed)
-    correct = sure.astype(bool) & (source >= 0) & (identity_after_each(source, track) == source)
-    previous: dict[int, int] = {}
-    kept = np.zeros(len(window), dtype=bool)
-    for row, (aircraft, taker) in enumerate(zip(source.tolist(), track.tolist(), strict=True)):
-        if aircraft >= 0:
-            kept[row] = taker >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
-            previous[aircraft] = taker
-    real, given = source >= 0, track >= 0
-    names, index = np.unique(window, return_inverse=True)
+    found = RatesSoFar()
+    found.add(*columns_of_rows(windows=windows, sources=sources, tracks=tracks, confirmed=confirmed))
+    return found.result()
 
-    def count(chosen: Array) -> Array:
-        return np.bincount(index, weights=chosen, minlength=len(names))
 
-    with np.errstate(invalid="ignore"):
-        wrong = count(given & ~correct) / count(given)
-        rates = np.stack([count(correct) / count(real), count(kept) / count(real), wrong], axis=1)
-    ct, mt, it = (100.0 * _mean(rate) for rate in rates.T)
-    return CtMtIt(ct, mt, it, names, 100.0 * rates)
+class RatesSoFar:
+    """`ct_mt_it` of plots that are added one after the other, all of a window at once."""
+
+    def __init__(self) -> None:
+        self._last = LastPlots()
+        self._previous: dict[int, int] = {}
+        self._windows: list[Array] = []
+        self._rates: list[Array] = []
+
+    def add(self, windows: Array, sources: Array, tracks: Array, confirmed: Array) -> None:
+        """Add plots."""
+        sure = confirmed.astype(bool)
+        correct = sure & (sources >= 0) & (self._last.identities(sources, tracks) == sources)
+        previous = self._previous
+        kept = np.zeros(len(windows), dtype=bool)
+        for row, (aircraft, taker) in enumerate(zip(sources.tolist(), tracks.tolist(), strict=True)):
+            if aircraft >= 0:
+                kept[row] = taker >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
+                previous[aircraft] = taker
+        real, given = sources >= 0, tracks >= 0
+        names, index = np.unique(windows, return_inverse=True)
+
+        def count(chosen: Array) -> Array:
+            return np.bincount(index, weights=chosen, minlength=len(names))
+
+        with np.errstate(invalid="ignore"):
+            wrong = count(given & ~correct) / count(given)
+            rates = [count(correct) / count(real), count(kept) / count(real), wrong]
+        self._windows.append(names)
+        self._rates.append(np.stack(rates, axis=1))
+
+    def keep(self, tracks: set[int]) -> None:
+        """Forget the last plots of all tracks but these."""
+        self._last.keep(tracks)
+
+    def result(self) -> CtMtIt:
+        """The rates so far."""
+        rates = np.concatenate(self._rates)
+        ct, mt, it = (100.0 * _mean(rate) for rate in rates.T)
+        return CtMtIt(ct, mt, it, np.concatenate(self._windows), 100.0 * rates)
 
 
 def _mean(rate: Array) -> float:

@@ -33,15 +33,31 @@ def identity_after_each(sources: Array, tracks: Array) -> Array:
     int64 array (n,)
         The aircraft; -1 where no track took the plot, or its track has false plots only.
     """
-    source, track = columns_of_rows(sources=sources, tracks=tracks)
-    recent: dict[int, deque[int]] = {}
-    identity = np.full(len(source), -1, dtype=np.int64)
-    for row, (aircraft, taker) in enumerate(zip(source.tolist(), track.tolist(), strict=True)):
-        if taker >= 0:
-            plots = recent.setdefault(taker, deque(maxlen=MEMORY))
-            plots.append(aircraft)
-            identity[row] = majority(plots)
-    return identity
+    return LastPlots().identities(*columns_of_rows(sources=sources, tracks=tracks))
+
+
+class LastPlots:
+    """The last plots of tracks."""
+
+    def __init__(self) -> None:
+        self._recent: dict[int, deque[int]] = {}
+
+    def identities(self, sources: Array, tracks: Array) -> Array:
+        """`identity_after_each` of the plots that follow."""
+        identity = np.full(len(sources), -1, dtype=np.int64)
+        for row, (aircraft, taker) in enumerate(zip(sources.tolist(), tracks.tolist(), strict=True)):
+            if taker >= 0:
+                plots = self._recent.get(taker)
+                if plots is None:
+                    plots = self._recent[taker] = deque(maxlen=MEMORY)
+                plots.append(aircraft)
+                sure = aircraft >= 0 and 2 * plots.count(aircraft) >= len(plots)
+                identity[row] = aircraft if sure else majority(plots)
+        return identity
+
+    def keep(self, tracks: set[int]) -> None:
+        """Forget all tracks but these."""
+        self._recent = {track: plots for track, plots in self._recent.items() if track in tracks}
 
 
 def majority(plots: deque[int]) -> int:
@@ -92,9 +108,33 @@ def tracks_of_one_identity(sources: Array, tracks: Array, confirmed: Array) -> t
     confirmed : array_like of bool (n,)
         Whether that track was confirmed then; its plots before that do not count.
     """
-    source, track, sure = columns_of_rows(sources=sources, tracks=tracks, confirmed=confirmed)
-    identity = identity_after_each(source, track)
-    held = sure.astype(bool) & (track >= 0) & (identity >= 0)
-    known = np.unique(np.stack([track[held], identity[held]], axis=1), axis=0)
-    _, count = np.unique(known[:, 0], return_counts=True)
-    return int((count == 1).sum()), len(count)
+    found = IdentitiesSoFar()
+    found.add(*columns_of_rows(sources=sources, tracks=tracks, confirmed=confirmed))
+    return found.result()
+
+
+class IdentitiesSoFar:
+    """`tracks_of_one_identity` of plots that are added one after the other."""
+
+    def __init__(self) -> None:
+        self._last = LastPlots()
+        self._of: dict[int, int] = {}
+        self.any = False
+        """Whether any plot had an identity."""
+
+    def add(self, sources: Array, tracks: Array, confirmed: Array) -> None:
+        """Add plots."""
+        self.any |= bool((sources >= 0).any())
+        identity = self._last.identities(sources, tracks)
+        held = confirmed.astype(bool) & (tracks >= 0) & (identity >= 0)
+        for track, aircraft in zip(tracks[held].tolist(), identity[held].tolist(), strict=True):
+            if self._of.setdefault(track, aircraft) != aircraft:
+                self._of[track] = -1
+
+    def keep(self, tracks: set[int]) -> None:
+        """Forget the last plots of all tracks but these."""
+        self._last.keep(tracks)
+
+    def result(self) -> tuple[int, int]:
+        """The numbers so far."""
+        return sum(one >= 0 for one in self._of.values()), len(self._of)

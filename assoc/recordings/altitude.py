@@ -12,12 +12,16 @@ GARBLED_CODES = (0, 1, 2, 3, 256, 257, 258, 512, 513, 514, 584, 770)
 """Flight levels of the paper's recording that appear between quite different ones: answers with lost bits."""
 
 NEIGHBOURS = 3
+NEARBY = 300.0
+"""Seconds: plots of one identity that are farther apart say nothing of one another."""
 LARGEST_STEP = 30.0
 """Flight levels: no aircraft changes its level by more between a few rotations."""
 
 
 @door
-def garbled_altitudes(levels: ArrayLike, identities: ArrayLike, codes: ArrayLike = GARBLED_CODES) -> Array:
+def garbled_altitudes(
+    levels: ArrayLike, identities: ArrayLike, codes: ArrayLike = GARBLED_CODES, times: ArrayLike | None = None
+) -> Array:
     """Find garbled altitudes.
 
     Garbled are the known codes, and a level that is more than 30 flight levels away from the median of up to three
@@ -31,20 +35,30 @@ def garbled_altitudes(levels: ArrayLike, identities: ArrayLike, codes: ArrayLike
         0 where it was not decoded: such plots are judged by the codes only.
     codes : array_like of int
         Flight levels that are taken for garbled.
+    times : array_like (n,), optional
+        Seconds: only plots within `NEARBY` of one another are then compared.
 
     Returns
     -------
     ndarray of bool (n,)
     """
     level, identity = np.asarray(levels, dtype=np.float64), np.asarray(identities)
-    garbled = np.isin(level, np.asarray(codes, dtype=np.float64))
-    for code in np.unique(identity[identity != 0]):
-        rows = np.flatnonzero((identity == code) & ~np.isnan(level))
-        good = rows[~garbled[rows]]
-        for index, row in enumerate(good):
-            around = np.concatenate(
-                [good[max(0, index - NEIGHBOURS) : index], good[index + 1 : index + 1 + NEIGHBOURS]]
-            )
-            if len(around) >= NEIGHBOURS and abs(level[row] - np.median(level[around])) > LARGEST_STEP:
-                garbled[row] = True
+    garbled: Array = np.isin(level, np.asarray(codes, dtype=np.float64))
+    rows = np.flatnonzero((identity != 0) & ~np.isnan(level) & ~garbled)
+    rows = rows[np.argsort(identity[rows], kind="stable")]
+    if len(rows):
+        # each good plot beside its neighbours of the same identity
+        steps = np.array([*range(-NEIGHBOURS, 0), *range(1, NEIGHBOURS + 1)])
+        beside = np.arange(len(rows))[:, None] + steps
+        there = (beside >= 0) & (beside < len(rows))
+        others = rows[np.clip(beside, 0, len(rows) - 1)]
+        there &= identity[others] == identity[rows][:, None]
+        if times is not None:
+            when = np.asarray(times, dtype=np.float64)
+            there &= np.abs(when[others] - when[rows][:, None]) <= NEARBY
+        count = there.sum(axis=1)
+        around = np.sort(np.where(there, level[others], np.inf), axis=1)
+        each = np.arange(len(rows))
+        median = 0.5 * (around[each, np.maximum(count - 1, 0) // 2] + around[each, count // 2])
+        garbled[rows[(count >= NEIGHBOURS) & (np.abs(level[rows] - median) > LARGEST_STEP)]] = True
     return garbled

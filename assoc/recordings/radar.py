@@ -11,6 +11,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
+from assoc.recordings.survey import Survey
 from assoc.sensors.radar import Radar2D
 
 HEIGHT_NOISE = 50.0
@@ -23,7 +24,7 @@ _LEAST_SHARE, _FALSE_SHARE = 0.02, 0.1
 
 @door
 def radar_of(
-    recording: Recording,
+    recording: Recording | Survey,
     *,
     range_noise: float | None = None,
     azimuth_noise: float | None = None,
@@ -35,7 +36,7 @@ def radar_of(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or Survey
     range_noise, azimuth_noise : float, optional
         Standard deviations, metres and radians. Without them they are taken from the steps in which the plots
         come: step / sqrt(12), the deviation of rounding.
@@ -54,11 +55,12 @@ def radar_of(
     InvalidInputError
         The plots do not come in steps, and no noise is given.
     """
+    seen = recording if isinstance(recording, Survey) else Survey([recording])
     steps = [
-        _noise("range_noise", range_noise, recording.ranges),
-        _noise("azimuth_noise", azimuth_noise, recording.bearings),
+        _noise("range_noise", range_noise, seen.ranges, seen.count),
+        _noise("azimuth_noise", azimuth_noise, seen.bearings, seen.count),
     ]
-    reach = float(recording.ranges.max()) + 8.0 * steps[0] if len(recording) else 1.0
+    reach = seen.farthest + 8.0 * steps[0] if seen.count else 1.0
     return Radar2D(
         position=np.zeros(3),
         noise=np.array(steps),
@@ -70,12 +72,13 @@ def radar_of(
 
 
 @door
-def with_heights(radar: Radar2D, recording: Recording) -> list[Radar2D]:
+def with_heights(radar: Radar2D, recording: Recording | Survey) -> list[Radar2D]:
     """The radar of a recording as two sensors at one place: its plots with an altitude that is not garbled, and others.
 
     The first measures heights, too (`Window.heights`). Only the radar itself where hardly any plot has an altitude.
     """
-    share = float(np.isfinite(recording.trusted_altitudes).mean()) if len(recording) else 0.0
+    seen = recording if isinstance(recording, Survey) else Survey([recording])
+    share = seen.high / seen.count if seen.count else 0.0
     if share < _LEAST_SHARE:
         return [radar]
     share = min(share, 1.0 - _LEAST_SHARE)
@@ -88,23 +91,22 @@ def with_heights(radar: Radar2D, recording: Recording) -> list[Radar2D]:
     return [high, replace(radar, detection_probability=(1.0 - share) * radar.detection_probability)]
 
 
-def _noise(name: str, given: float | None, values: Array) -> float:
+def _noise(name: str, given: float | None, distinct: Array, count: int) -> float:
     if given is not None:
         if isinstance(given, bool) or not 0 < given < math.inf:
             raise InvalidInputError(f"{name}: expected a number > 0, got {given!r}")
         return float(given)
-    step = resolution(values)
+    step = resolution(distinct, count)
     if step == 0.0:
         raise InvalidInputError(f"{name}: the plots do not come in steps, from which it could be estimated: give it")
     return step / math.sqrt(12.0)
 
 
-def resolution(values: Array) -> float:
-    """Step in which values come (n,), or 0 if they do not come in steps.
+def resolution(distinct: Array, count: int) -> float:
+    """Step in which so many values come, by the distinct ones in ascending order; 0 if they do not come in steps.
 
     It is the smallest difference between two of them, if all are its multiples within 5 % of it.
     """
-    distinct = np.unique(values)
     if len(distinct) < 3:
         return 0.0
     gaps = np.diff(distinct)
@@ -118,4 +120,4 @@ def resolution(values: Array) -> float:
             return 0.0
         step = float(distinct @ counts / (counts @ counts))
     off = np.abs(distinct - np.round(distinct / step) * step)
-    return step if (off <= 0.05 * step).all() and len(distinct) < 20 * len(values) ** 0.5 + 20 else 0.0
+    return step if (off <= 0.05 * step).all() and len(distinct) < 20 * count**0.5 + 20 else 0.0

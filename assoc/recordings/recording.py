@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -150,23 +150,15 @@ class Recording(Shown):
     def take(self, rows: Array) -> Recording:
         """Return the plots of some rows, in the order of time."""
         chosen = np.sort(np.arange(len(self))[rows])
-        parts = {name: getattr(self, name)[chosen] for name in _COLUMNS}
+        parts = {name: getattr(self, name)[chosen] for name in RECORDED}
         sources = None if self.sources is None else self.sources[chosen]
         return Recording(**parts, sources=sources, notes=self.notes, name=self.name)
 
     def summary(self) -> str:
         """Return its contents and defects in a few lines."""
-        if not len(self):
-            return "no plots"
-        missing = int(np.isnan(self.altitudes).sum())
-        identities = len(np.unique(self.identities[self.decoded]))
-        lines = [
-            f"{len(self)} plots over {self.times[-1] - self.times[0]:g} s",
-            f"{identities} identities; {int((~self.decoded).sum())} plots not decoded",
-            f"altitudes: {int(self.garbled.sum())} garbled, {missing} missing",
-            *(f"{what}: {count}" for what, count in self.notes.items() if count),
-        ]
-        return "\n".join(lines)
+        from assoc.recordings.survey import Survey
+
+        return Survey([self]).summary(self.notes)
 
     def __repr__(self) -> str:
         name = f"{self.name!r}, " if self.name else ""
@@ -174,4 +166,13 @@ class Recording(Shown):
         return f"Recording({name}{len(self)} plots{span})"
 
 
-_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines", "addresses")
+RECORDED = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines", "addresses")
+
+
+def joined(parts: Sequence[Recording], notes: Mapping[str, int], name: str) -> Recording:
+    """One recording of parts in the order of time."""
+    if not parts:
+        return Recording([], [], [], notes=notes, name=name)  # type: ignore[arg-type]
+    columns = {column: np.concatenate([getattr(part, column) for part in parts]) for column in RECORDED}
+    known = [part.sources for part in parts if part.sources is not None]
+    return Recording(**columns, sources=np.concatenate(known) if known else None, notes=notes, name=name)

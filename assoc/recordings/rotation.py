@@ -10,6 +10,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
+from assoc.recordings.survey import StoredPlots
 
 SHORTEST, LONGEST = 2.0, 30.0
 """Rotation times (s) that are tried. Below 2 s stamps in whole seconds do not distinguish them."""
@@ -23,7 +24,9 @@ _LEAST_COHERENCE = 0.5
 
 
 @door
-def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest: float = LONGEST) -> float:
+def estimate_rotation(
+    recording: Recording | StoredPlots, shortest: float = SHORTEST, longest: float = LONGEST
+) -> float:
     """Estimate the rotation time of the antenna.
 
     An antenna that turns once in T seconds points to the bearing b when t / T - b / (2 pi) + const is whole. The T
@@ -33,7 +36,7 @@ def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest:
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or StoredPlots
     shortest, longest : float
         Limits of the search, seconds.
 
@@ -84,21 +87,35 @@ def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest:
     return 1.0 / float(center)
 
 
-def _stretches(recording: Recording) -> list[tuple[Array, Array]]:
+def _stretches(recording: Recording | StoredPlots) -> list[tuple[Array, Array]]:
     """Times (from the start of each stretch) and bearings, of stretches without long gaps."""
-    every = max(1, -(-len(recording) // _MOST))
-    starts = [0]
-    for row in range(1, len(recording)):
-        gap = recording.times[row] - recording.times[row - 1]
-        if gap > 2 * LONGEST or recording.times[row] - recording.times[starts[-1]] > STRETCH:
-            starts.append(row)
-    parts = []
-    for first, last in zip(starts, [*starts[1:], len(recording)], strict=True):
-        if last - first >= 2:
-            times = recording.times[first:last]
-            parts.append((times - times[0], recording.bearings[first:last]))
     # of a very long recording some stretches are enough
-    return parts[::every]
+    every = max(1, -(-len(recording) // _MOST))
+    found: list[tuple[Array, Array]] = []
+    number = 0
+    times = bearings = np.zeros(0)
+
+    def take(end: int) -> None:
+        """Take the stretch that ends there."""
+        nonlocal times, bearings, number
+        if end >= 2:
+            if number % every == 0:
+                found.append((times[:end] - times[0], bearings[:end]))
+            number += 1
+        times, bearings = times[end:], bearings[end:]
+
+    for part in [recording] if isinstance(recording, Recording) else recording:
+        times, bearings = np.concatenate([times, part.times]), np.concatenate([bearings, part.bearings])
+        while len(times):
+            wide = np.flatnonzero(np.diff(times) > 2 * LONGEST)
+            end = int(np.searchsorted(times, times[0] + STRETCH, side="right"))
+            end = min(end, int(wide[0]) + 1 if len(wide) else len(times))
+            if end == len(times):
+                break
+            take(end)
+    if len(times):
+        take(len(times))
+    return found
 
 
 def _agreement(stretches: list[tuple[Array, Array]], frequencies: Array) -> Array:

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from assoc._parameters import is_number
+from assoc._system.compiled import njit
 from assoc._system.door import door
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.recordings.recording import Recording
+from assoc.recordings.recording import Recording, joined
 from assoc.recordings.rotation import estimate_rotation
+from assoc.recordings.survey import Survey
 
 LONG_GAP = 20.0
 """Rotations without a plot after which the antenna's phase is taken anew."""
 
 MOST_TURNS = 1e12
+# turns that set the antenna's phase at first
+_SETTLED = 5
 
 EARTH_RADIUS = 6.371e6
 """Metres."""
@@ -45,6 +51,8 @@ class Window:
         The plots' numbers in the recording.
     addresses : int array (n,)
         ICAO addresses, 0 where they are not known.
+    sources : int array (n,) or None
+        The aircraft, -1 for a false plot, where they are known.
     """
 
     number: int
@@ -54,6 +62,7 @@ class Window:
     altitudes: Array
     rows: Array
     addresses: Array
+    sources: Array | None = None
 
     @classmethod
     def of(cls, recording: Recording, rows: Array, number: int) -> Window:
@@ -67,6 +76,7 @@ class Window:
             altitudes=recording.trusted_altitudes[rows],
             rows=rows,
             addresses=recording.addresses[rows],
+            sources=None if recording.sources is None else recording.sources[rows],
         )
 
     @property
@@ -113,41 +123,107 @@ def clustering_time_window(
     if not len(recording):
         return []
     turn = estimate_rotation(recording) if rotation is None else rotation
-    if not is_number(turn, 0.0) or turn == 0:
+    return list(windows_in_turn([recording], Survey([recording]), turn, by=by))
+
+
+def windows_in_turn(
+    parts: Iterable[Recording], survey: Survey, rotation: float, *, by: Literal["antenna", "time"] = "antenna"
+) -> Iterator[Window]:
+    """The windows of `clustering_time_window`, one after the other, from a recording in parts.
+
+    Parameters
+    ----------
+    parts : iterable of Recording
+        In the order of time.
+    survey : Survey
+        Of all of them.
+    rotation, by
+        As for `clustering_time_window`.
+    """
+    if not is_number(rotation, 0.0) or rotation == 0:
         raise InvalidInputError(f"rotation: expected seconds > 0, got {rotation!r}")
-    turn = float(turn)
-    span = float(recording.times[-1] - recording.times[0])
+    turn, span = float(rotation), survey.last - survey.first
     if not span / turn < MOST_TURNS:
         raise InvalidInputError(f"rotation: {turn:g} s is too short for a recording of {span:g} s")
-    numbers = _by_time(recording.times, turn) if by == "time" else _by_antenna(recording, turn)
-    return windows_of(recording, numbers)
+    plots = joined([], {}, "")
+    numbers = places = np.zeros(0, dtype=np.int64)
+    begin = 0
+    for part, new, complete in _by_time(parts, survey, turn) if by == "time" else _by_antenna(parts, survey, turn):
+        plots = joined([plots, part], {}, "") if len(plots) else part
+        numbers = np.concatenate([numbers, new])
+        places = np.concatenate([places, np.arange(begin, begin + len(part))])
+        begin += len(part)
+        out = numbers < complete
+        for window in windows_of(plots, numbers, out):
+            yield replace(window, rows=places[window.rows])
+        plots, numbers, places = plots.take(~out), numbers[~out], places[~out]
+    for window in windows_of(plots, numbers):
+        yield replace(window, rows=places[window.rows])
 
 
-def windows_of(recording: Recording, numbers: Array) -> list[Window]:
-    """Windows from the number of the group of each plot (n,); groups come in the order of their numbers."""
-    order = np.argsort(numbers, kind="stable")
+def windows_of(recording: Recording, numbers: Array, which: Array | None = None) -> list[Window]:
+    """Windows from the number of the group of each plot (n,); groups come in the order of their numbers.
+
+    Of all plots, or of those in `which`, bool (n,).
+    """
+    rows = np.arange(len(numbers)) if which is None else np.flatnonzero(which)
+    order = rows[np.argsort(numbers[rows], kind="stable")]
     groups = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
-    return [Window.of(recording, rows, numbers[rows[0]]) for rows in groups if len(rows)]
+    return [Window.of(recording, group, numbers[group[0]]) for group in groups if len(group)]
 
 
-def _by_time(times: Array, turn: float) -> Array:
-    # a billionth of a turn forgives rounding at the edges
-    return np.floor((times - times[0]) / turn + 1e-9).astype(np.int64)
+Numbered = Iterator[tuple[Recording, Array, float]]
+"""Parts of a recording, the number of each plot's window, and the number before which windows are complete."""
 
 
-def _by_antenna(recording: Recording, turn: float) -> Array:
-    bearings = np.mod(recording.bearings - _quietest(recording.bearings), 2 * math.pi) / (2 * math.pi)
-    numbers = np.zeros(len(recording), dtype=np.int64)
-    parts = np.split(np.arange(len(recording)), np.flatnonzero(np.diff(recording.times) > LONG_GAP * turn) + 1)
-    last = -1
-    for rows in parts:
-        turns = recording.times[rows] / turn - bearings[rows]
-        phase = running_phase(recording.times[rows], turns, turn)
-        turn_numbers = np.round(turns - phase).astype(np.int64)
-        turn_numbers += last + 1 - turn_numbers.min()
-        numbers[rows] = turn_numbers
-        last = int(turn_numbers.max())
-    return numbers
+def _by_time(parts: Iterable[Recording], survey: Survey, turn: float) -> Numbered:
+    for part in parts:
+        # a billionth of a turn forgives rounding at the edges
+        numbers = np.floor((part.times - survey.first) / turn + 1e-9).astype(np.int64)
+        yield part, numbers, float(numbers[-1])
+
+
+def _by_antenna(parts: Iterable[Recording], survey: Survey, turn: float) -> Numbered:
+    cut = _quietest(survey.sectors)
+    last = shift = complete = -1
+    state = np.zeros(4)
+    for part, begins in _runs(parts, turn):
+        turns = part.times / turn - np.mod(part.bearings - cut, 2 * math.pi) / (2 * math.pi)
+        if begins:
+            state = _first_phase(part.times, turns, turn)
+        phase = _follow(part.times, np.exp(2j * math.pi * turns), turn, state)
+        numbers = np.round(turns - phase).astype(np.int64)
+        if begins:
+            shift = last + 1 - int(numbers.min())
+        numbers = np.maximum(numbers + shift, complete)
+        last = max(last, int(numbers.max()))
+        # a plot is at most a turn and a half before the antenna's count at its time
+        complete = max(complete, math.floor(part.times[-1] / turn - phase[-1]) + shift - 3)
+        yield part, numbers, float(complete)
+
+
+def _runs(parts: Iterable[Recording], turn: float) -> Iterator[tuple[Recording, bool]]:
+    """Parts without long gaps, and whether each is the first after one; the first are longer than five turns."""
+    waiting: list[Recording] = []
+    before = -math.inf
+    for part in parts:
+        far = np.diff(part.times, prepend=before) > LONG_GAP * turn
+        before = float(part.times[-1])
+        for first, end in pairwise([*np.unique([0, *np.flatnonzero(far)]), len(part)]):
+            if far[first] and waiting:
+                yield joined(waiting, {}, ""), True
+            if far[first]:
+                waiting = [joined([], {}, "")]
+            piece = part.take(np.arange(first, end))
+            if not waiting:
+                yield piece, False
+                continue
+            waiting.append(piece)
+            if piece.times[-1] - waiting[1].times[0] > _SETTLED * turn:
+                yield joined(waiting, {}, ""), True
+                waiting = []
+    if waiting:
+        yield joined(waiting, {}, ""), True
 
 
 def running_phase(times: Array, turns: Array, turn: float) -> Array:
@@ -155,30 +231,39 @@ def running_phase(times: Array, turns: Array, turn: float) -> Array:
 
     The estimated rotation time is off by a little, and motors drift: the mean over the last turns keeps count.
     """
-    angles = np.exp(2j * math.pi * turns)
+    phase: Array = _follow(times, np.exp(2j * math.pi * turns), turn, _first_phase(times, turns, turn))
+    return phase
+
+
+def _first_phase(times: Array, turns: Array, turn: float) -> Array:
+    """State of the phase before the first plot: its mean as a complex number, itself, and the time, (4,)."""
     # the first few turns set the start, so that the first plot's error does not
-    first = np.angle(angles[times - times[0] <= 5 * turn].sum())
-    phase = np.empty(len(turns))
-    held, now = complex(math.cos(first), math.sin(first)), first / (2 * math.pi)
-    before = times[0]
-    for row in range(len(turns)):
+    first = np.angle(np.exp(2j * math.pi * turns[times - times[0] <= _SETTLED * turn]).sum())
+    return np.array([math.cos(first), math.sin(first), first / (2 * math.pi), times[0]])
+
+
+@njit
+def _follow(times: Array, angles: Array, turn: float, state: Array) -> Array:
+    phase = np.empty(len(times))
+    held, now, before = complex(state[0], state[1]), state[2], state[3]
+    for row in range(len(times)):
         held = held * math.exp(-(times[row] - before) / (10 * turn)) + 0.05 * angles[row]
         before = times[row]
         fraction = math.atan2(held.imag, held.real) / (2 * math.pi)
         now += (fraction - now + 0.5) % 1.0 - 0.5
         phase[row] = now
+    state[:] = held.real, held.imag, now, before
     return phase
 
 
-def _quietest(bearings: Array) -> float:
-    """Where to cut the circle: the middle of the sector with the fewest plots, rad.
+def _quietest(counts: Array) -> float:
+    """Where to cut the circle, by the plots in each of its sectors: the middle of the one with the fewest, rad.
 
     An aircraft that crosses the cut against the antenna would be twice in a turn.
     """
-    cells = 72
-    counts = np.bincount((bearings / (2 * math.pi) * cells).astype(np.int64) % cells, minlength=cells).astype(float)
+    cells = len(counts)
     # smoothed around the circle: the middle of an empty sector is better than its edge
     width = np.minimum(np.arange(cells), cells - np.arange(cells))
     weights = np.exp(-0.5 * (width / 4.0) ** 2)
-    smooth = np.real(np.fft.ifft(np.fft.fft(counts) * np.fft.fft(weights)))
+    smooth = np.real(np.fft.ifft(np.fft.fft(counts.astype(float)) * np.fft.fft(weights)))
     return (float(np.argmin(np.round(smooth, 9))) + 0.5) * 2 * math.pi / cells

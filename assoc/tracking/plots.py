@@ -9,14 +9,19 @@ import numpy as np
 
 from assoc._system.interrupts import end_is_asked
 from assoc._types import Array
-from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
+from assoc.metrics import CtMtIt
+from assoc.metrics.ct_mt_it import RatesSoFar
+from assoc.metrics.plot_identity import IdentitiesSoFar
 from assoc.recordings import Recording, Window
 from assoc.scene.scene import Scene
 from assoc.tracking.quality import Qualities
 from assoc.tracking.smoothing import smoothed
-from assoc.tracking.track import Decision, Step
+from assoc.tracking.track import Step, Track
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
+
+FORGET = 50
+"""Windows after which what is known of tracks that have ended is forgotten."""
 
 
 def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = True) -> Iterator[Step]:
@@ -114,62 +119,122 @@ def track_plots(
         Whether the table has the finished tracks instead, see `assoc.tracking.smoothed`; needs a new tracker.
     """
     table = TrackTable()
-    scans: list[tuple[list[Array], list[Array]]] = []
-    decisions: list[Decision] = []
-    ends: list[float] = []
-    takers: list[Array] = [np.zeros(0, dtype=np.int64)]
-    sure: list[Array] = [np.zeros(0, dtype=np.bool_)]
+    takers = TakenPlots(recording.aircraft is not None, bool(recording.addresses.any()))
+    done: list[Followed] = []
+    for followed in follow(tracker, windows):
+        done.append(followed)
+        takers.take(followed)
+        table.add(*followed.listed(confirmed))
+    if smooth and done:
+        decisions = [decision for one in done for decision in one.step.final]
+        ends, settings = np.array([one.step.time for one in done]), tracker.settings
+        plots, times = [one.measurements for one in done], [one.times for one in done]
+        scene = Scene(tracker.sensors, ends, plots, settings.place.region, measurement_times=times)
+        table = smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
+    ends = np.array([one.step.time for one in done])
+    tracks = np.concatenate([np.zeros(0, dtype=np.int64), *(one.tracks for one in done)])
+    rates, kept = takers.rates(), takers.kept()
+    return PlotTracks(recording, [one.window for one in done], ends, tracks, rates, table, kept)
+
+
+class Followed(NamedTuple):
+    """A window that a tracker has taken."""
+
+    tracker: Tracker
+    window: Window
+    step: Step
+    tracks: Array
+    """The track that took each plot, -1 if none did."""
+    sure: Array
+    """Whether that track was confirmed."""
+    measurements: list[Array]
+    times: list[Array]
+    altitudes: dict[int, float]
+    """Last altitude of each track; shared by all windows."""
+    qualities: Qualities
+    """Shared likewise."""
+
+    def listed(self, confirmed: bool) -> tuple[list[Track], Sequence[int], dict[int, float], Qualities]:
+        """Arguments of `TrackTable.add`: the tracks after this window, or only the confirmed ones."""
+        listed = [track for track in self.tracker.tracks if track.reported or not confirmed]
+        return listed, self.tracker.filter.motion.position, self.altitudes, self.qualities
+
+
+def follow(tracker: Tracker, windows: Iterable[Window], *, forget: bool = False) -> Iterator[Followed]:
+    """Step a tracker through windows, until the program is asked to end.
+
+    With `forget` nothing is kept of tracks that have ended.
+    """
     altitudes: dict[int, float] = {}
-    done: list[Window] = []
     qualities = Qualities(len(tracker.sensors))
-    for window in windows:
+    for number, window in enumerate(windows):
         before = tracker.state
         try:
             (step,) = step_windows(tracker, [window])
         except KeyboardInterrupt:
             if end_is_asked():
                 # the tracker is as it was before this window
-                break
+                return
             raise
-        done.append(window)
         own = rows_of(tracker, window)
         # back in the order of the window
         order = np.argsort(np.concatenate(own))
         ids = np.concatenate(step.assigned)[order]
-        takers.append(np.where(ids > 0, ids, -1))
-        sure.append(np.concatenate(step.confirmed)[order])
-        table.count_identities(ids, np.stack([window.identities, window.addresses], axis=1))
         known = (ids > 0) & np.isfinite(window.altitudes)
         altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
-        ends.append(float(step.time))
-        listed = (track for track in tracker.tracks if track.reported or not confirmed)
         stamps = np.clip(window.times, -np.inf if before.time is None else before.time, step.time)
-        scans.append((measured(tracker, window), [stamps[row] for row in own]))
-        decisions += step.final
-        qualities.after(tracker, before, step, *scans[-1])
-        table.add(listed, tracker.filter.motion.position, altitudes, qualities)
-    table.name_by_identities()
-    if smooth and done:
-        plots, times = zip(*scans, strict=True)
-        scene = Scene(tracker.sensors, np.array(ends), plots, tracker.settings.place.region, measurement_times=times)
-        named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=altitudes)
-        table.take_names(named)
-    tracks = np.concatenate(takers)
-    aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
-    rates = kept = None
-    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(window.rows for window in done)])
-    if aircraft is not None and done:
-        number = np.repeat(np.arange(len(done)), [len(window) for window in done])
-        rates = ct_mt_it(number, aircraft[rows], tracks, confirmed_then)
-    names = _names(recording)[rows]
-    if (names >= 0).any():
-        kept = tracks_of_one_identity(names, tracks, confirmed_then)
-    return PlotTracks(recording, done, np.array(ends), tracks, rates, table, kept)
+        scan = measured(tracker, window), [stamps[row] for row in own]
+        qualities.after(tracker, before, step, *scan)
+        sure = np.concatenate(step.confirmed)[order]
+        yield Followed(tracker, window, step, np.where(ids > 0, ids, -1), sure, *scan, altitudes, qualities)
+        if forget and number % FORGET == 0:
+            living = may_return(tracker)
+            qualities.keep(living)
+            for gone in altitudes.keys() - living:
+                del altitudes[gone]
 
 
-def _names(recording: Recording) -> Array:
-    """Number of each plot's identity (n,): aircraft, else address, else Mode 3; -1 for none."""
-    if recording.sources is not None:
-        return recording.sources
-    given = recording.addresses if recording.addresses.any() else recording.identities
-    return np.where(given > 0, given, -1)
+def may_return(tracker: Tracker) -> set[int]:
+    """Ids of the tracks that live, or that may be taken up again."""
+    return {track.track_id for track in tracker.tracks} | {*tracker.state.lost.track_id.tolist()}
+
+
+class TakenPlots:
+    """CT, MT and IT, and how many tracks kept one identity, window after window.
+
+    Parameters
+    ----------
+    known : bool
+        Whether any plot of the recording has an aircraft or a code.
+    addressed : bool
+        Whether any has an address.
+    """
+
+    def __init__(self, known: bool, addressed: bool) -> None:
+        self._known, self._addressed, self._count = known, addressed, 0
+        self._rates, self._identities = RatesSoFar(), IdentitiesSoFar()
+
+    def take(self, followed: Followed) -> None:
+        """Take the next window."""
+        window, tracks, sure = followed.window, followed.tracks, followed.sure
+        if self._known:
+            aircraft = np.where(window.identities > 0, window.identities, -1)
+            aircraft = aircraft if window.sources is None else window.sources
+            self._rates.add(np.full(len(window), self._count), aircraft, tracks, sure)
+        names = window.addresses if self._addressed else window.identities
+        names = np.where(names > 0, names, -1) if window.sources is None else window.sources
+        self._identities.add(names, tracks, sure)
+        self._count += 1
+
+    def keep(self, tracks: set[int]) -> None:
+        """Forget the last plots of all tracks but these."""
+        self._rates.keep(tracks)
+        self._identities.keep(tracks)
+
+    def rates(self) -> CtMtIt | None:
+        """CT, MT and IT; None where no aircraft is known."""
+        return self._rates.result() if self._known and self._count else None
+
+    def kept(self) -> tuple[int, int] | None:
+        """Numbers of confirmed tracks that kept one identity, and that had any; None if no plot has an identity."""
+        return self._identities.result() if self._identities.any else None

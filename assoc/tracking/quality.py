@@ -82,7 +82,10 @@ class Qualities:
 
     def of_track(self, track_id: int) -> TrackQuality:
         """Quality of a track, also of one that has ended."""
-        return self._of.setdefault(track_id, TrackQuality(np.zeros(self._sensors, np.int64)))
+        found = self._of.get(track_id)
+        if found is None:
+            found = self._of[track_id] = TrackQuality(np.zeros(self._sensors, np.int64))
+        return found
 
     def keep(self, track_ids: Iterable[int]) -> None:
         """Forget all tracks but these."""
@@ -157,4 +160,5 @@ class Qualities:
                 if value <= gate:
                     found.setdefault(i, []).append((value, sensor.dim))
         for i, values in found.items():
-            self.of_track(i).take(*np.mean(values, axis=0).tolist())
+            squares, freedoms = zip(*values, strict=True)
+            self.of_track(i).take(sum(squares) / len(values), sum(freedoms) / len(values))

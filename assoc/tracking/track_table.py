@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._files.tables import TableWriter
 from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
@@ -37,6 +38,10 @@ COLUMNS = (
 Speed and heading are those of the horizontal velocity (equations 3.5 to 3.8 of the thesis on clustering time windows,
 of the filter's estimate and not from plot to plot), the heading in degrees, clockwise from +y: with y to the north a
 compass heading."""
+
+
+# rows that wait to be written together
+_ROWS = 20_000
 
 
 @doors
@@ -95,17 +100,23 @@ class TrackTable(Shown):
             Positions of all targets at this time: the table then has the column nees, the normalised estimation error
             squared of the position over its number of components, by the nearest target; NaN if none is within 1 km.
         """
-        for track in tracks:
-            sigma = np.zeros(3)
-            sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
-            vx, vy = track.velocity[:2].tolist()
-            altitude = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
-            life = track.confirmed, track.score, track.hits, track.started, track.last_detection
+        listed = list(tracks)
+        if not listed:
+            return
+        axes, sigmas = list(positions), np.zeros((len(listed), 3))
+        variances = np.diagonal(np.stack([track.covariance for track in listed]), axis1=1, axis2=2)
+        sigmas[:, : len(axes)] = np.sqrt(variances[:, axes])
+        for track, sigma in zip(listed, sigmas.tolist(), strict=True):
+            x, y, z = track.position.tolist()
+            vx, vy, vz = track.velocity.tolist()
+            altitude = z if altitudes is None and len(axes) > 2 else math.nan
             speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
             altitude = altitude if altitudes is None else altitudes.get(track.track_id, math.nan)
-            where = *track.position.tolist(), *track.velocity.tolist()
-            more = *sigma.tolist(), track.existence, speed, heading, altitude, track.status, track.parent
-            self._rows.append((track.track_id, track.time, *where, *life, *more))
+            self._rows.append((
+                track.track_id, track.time, x, y, z, vx, vy, vz, track.confirmed, track.score, track.hits,
+                track.started, track.last_detection, *sigma, track.existence, speed, heading, altitude, track.status,
+                track.parent,
+            ))  # fmt: skip
             quality: dict[str, Any] = {}
             if qualities is not None:
                 one = qualities.of_track(track.track_id)
@@ -201,6 +212,10 @@ class TrackTable(Shown):
                 found[row[0]] = max(found.get(row[0], 0.0), quality["nis"])
         return found
 
+    def confirmed_ids(self) -> set[int]:
+        """Ids of tracks that were confirmed at any time."""
+        return {row[0] for row in self._rows if row[8]}
+
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
         """Times (n,), track ids (n,) and positions (n, 3) of confirmed tracks or of all, for metrics.
 
@@ -212,6 +227,49 @@ class TrackTable(Shown):
         positions = np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
         kept = last_at_each_instant(times, ids)
         return times[kept], ids[kept], positions[kept]
+
+
+class WrittenTracks:
+    """A `TrackTable` whose rows are written as they come; what is kept of them are numbers.
+
+    Parameters
+    ----------
+    writer : TableWriter
+    origin : tuple of latitude, longitude, height, optional
+        As of `TrackTable`.
+    """
+
+    def __init__(self, writer: TableWriter, origin: Origin | None = None) -> None:
+        self._writer, self._origin = writer, origin
+        self._table = TrackTable(origin)
+        self._ids: set[int] = set()
+        self._inconsistent: dict[int, float] = {}
+
+    def __len__(self) -> int:
+        return self._writer.rows + len(self._table)
+
+    def add(self, *arguments: Any) -> None:
+        """Add the tracks of a scan; see `TrackTable.add`."""
+        self._table.add(*arguments)
+        if len(self._table) >= _ROWS:
+            self.write()
+
+    def write(self) -> None:
+        """Write the rows that wait."""
+        if len(self._table) or not self._writer.rows:
+            self._writer.add(self._table.to_frame())
+        self._ids |= self._table.confirmed_ids()
+        for track, nis in self._table.inconsistent().items():
+            self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
+        self._table = TrackTable(self._origin)
+
+    def confirmed_ids(self) -> set[int]:
+        """As of `TrackTable`."""
+        return self._ids | self._table.confirmed_ids()
+
+    def inconsistent(self) -> dict[int, float]:
+        """As of `TrackTable`."""
+        return self._inconsistent
 
 
 def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Trajectories]:
