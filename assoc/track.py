@@ -10,6 +10,7 @@ import os
 import shlex
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
-from assoc._cli.options import Given, Parser, flag_of
+from assoc._cli.options import Given, Parser, check_scheduler, flag_of
 from assoc._cli.program import Program, command, prepare_streams, write_all
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
@@ -40,11 +41,11 @@ from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
 from assoc._text.times import decimals
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, LimitExceededError, warn
 
 if TYPE_CHECKING:
     from assoc.metrics import CtMtIt
-    from assoc.recordings import Window
+    from assoc.recordings import Recording, Window
     from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker, TrackTable
@@ -58,6 +59,8 @@ _USUAL = {
 }
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
+# seconds of a slice
+_SLICE = 900.0
 
 
 def start(arguments: Sequence[str] | None = None) -> int:
@@ -88,7 +91,9 @@ def _program(arguments: Sequence[str] | None) -> tuple[Program, list[str]]:
 
 def _track(words: list[str]) -> None:
     given, settings = read_options(words, track_parser())
-    given.check_outputs([given["file"]])
+    given.check_outputs(given["files"])
+    given["file"] = given["files"][0]
+    check_scheduler(given)
     if given["check"] and given["no_adapt"]:
         raise InvalidInputError("--check: nothing is estimated with --no-adapt; leave one of them out")
     with messages(given):
@@ -108,6 +113,8 @@ class _Tracked(NamedTuple):
     """For reports."""
     written: bool = False
     """Whether the tracks are in their file already."""
+    missing: Sequence[str] = ()
+    """Files and slices that they lack."""
 
 
 class _Judged(NamedTuple):
@@ -126,6 +133,8 @@ class _Judged(NamedTuple):
 def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     file = given["file"]
     started, compiled = time.perf_counter(), compile_seconds()
+    if len(given["files"]) > 1 and not all(_has_plots(one) for one in given["files"]):
+        raise InvalidInputError(f"{given['files'][1]}: only recorded plots may be in several files")
     of = _of_radars if file.lower().endswith(".toml") else _of_scene if _is_npz(file) else _of_plots
     found = of(file, given, settings)
     compiling = compile_seconds() - compiled
@@ -144,6 +153,9 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
         (found.plots, lambda: _print_rates(found.plots, given["identity"])),
     )
     _EARLY_END.say(f"the tracks of {found.num_tracked} of {found.total} scans are written")
+    if found.missing:
+        again = "; the same command does what is left" if given["jobs"] or given["scheduler"] or given["slice"] else ""
+        raise LimitExceededError(f"{given['output']}: written without {', '.join(found.missing)}{again}")
 
 
 def _is_npz(file: str) -> bool:
@@ -157,6 +169,10 @@ def _is_npz(file: str) -> bool:
     except OSError:
         return not file.lower().endswith(".csv")
     return start == b"PK\x03\x04" or file.lower().endswith(".npz")
+
+
+def _has_plots(file: str) -> bool:
+    return not file.lower().endswith(".toml") and not _is_npz(file)
 
 
 def _is_asterix(file: str) -> bool:
@@ -260,7 +276,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         raise InvalidInputError(f"--tracker: {name} takes scenes; for plots use one of {others}")
     if given["map"] and given["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    stored, notes = _stored_plots(file, given)
+    stored, notes, left = _stored_plots(given)
     survey = stored.survey
     with _as_options():
         windows = _Windows(stored, given, settings.get("seed", 0))
@@ -269,6 +285,9 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
     # these show all tracks at once
     whole = bool(given["smooth"] or given["report"] or given["map"])
+    sliced = given["jobs"] or given["scheduler"] or given["slice"]
+    if sliced and (whole or given["check"]):
+        raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map and --check")
 
     def track(scans: Iterator[Window]) -> tuple[Any, _Judged, PlotTracks | None]:
         if whole:
@@ -293,15 +312,62 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
             table.write()
         return table, _Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
 
-    turns = 1 + (survey.last - survey.first) / windows.rotation
-    (table, judged, plots), count = _watched(
-        given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
-    )
+    if sliced:
+        table, judged, missing = _in_slices(given, tracker, windows, stored)
+        plots, count = None, len(judged.ends)
+    else:
+        turns = 1 + (survey.last - survey.first) / windows.rotation
+        (table, judged, plots), count = _watched(
+            given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
+        )
+        missing = []
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
         judged = judged._replace(rates=None, kept=None)
+        plots = plots and plots._replace(rates=None, kept=None)
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return _Tracked(tracker, table, None, judged, count, total, plots, written=not whole)
+    return _Tracked(tracker, table, None, judged, count, total, plots, written=not whole, missing=[*left, *missing])
+
+
+def _in_slices(
+    given: Given, tracker: Tracker, windows: _Windows, stored: StoredPlots
+) -> tuple[Any, _Judged, list[str]]:
+    """Track slices of the recording, write their tracks, and name what is missing."""
+    import numpy as np
+
+    from assoc._cli.track.slices import kept_slices
+    from assoc._files.tables import table_writer
+    from assoc.tracking.plots import TakenPlots
+    from assoc.tracking.slices import Stitching, TrackSlice, overlap
+    from assoc.tracking.track_table import WrittenTracks
+
+    work = TrackSlice(tracker, not given["all"], given["origin"])
+    places = {"jobs": given["jobs"] or 1, "scheduler": given["scheduler"]}
+    takers, stitching = TakenPlots(stored.survey.named, stored.addressed), Stitching()
+    ends, sizes = [], []
+    with kept_slices(given, given["files"]) as slices:
+        try:
+            with _EARLY_END.work(0.0):
+                slices.run(work, windows, given["slice"] or _SLICE, overlap(tracker, windows.rotation), places)
+        except KeyboardInterrupt:
+            _EARLY_END.say(f"{len(slices.done())} slices are kept; the same command goes on from there")
+            raise
+        with table_writer(given["output"]) as writer:
+            table = WrittenTracks(writer, given["origin"])
+            for number in slices.done():
+                part = slices.load(number)
+                if part is None:
+                    continue
+                part = stitching.add(part)
+                table.add_frame(part.frame)
+                takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
+                takers.keep({*part.tracks.tolist()})
+                ends.append(part.ends)
+                sizes += part.sizes.tolist()
+            table.write()
+        missing = slices.missing()
+    times = np.concatenate([np.zeros(0), *ends])
+    return table, _Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
 
 
 @contextmanager
@@ -321,20 +387,66 @@ def _as_options() -> Iterator[None]:
         raise InvalidInputError(f"{flag_of(flags[name])}: {rest}{usual}") from None
 
 
-def _stored_plots(file: str, given: Given) -> tuple[StoredPlots, Mapping[str, int]]:
-    """The plots of a file, read part by part, and what reading had to correct."""
-    from assoc.recordings.reading import PlotReader
+def _stored_plots(given: Given) -> tuple[StoredPlots, Mapping[str, int], list[str]]:
+    """The plots of the files, read part by part, what reading had to correct, and what could not be read."""
+    import numpy as np
+
     from assoc.recordings.survey import StoredPlots
+
+    files, notes = given["files"], Counter[str]()
+    left: list[str] = []
+    first = {}
+    for file in files:
+        try:
+            first[file] = next(_parts(file, given, Counter())).times[0] if len(files) > 1 else 0.0
+        except InvalidInputError as error:
+            left.append(str(error))
+    if len(left) == len(files):
+        raise InvalidInputError(left[0])
+
+    def parts() -> Iterator[Recording]:
+        end, behind, latest = -math.inf, "", np.zeros((0, 2))
+        for file in sorted(first, key=lambda file: float(first[file])):
+            before, late, last = end, 0, None
+            try:
+                for part in _parts(file, given, notes):
+                    # a file may begin at the instant at which the one before ends, with other plots
+                    twice = (part.measurements[:, None] == latest).all(axis=2).any(axis=1) & (part.times == before)
+                    kept = (part.times >= before) & ~twice
+                    late += len(part) - int(kept.sum())
+                    if kept.any():
+                        part = part.take(kept)
+                        end, last = float(part.times[-1]), part
+                        yield part
+            except InvalidInputError as error:
+                if len(files) == 1:
+                    raise
+                left.append(str(error))
+            if late:
+                left.append(f"{late} plots of {file}, which are before the end of {behind}")
+            if last is not None:
+                behind, latest = file, last.measurements[last.times == end]
+
+    stored = StoredPlots(parts())
+    for line in left:
+        warn(f"left out: {line}")
+    if given["rates"] and not stored.survey.named:
+        raise InvalidInputError(f"--rates: {files[0]}: no plot has an identity (column mode3 or aircraft)")
+    return stored, notes, left
+
+
+def _parts(file: str, given: Given, notes: Counter[str]) -> Iterator[Recording]:
+    """The plots of a file part by part; what reading had to correct is counted in the notes."""
+    from assoc.recordings.reading import PlotReader
 
     if _is_asterix(file):
         content, source = read_asterix_plots(file, given["radar"], "--radar")
-        stored, notes = StoredPlots([content.plots[source]]), content.plots[source].notes
+        yield content.plots[source]
+        notes.update(content.plots[source].notes)
     else:
         reader = PlotReader(file)
-        stored, notes = StoredPlots(reader), reader.notes
-    if given["rates"] and not stored.survey.named:
-        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
-    return stored, notes
+        yield from reader
+        notes.update(reader.notes)
 
 
 class _Windows:

@@ -194,6 +194,16 @@ def follow(tracker: Tracker, windows: Iterable[Window], *, forget: bool = False)
                 del altitudes[gone]
 
 
+UNKNOWN = -2
+"""Stands for the aircraft where it is not known."""
+
+
+def known_of(window: Window) -> Array:
+    """Aircraft, code and address of each plot, (n, 3)."""
+    sources = np.full(len(window), UNKNOWN) if window.sources is None else window.sources
+    return np.stack([sources, window.identities, window.addresses], axis=1)
+
+
 def may_return(tracker: Tracker) -> set[int]:
     """Ids of the tracks that live, or that may be taken up again."""
     return {track.track_id for track in tracker.tracks} | {*tracker.state.lost.track_id.tolist()}
@@ -216,15 +226,18 @@ class TakenPlots:
 
     def take(self, followed: Followed) -> None:
         """Take the next window."""
-        window, tracks, sure = followed.window, followed.tracks, followed.sure
+        known = known_of(followed.window)
+        self.add(np.zeros(len(known), dtype=np.int64), known, followed.tracks, followed.sure)
+
+    def add(self, windows: Array, known: Array, tracks: Array, sure: Array) -> None:
+        """Take the plots of windows numbered from 0 on, what is known of each (`known_of`), and their tracks."""
+        aircraft, codes, addresses = known.T
+        sourced = bool(len(aircraft)) and aircraft[0] != UNKNOWN
+        codes, addresses = np.where(codes > 0, codes, -1), np.where(addresses > 0, addresses, -1)
         if self._known:
-            aircraft = np.where(window.identities > 0, window.identities, -1)
-            aircraft = aircraft if window.sources is None else window.sources
-            self._rates.add(np.full(len(window), self._count), aircraft, tracks, sure)
-        names = window.addresses if self._addressed else window.identities
-        names = np.where(names > 0, names, -1) if window.sources is None else window.sources
-        self._identities.add(names, tracks, sure)
-        self._count += 1
+            self._rates.add(self._count + windows, aircraft if sourced else codes, tracks, sure)
+        self._identities.add(aircraft if sourced else addresses if self._addressed else codes, tracks, sure)
+        self._count += int(windows[-1]) + 1 if len(windows) else 0
 
     def keep(self, tracks: set[int]) -> None:
         """Forget the last plots of all tracks but these."""

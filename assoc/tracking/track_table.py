@@ -254,6 +254,15 @@ class WrittenTracks:
         if len(self._table) >= _ROWS:
             self.write()
 
+    def add_frame(self, frame: pd.DataFrame) -> None:
+        """Write rows of a table."""
+        if len(frame):
+            self._writer.add(frame)
+            self._ids |= {*frame.track_id[frame.confirmed].tolist()}
+            wrong = frame[~frame.consistent]
+            for track, nis in zip(wrong.track_id.tolist(), wrong.nis.tolist(), strict=True):
+                self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
+
     def write(self) -> None:
         """Write the rows that wait."""
         if len(self._table) or not self._writer.rows:

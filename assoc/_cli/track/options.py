@@ -96,8 +96,8 @@ _SCENES = {"input": ("scenes",)}
 _PLOTS = {"input": ("plots",)}
 TRACKS = kinds.Output(".csv", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
 TRACK = (
-    Option("file", "FILE", "scene.npz, plots.csv (docs/recordings.md), or radars.toml (docs/from_files.md)",
-           positional=True),
+    Option("files", "FILE", "scene.npz, plots.csv (docs/recordings.md; several, as of the hours of a day), or "
+           "radars.toml (docs/from_files.md)", positional=True, rest={"nargs": "+"}),
     Option("output", "FILE", "file for the tracks (.csv or .parquet)", TRACKS,
            short="-o", rest={"required": True}),
     Option("map", "FILE", "write the tracks for a map as well (.geojson or .kml); needs an origin",
@@ -133,6 +133,9 @@ OF_PLOTS = (
     Option("range_noise", "M", "standard deviation of range, metres (default: from the plots' steps)", kinds.number,
            _PLOTS),
     Option("bearing_noise", "DEG", "standard deviation of bearing, degrees (default: likewise)", kinds.degrees, _PLOTS),
+    *(replace(COMMON[name], only=_PLOTS) for name in ("jobs", "scheduler")),
+    Option("slice", "S", "track slices of so many seconds, each by itself (default with --jobs or --scheduler: 900)",
+           kinds.positive, _PLOTS),
     Option("false_alarms", "X", "mean number of false plots in a rotation (default 2.5)", kinds.number, _PLOTS),
 )  # fmt: skip
 # names of these options in `assoc.recordings.radar_of`

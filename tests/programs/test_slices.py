@@ -1,0 +1,141 @@
+"""Recordings of several files, tracked in slices of time: the tracks of one process, and what becomes of damage."""
+
+import os
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc import track
+from assoc.recordings import write_plots
+from assoc.simulation import simulate_recording
+from assoc.tracking.slices import Stitching, TrackSlice, _same
+
+WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return simulate_recording("rotating-radar", 4, aircraft=8, duration=420.0).recording
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, recording):
+    monkeypatch.chdir(tmp_path)
+    write_plots("all.csv", recording)
+    return tmp_path
+
+
+def run(words, output, capsys):
+    """Exit code, the tracks, and what was said of errors."""
+    code = track.main([*words, "-o", output, *WORDS])
+    said = capsys.readouterr()
+    return code, pd.read_csv(output) if os.path.exists(output) else None, said.out + said.err
+
+
+def check_same(one, other):
+    """The same tracks under other ids: at each time as many, each near its own, each with its start and its hits."""
+    assert len(one) == len(other)
+    pairs = one.merge(other, on="time", suffixes=("", "_other"))
+    pairs["off"] = np.hypot(pairs.x - pairs.x_other, pairs.y - pairs.y_other)
+    pairs = pairs.sort_values("off").drop_duplicates(["time", "track_id"])
+    assert len(pairs) == len(one) and pairs.off.max() < 20.0 and pairs.off.median() < 0.01
+    assert (pairs.groupby("track_id").track_id_other.nunique() == 1).all()
+    assert (pairs.groupby("track_id_other").track_id.nunique() == 1).all()
+    for column in ("hits", "started", "last_detection", "status", "altitude"):
+        assert (pairs[column] == pairs[f"{column}_other"]).all(), column
+    assert (pairs.score - pairs.score_other).abs().max() < 0.01
+
+
+@pytest.mark.parametrize("tracker", ["nearest-neighbour", "mht"])
+def test_slices_make_the_tracks_of_one_process(here, capsys, tracker):
+    code, one, _ = run(["all.csv", "--tracker", tracker], "one.csv", capsys)
+    assert code == 0
+    code, cut, _ = run(["all.csv", "--tracker", tracker, "--slice", "120"], "cut.csv", capsys)
+    assert code == 0 and not os.path.exists("cut.csv.slices")
+    # most tracks cross borders
+    assert (one.groupby("track_id").time.agg(lambda times: times.max() - times.min()) > 240.0).sum() >= 5
+    check_same(one, cut)
+
+
+def test_stitching_is_by_as_many_common_plots_as_possible():
+    before, early = np.repeat([7, 8, 8, 9, -1], [3, 1, 3, 4, 2]), np.repeat([1, 1, 2, 3, 3], [3, 1, 3, 4, 2])
+    assert _same(before, early) == {1: 7, 2: 8, 3: 9}
+    # greedily 2 would be 7, and 1 nothing
+    before, early = np.repeat([7, 8, 7], [3, 2, 4]), np.repeat([1, 1, 2], [3, 2, 4])
+    assert _same(before, early) == {1: 8, 2: 7}
+    assert _same(np.array([-1, 3]), np.array([4, -1])) == {}
+
+
+def test_what_is_done_is_kept_and_what_is_missing_is_named(here, capsys, monkeypatch):
+    tracked, broken = [], {2}
+
+    def call(self, part):
+        tracked.append(part.number)
+        return (part.number, "the disk is damaged") if part.number in broken else self._tracked(part)
+
+    words = ["all.csv", "--tracker", "nearest-neighbour", "--slice", "100"]
+    assert run(words, "whole.csv", capsys)[0] == 0
+    monkeypatch.setattr(TrackSlice, "__call__", call)
+    code, cut, said = run(words, "cut.csv", capsys)
+    assert code == 3 and "written without the slice from" in said and "the disk is damaged" in said
+    assert said.count("\n") == 1 and set(tracked) == set(range(max(tracked) + 1))
+    whole = pd.read_csv("whole.csv")
+    gap = whole[~whole.time.isin(cut.time)]
+    assert 60.0 < np.ptp(gap.time) < 100.0 and len(whole) == len(cut) + len(gap)
+    # a slice that was damaged meanwhile is done again
+    (folder,) = os.listdir("cut.csv.slices")
+    with open(f"cut.csv.slices/{folder}/00001.npz", "r+b") as file:
+        file.truncate(1000)
+    tracked.clear()
+    broken.clear()
+    code, cut, _ = run(words, "cut.csv", capsys)
+    assert code == 0 and tracked == [1, 2] and not os.path.exists("cut.csv.slices")
+    pd.testing.assert_frame_equal(cut, whole)
+
+
+def test_damaged_empty_and_overlapping_files_are_named_and_the_rest_is_tracked(here, capsys, recording):
+    thirds = np.array_split(np.arange(len(recording)), 3)
+    # in the wrong order, and the second reaches into the third
+    for name, rows in (("a", thirds[2]), ("b", np.append(thirds[1], thirds[2][:40])), ("c", thirds[0])):
+        write_plots(f"{name}.csv", recording.take(rows))
+    (here / "empty.csv").write_text("time,range,bearing\n")
+    (here / "damaged.parquet").write_bytes(b"PAR1 is not a table PAR1")
+    words = ["--tracker", "nearest-neighbour"]
+    _, one, _ = run(["all.csv", *words], "one.csv", capsys)
+    code, many, said = run(["a.csv", "empty.csv", "b.csv", "damaged.parquet", "c.csv", *words], "many.csv", capsys)
+    assert code == 3
+    for line in (
+        "empty.csv: holds no plots",
+        "damaged.parquet: is not a readable",
+        "40 plots of a.csv, which are before",
+    ):
+        assert said.count(line) == 2, line
+    pd.testing.assert_frame_equal(one[["track_id", "time", "hits"]], many[["track_id", "time", "hits"]])
+    code, _, said = run(["empty.csv", "damaged.parquet", *words], "none.csv", capsys)
+    assert code == 2 and "empty.csv: holds no plots" in said and not os.path.exists("none.csv")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["all.csv", "--slice", "100", "--smooth"], "--slice, --jobs, --scheduler: leave out --smooth"),
+        (["all.csv", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], "give --jobs or --scheduler, not both"),
+        (["all.csv", "scene.npz"], "scene.npz: only recorded plots may be in several files"),
+        (["all.csv", "--slice", "0"], "--slice: expected a number above 0"),
+    ],
+)
+def test_refusals(here, capsys, words, message):
+    (here / "scene.npz").write_bytes(b"PK\x03\x04")
+    code, tracks, said = run(words, "t.csv", capsys)
+    assert code == 2 and tracks is None and message in said and said.count("\n") == 1
+
+
+def test_ids_of_slices_with_a_gap_are_new(recording, here, capsys, monkeypatch):
+    parts = []
+    plain = Stitching.add
+    monkeypatch.setattr(Stitching, "add", lambda self, part: parts.append(plain(self, part)) or parts[-1])
+    run(["all.csv", "--tracker", "nearest-neighbour", "--slice", "100"], "t.csv", capsys)
+    again = Stitching()
+    first, third = plain(again, parts[0]), plain(again, parts[2])
+    assert not {*first.frame.track_id} & {*third.frame.track_id}
