@@ -59,7 +59,8 @@ _SCANS = Option("scans", "A:B", "only scans A to B-1, counted from 0; A alone is
 _KBEST = Option("kbest", "K", "the K best associations of each scan, in order", whole(1))
 _LINES = Output(".jsonl", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
 _SHARED = [COMMON[name] for name in ("seed", "time_limit", "jobs", "scheduler")]
-_OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST)
+_TILES = Option("tiles", "N", "build and solve each scan in N tiles of space: for huge scans", whole(1), _SCENES)
+_OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST, _TILES)
 """Options that a TOML file may have."""
 _OPTIONS = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "+"}),
@@ -115,6 +116,8 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     log = SolverLog(bar, given["verbose"])
     plan = _plan(sources, solver, parameters, given, log)
     items = _items(plan, given)
+    if given["proof"] and (given["tiles"] or 0) > 1:
+        raise InvalidInputError("--proof: leave out --tiles: a proof is of a problem in one piece")
     if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
     if given["verbose"]:
@@ -256,10 +259,10 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
         solver,
         parameters=parameters,
         gating=given.some(parameter.name for parameter in _GATING),
-        pheromone=given["report"] is not None,
+        pheromone=given["report"] is not None and not given["tiles"],
         gate_loss=bool(given["gate_loss"]),
         watch=log,
-        **given.some(("seed", "time_limit", "kbest")),
+        **given.some(("seed", "time_limit", "kbest", "tiles")),
     )
 
 

@@ -17,6 +17,7 @@ from assoc.association.association import Association
 from assoc.association.gate_loss import bound_without_gates
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
+from assoc.association.tiles import solve_in_tiles, targets_of
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.costs.range_rates import SPEED
 from assoc.errors import InvalidInputError
@@ -58,6 +59,8 @@ class Plan:
         Called with the number of a scan and each TracePoint of its solver, in this process only.
     gate_loss : bool
         Whether to bound the loss by gating for each scan of a scene.
+    tiles : int
+        Above 1: build and solve each scan of a scene in so many tiles of space; see `assoc.association.tiles`.
     """
 
     sources: Sequence[Source]
@@ -70,6 +73,7 @@ class Plan:
     pheromone: bool = False
     watch: Callable[[int, TracePoint], object] | None = None
     gate_loss: bool = False
+    tiles: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", whole_seed(self.seed))
@@ -121,6 +125,15 @@ class Plan:
             scans = [replace(ranked, gate_loss=max(0.0, ranked.solution.cost - bound)) for ranked in scans]
         return self._best(scans, history, compiled)
 
+    def _tiled(self, item: tuple[int, int], jobs: int, scheduler: str | None) -> ScanAssociation:
+        source, compiled = self.sources[item[0]], compile_seconds()
+        if isinstance(source, AssignmentProblem):
+            raise InvalidInputError("tiles: expected a scene; a problem has its tuples already")
+        scan = source.scan(item[1])
+        solution, targets, costs = solve_in_tiles(self, source, scan, self.tiles, jobs=jobs, scheduler=scheduler)
+        found = _scan_of_targets(source, scan, solution, targets, costs, self.gating.get("speed", SPEED))
+        return replace(found, compile_time=compile_seconds() - compiled)
+
     def problem(self, item: tuple[int, int]) -> AssignmentProblem:
         """The assignment problem of scan ``item[1]`` of source ``item[0]``."""
         source = self.sources[item[0]]
@@ -160,6 +173,8 @@ class Plan:
         """Associate scans one after the other, or several at once in processes or on a cluster; results in order."""
         if isinstance(jobs, bool) or not isinstance(jobs, (int, np.integer)) or jobs < 1:
             raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
+        if self.tiles > 1:
+            return (self._tiled(item, int(jobs), scheduler) for item in items)
         # enough batches that processes end at about the same time
         together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
         return spread(self, items, jobs=int(jobs), scheduler=scheduler, together=together)
@@ -176,24 +191,26 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Pla
     return Plan(*values)
 
 
-def _targets(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Tuples that are targets, and their costs."""
-    number = np.count_nonzero(solution.tuples, axis=1)
-    alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
-    real = (number >= 2) | alone_but_real
-    return solution.tuples[real], problem.costs[solution.indices[real]]
-
-
 def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
     sizes = tuple(int(n) for n in problem.sizes)
-    targets, costs = _targets(problem, solution)
+    targets, costs = targets_of(problem, solution)
     return ScanAssociation(0, None, sizes, solution, targets, costs=costs)
 
 
 def _of_scan(
     scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution, speed: float | Sequence[float]
 ) -> ScanAssociation:
-    targets, costs = _targets(problem, solution)
+    return _scan_of_targets(scene, scan, solution, *targets_of(problem, solution), speed)
+
+
+def _scan_of_targets(
+    scene: Scene,
+    scan: Scan,
+    solution: Solution,
+    targets: NDArray[np.int32],
+    costs: NDArray[np.float64],
+    speed: float | Sequence[float],
+) -> ScanAssociation:
     positions, covariances = positions_and_covariances(scene, scan, targets, speed=speed)
     truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
