@@ -156,9 +156,12 @@ class Recording(Shown):
 
     def summary(self) -> str:
         """Return its contents and defects in a few lines."""
-        from assoc.recordings.survey import Survey
-
-        return Survey([self]).summary(self.notes)
+        if not len(self):
+            return "no plots"
+        identities = len(np.unique(self.identities[self.decoded]))
+        missing = int(np.isnan(self.altitudes).sum())
+        counts = len(self), identities, int((~self.decoded).sum()), int(self.garbled.sum()), missing
+        return in_words(float(self.times[-1] - self.times[0]), counts, self.notes)
 
     def __repr__(self) -> str:
         name = f"{self.name!r}, " if self.name else ""
@@ -176,3 +179,15 @@ def joined(parts: Sequence[Recording], notes: Mapping[str, int], name: str) -> R
     columns = {column: np.concatenate([getattr(part, column) for part in parts]) for column in RECORDED}
     known = [part.sources for part in parts if part.sources is not None]
     return Recording(**columns, sources=np.concatenate(known) if known else None, notes=notes, name=name)
+
+
+def in_words(span: float, counts: tuple[int, int, int, int, int], notes: Mapping[str, int]) -> str:
+    """A few lines on a recording: its seconds, plots, identities, plots without one, garbled and missing altitudes."""
+    plots, identities, undecoded, garbled, missing = counts
+    lines = [
+        f"{plots} plots over {span:g} s",
+        f"{identities} identities; {undecoded} plots not decoded",
+        f"altitudes: {garbled} garbled, {missing} missing",
+        *(f"{what}: {count}" for what, count in notes.items() if count),
+    ]
+    return "\n".join(lines)

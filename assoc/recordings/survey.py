@@ -11,7 +11,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import LimitExceededError
-from assoc.recordings.recording import RECORDED, Recording
+from assoc.recordings.recording import RECORDED, Recording, in_words
 
 CELLS = 72
 """Sectors in which bearings are counted."""
@@ -71,13 +71,8 @@ class Survey:
         """Contents and defects in a few lines."""
         if not self.count:
             return "no plots"
-        lines = [
-            f"{self.count} plots over {self.last - self.first:g} s",
-            f"{len(self._identities)} identities; {self._undecoded} plots not decoded",
-            f"altitudes: {self._garbled} garbled, {self._missing} missing",
-            *(f"{what}: {count}" for what, count in notes.items() if count),
-        ]
-        return "\n".join(lines)
+        counts = self.count, len(self._identities), self._undecoded, self._garbled, self._missing
+        return in_words(self.last - self.first, counts, notes)
 
 
 def _distinct(known: Array, values: Array, count: int) -> Array:
