@@ -111,8 +111,6 @@ class _Tracked(NamedTuple):
     total: int
     whole: PlotTracks | None = None
     """For reports."""
-    written: bool = False
-    """Whether the tracks are in their file already."""
     missing: Sequence[str] = ()
     """Files and slices that they lack."""
 
@@ -144,7 +142,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),
         (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
-        (None if found.written else given["output"], lambda: _write_tracks(given["output"], found.table)),
+        (given["output"], lambda: _write_tracks(given["output"], found.table)),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
@@ -261,11 +259,11 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
 def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     import numpy as np
 
-    from assoc._files.tables import table_writer
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
-    from assoc.tracking.plots import FORGET, TakenPlots, follow, may_return, track_plots
-    from assoc.tracking.track_table import WrittenTracks
+    from assoc.tracking import TrackTable
+    from assoc.tracking.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
+    from assoc.tracking.track_table import LongTable
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if _is_asterix(file) else "tables", given["identity"] or "score-only"
@@ -284,10 +282,10 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         radar = radar_of(survey, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
     # these show all tracks at once
-    whole = bool(given["smooth"] or given["report"] or given["map"])
+    whole = any(given[name] for name in ("smooth", "report", "map", "asterix"))
     sliced = given["jobs"] or given["scheduler"] or given["slice"]
     if sliced and (whole or given["check"]):
-        raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map and --check")
+        raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map, --asterix, --check")
 
     def track(scans: Iterator[Window]) -> tuple[Any, _Judged, PlotTracks | None]:
         if whole:
@@ -297,19 +295,16 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
             sizes = [len(window) for window in done.windows]
             return done.table, _Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
         takers = TakenPlots(survey.named, stored.addressed)
-        ends, sizes = [], []
-        with table_writer(given["output"]) as writer:
-            table = WrittenTracks(writer, given["origin"])
-            for followed in follow(tracker, scans, forget=True):
-                takers.take(followed)
-                table.add(*followed.listed(not given["all"]))
-                ends.append(float(followed.step.time))
-                sizes.append(len(followed.window))
-                if len(ends) % FORGET == 0:
-                    takers.keep(may_return(tracker))
-            if not ends:
-                _EARLY_END.say("")
-            table.write()
+        table, ends, sizes = LongTable(given["origin"]), [], []
+        for followed in follow(tracker, scans, forget=True):
+            takers.take(followed)
+            table.names.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
+            table.add(*followed.listed(not given["all"]))
+            ends.append(float(followed.step.time))
+            sizes.append(len(followed.window))
+            if len(ends) % FORGET == 0:
+                takers.keep(may_return(tracker))
+        table.finish()
         return table, _Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
 
     if sliced:
@@ -325,8 +320,9 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         # do not judge by plots that were left out
         judged = judged._replace(rates=None, kept=None)
         plots = plots and plots._replace(rates=None, kept=None)
+        (table if whole else table.names).take_names(TrackTable())
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return _Tracked(tracker, table, None, judged, count, total, plots, written=not whole, missing=[*left, *missing])
+    return _Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing])
 
 
 def _in_slices(
@@ -336,10 +332,9 @@ def _in_slices(
     import numpy as np
 
     from assoc._cli.track.slices import kept_slices
-    from assoc._files.tables import table_writer
     from assoc.tracking.plots import TakenPlots
     from assoc.tracking.slices import Stitching, TrackSlice, overlap
-    from assoc.tracking.track_table import WrittenTracks
+    from assoc.tracking.track_table import LongTable
 
     work = TrackSlice(tracker, not given["all"], given["origin"])
     places = {"jobs": given["jobs"] or 1, "scheduler": given["scheduler"]}
@@ -352,19 +347,16 @@ def _in_slices(
         except KeyboardInterrupt:
             _EARLY_END.say(f"{len(slices.done())} slices are kept; the same command goes on from there")
             raise
-        with table_writer(given["output"]) as writer:
-            table = WrittenTracks(writer, given["origin"])
-            for number in slices.done():
-                part = slices.load(number)
-                if part is None:
-                    continue
-                part = stitching.add(part)
-                table.add_frame(part.frame)
-                takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
-                takers.keep({*part.tracks.tolist()})
-                ends.append(part.ends)
-                sizes += part.sizes.tolist()
-            table.write()
+        table = LongTable(given["origin"])
+        for part in filter(None, map(slices.load, slices.done())):
+            part = stitching.add(part)
+            table.add_frame(part.frame)
+            table.names.count_identities(part.tracks, part.known[:, 1:])
+            takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
+            takers.keep({*part.tracks.tolist()})
+            ends.append(part.ends)
+            sizes += part.sizes.tolist()
+        table.finish()
         missing = slices.missing()
     times = np.concatenate([np.zeros(0), *ends])
     return table, _Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
@@ -516,8 +508,10 @@ def _write_asterix(path: str, found: _Tracked) -> None:
     write_tracks(path, frame)
 
 
-def _write_tracks(path: str, tracks: TrackTable) -> None:
-    if TRACKS.ending(path) == ".parquet":
+def _write_tracks(path: str, tracks: Any) -> None:
+    if not hasattr(tracks, "to_csv"):
+        tracks.write(path)
+    elif TRACKS.ending(path) == ".parquet":
         tracks.to_parquet(path)
     else:
         tracks.to_csv(path)

@@ -20,19 +20,16 @@ class TableWriter:
     """Takes parts of a table; see `table_writer`."""
 
     def __init__(self, file: IO[bytes], parquet: bool) -> None:
-        self._file, self._parquet = file, parquet
+        self._file, self.parquet = file, parquet
         self._parts: list[pd.DataFrame] = []
         self._waiting = 0
         self._writer: Any = None
         self._begun = False
-        self.rows = 0
-        """Rows so far."""
 
     def add(self, part: pd.DataFrame) -> None:
         """Write some rows; all parts have the same columns."""
         self._parts.append(part)
         self._waiting += len(part)
-        self.rows += len(part)
         if self._waiting >= _ROWS:
             self._write()
 
@@ -43,7 +40,7 @@ class TableWriter:
         full = [part for part in self._parts if len(part)] or self._parts[:1]
         frame = pd.concat(full, ignore_index=True)
         self._parts, self._waiting = [], 0
-        if not self._parquet:
+        if not self.parquet:
             self._file.write(frame.to_csv(index=False, header=not self._begun).encode("utf-8", "backslashreplace"))
         else:
             import pyarrow as pa

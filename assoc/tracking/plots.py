@@ -124,13 +124,16 @@ def track_plots(
     for followed in follow(tracker, windows):
         done.append(followed)
         takers.take(followed)
+        table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
         table.add(*followed.listed(confirmed))
+    table.name_by_identities()
     if smooth and done:
         decisions = [decision for one in done for decision in one.step.final]
         ends, settings = np.array([one.step.time for one in done]), tracker.settings
         plots, times = [one.measurements for one in done], [one.times for one in done]
         scene = Scene(tracker.sensors, ends, plots, settings.place.region, measurement_times=times)
-        table = smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
+        named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
+        table.take_names(named)
     ends = np.array([one.step.time for one in done])
     tracks = np.concatenate([np.zeros(0, dtype=np.int64), *(one.tracks for one in done)])
     rates, kept = takers.rates(), takers.kept()

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import os
+import pickle
+import tempfile
+import weakref
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.tables import TableWriter
+from assoc._files.tables import table_writer
 from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
@@ -172,11 +175,17 @@ class TrackTable(Shown):
             frame = frame.assign(latitude=latitude, longitude=longitude)
         if any(self._quality):
             frame = frame.join(pd.DataFrame.from_records(self._quality))
+        return self.with_names(frame)
+
+    def with_names(self, frame: pd.DataFrame) -> pd.DataFrame:
+        """The frame with the columns of targets and identities, where there are any."""
+        ids = frame["track_id"].tolist()
         if self.targets:
-            frame["target"] = [self.targets.get(number, "") for number in frame["track_id"].tolist()]
+            frame = frame.assign(target=[self.targets.get(number, "") for number in ids])
         if self.identities:
-            names = [self.identities.get(number, ("", "")) for number in frame["track_id"].tolist()]
-            frame["address_hex"], frame["mode3_oct"] = zip(*names, strict=True) if names else ((), ())
+            names = [self.identities.get(number, ("", "")) for number in ids]
+            addresses, codes = zip(*names, strict=True) if names else ((), ())
+            frame = frame.assign(address_hex=addresses, mode3_oct=codes)
         return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
@@ -229,52 +238,67 @@ class TrackTable(Shown):
         return times[kept], ids[kept], positions[kept]
 
 
-class WrittenTracks:
-    """A `TrackTable` whose rows are written as they come; what is kept of them are numbers.
+class LongTable:
+    """A `TrackTable` that grows on the disk, in a temporary file: names of tracks are known at the end alone.
 
     Parameters
     ----------
-    writer : TableWriter
     origin : tuple of latitude, longitude, height, optional
         As of `TrackTable`.
     """
 
-    def __init__(self, writer: TableWriter, origin: Origin | None = None) -> None:
-        self._writer, self._origin = writer, origin
-        self._table = TrackTable(origin)
+    def __init__(self, origin: Origin | None = None) -> None:
+        self._origin, self._table, self.names = origin, TrackTable(origin), TrackTable()
+        self._file = tempfile.TemporaryFile()
+        weakref.finalize(self, self._file.close)
         self._ids: set[int] = set()
         self._inconsistent: dict[int, float] = {}
+        self._rows = 0
 
     def __len__(self) -> int:
-        return self._writer.rows + len(self._table)
+        return self._rows + len(self._table)
 
     def add(self, *arguments: Any) -> None:
         """Add the tracks of a scan; see `TrackTable.add`."""
         self._table.add(*arguments)
         if len(self._table) >= _ROWS:
-            self.write()
+            self._put_away()
+
+    def finish(self) -> None:
+        """Name the tracks; to be called when all are there."""
+        self.names.name_by_identities()
+        self._put_away()
+
+    def _put_away(self) -> None:
+        table, self._table = self._table, TrackTable(self._origin)
+        self.add_frame(table.to_frame())
 
     def add_frame(self, frame: pd.DataFrame) -> None:
-        """Write rows of a table."""
+        """Add rows of a table."""
+        pickle.dump(frame, self._file, pickle.HIGHEST_PROTOCOL)
+        self._rows += len(frame)
         if len(frame):
-            self._writer.add(frame)
             self._ids |= {*frame.track_id[frame.confirmed].tolist()}
             wrong = frame[~frame.consistent]
             for track, nis in zip(wrong.track_id.tolist(), wrong.nis.tolist(), strict=True):
                 self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
 
-    def write(self) -> None:
-        """Write the rows that wait."""
-        if len(self._table) or not self._writer.rows:
-            self._writer.add(self._table.to_frame())
-        self._ids |= self._table.confirmed_ids()
-        for track, nis in self._table.inconsistent().items():
-            self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
-        self._table = TrackTable(self._origin)
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write all rows: Parquet if the name ends so, else CSV."""
+        from assoc._text.plain import spreadsheet_text
+
+        end = self._file.tell()
+        self._file.seek(0)
+        with table_writer(path) as writer:
+            while self._file.tell() < end:
+                frame = self.names.with_names(pickle.load(self._file))
+                if "target" in frame and not writer.parquet:
+                    frame["target"] = frame["target"].map(spreadsheet_text)
+                writer.add(frame)
 
     def confirmed_ids(self) -> set[int]:
         """As of `TrackTable`."""
-        return self._ids | self._table.confirmed_ids()
+        return self._ids
 
     def inconsistent(self) -> dict[int, float]:
         """As of `TrackTable`."""
