@@ -10,6 +10,9 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
+# fixtures of several folders
+pytest_plugins = ["tests.dask_cluster"]
+
 # tests are of compiled kernels, and what they start is not to compile beside them; those of interpreting switch it on
 os.environ.setdefault("ASSOC_INTERPRET", "0")
 

@@ -1,14 +1,17 @@
 """Recordings of several files, tracked in slices of time: the tracks of one process, and what becomes of damage."""
 
+import json
 import os
+import signal
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from assoc import track
+from assoc import solve, track
+from assoc._cli.track.slices import Slices
 from assoc.recordings import write_plots
-from assoc.simulation import simulate_recording
+from assoc.simulation import simulate, simulate_recording
 from assoc.tracking.slices import Stitching, TrackSlice, _same
 
 WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
@@ -139,3 +142,58 @@ def test_ids_of_slices_with_a_gap_are_new(recording, here, capsys, monkeypatch):
     again = Stitching()
     first, third = plain(again, parts[0]), plain(again, parts[2])
     assert not {*first.frame.track_id} & {*third.frame.track_id}
+
+
+SLICED = ["all.csv", "--tracker", "nearest-neighbour", "--slice", "60"]
+
+
+def at_first(monkeypatch, do):
+    """Do something when the first slice is done."""
+    plain, done = Slices._save, []
+
+    def save(self, part):
+        plain(self, part)
+        if not done:
+            done.append(do())
+
+    monkeypatch.setattr(Slices, "_save", save)
+
+
+@pytest.mark.slow
+def test_a_lost_process_is_made_good(here, capsys, monkeypatch):
+    import psutil
+
+    assert run(SLICED, "one.csv", capsys)[0] == 0
+    at_first(monkeypatch, lambda: psutil.Process().children()[0].kill())
+    code, two, said = run([*SLICED, "--jobs", "2"], "two.csv", capsys)
+    assert (code, said) == (0, "")
+    pd.testing.assert_frame_equal(two, pd.read_csv("one.csv"))
+
+
+@pytest.mark.slow
+def test_a_real_cluster_gives_the_same_and_survives_losses(here, capsys, monkeypatch, scheduler, start_worker):
+    workers = [start_worker(), start_worker()]
+    assert run(SLICED, "one.csv", capsys)[0] == 0
+    one = pd.read_csv("one.csv")
+    with monkeypatch.context() as patch:
+        at_first(patch, workers[0].kill)
+        code, many, _ = run([*SLICED, "--scheduler", str(scheduler)], "many.csv", capsys)
+    assert code == 0 and workers[0].wait(10) == -signal.SIGKILL
+    pd.testing.assert_frame_equal(many, one)
+    scene = simulate("crowd", 1, targets=60, scans=40)
+    scene.save("scene.npz")
+    results = []
+    for words in ([], ["--scheduler", str(scheduler)], ["--scheduler", str(scheduler), "--tiles", "4"]):
+        assert solve.main(["scene.npz", "--json", "r.json", "-q", *words]) == 0
+        results.append(json.loads((here / "r.json").read_text())["scans"])
+    for scans in results[1:]:
+        assert [scan["tuples"] for scan in scans] == [scan["tuples"] for scan in results[0]]
+        assert [scan["cost"] for scan in scans] == pytest.approx([scan["cost"] for scan in results[0]])
+    capsys.readouterr()
+    # the scheduler goes: what is missing is named, and other processes do it
+    at_first(monkeypatch, scheduler.process.kill)
+    code, part, said = run([*SLICED, "--scheduler", str(scheduler)], "rest.csv", capsys)
+    assert code == 3 and "written without the slice from" in said and 0 < len(part) < len(one)
+    code, rest, _ = run([*SLICED, "--jobs", "2"], "rest.csv", capsys)
+    assert code == 0
+    pd.testing.assert_frame_equal(rest, one)
