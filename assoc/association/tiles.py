@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
@@ -25,9 +25,6 @@ from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
-
-if TYPE_CHECKING:
-    from assoc.association.plan import Plan
 
 
 def targets_of(problem: AssignmentProblem, solution: Solution) -> tuple[Array, Array]:
@@ -70,7 +67,7 @@ class TileAnswer(NamedTuple):
 class SolveTile:
     """Builds and solves a tile, in any process."""
 
-    def __init__(self, plan: Plan, scene: Scene) -> None:
+    def __init__(self, plan: Any, scene: Scene) -> None:
         # the other scans are not needed
         self._plan, self._scene = replace(plan, sources=(), watch=None), _without_scans(scene)
 
@@ -99,7 +96,7 @@ class SolveTile:
         return TileAnswer(targets, costs, answer.cost, answer.lower_bound, whole[left], left_costs, answer.runtime)
 
 
-def _solved(plan: Plan, problem: AssignmentProblem) -> Solution:
+def _solved(plan: Any, problem: AssignmentProblem) -> Solution:
     common: Any = {"seed": plan.seed, "time_limit": plan.time_limit}
     return assign(problem, plan.solver, **common, **plan.parameters)
 
@@ -110,9 +107,9 @@ def _without_scans(scene: Scene) -> Scene:
 
 
 def solve_in_tiles(
-    plan: Plan, scene: Scene, scan: Scan, count: int, *, jobs: int = 1, scheduler: str | None = None
+    plan: Any, scene: Scene, scan: Scan, count: int, *, jobs: int = 1, scheduler: str | None = None
 ) -> tuple[Solution, Array, Array]:
-    """Associate a scan in about so many tiles.
+    """Associate a scan in about so many tiles, as an `assoc.association.plan.Plan` says.
 
     Returns
     -------
