@@ -143,7 +143,7 @@ def _whole_grid(
             f"scan {chosen.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
         )
     # the first of the grid is the tuple without measurements, which no problem has
-    tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
+    tuples = np.ascontiguousarray(np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:])
     costs = tuple_costs(scene, chosen, tuples, speed=speed, target_density=density)
     return AssignmentProblem(tuples, costs, chosen.sizes)
 

@@ -279,7 +279,7 @@ class Filter(ABC, Generic[S]):
 
 def measured_array(measured: object, batch: int | None, dim: int, what: str = "measured") -> Array:
     """Return measurements as float64 (B, d); finiteness is left to the kernels."""
-    if isinstance(measured, np.ndarray) and measured.dtype == np.float64 and measured.flags.c_contiguous:
+    if isinstance(measured, np.ndarray) and measured.dtype == np.float64:
         array = measured
     else:
         array = numbers(measured, what)
@@ -288,7 +288,8 @@ def measured_array(measured: object, batch: int | None, dim: int, what: str = "m
     if array.ndim != 2 or array.shape[1] != dim or (batch is not None and len(array) != batch):
         rows = "M" if batch is None else batch
         raise InvalidInputError(f"{what} must have shape ({rows}, {dim}), got {array.shape}")
-    return array
+    # a kernel would be compiled once more for arrays that are read only, as those of scenes are
+    return array if array.flags.carray else array.copy()
 
 
 def complain(status: int, where: str = "") -> NoReturn:

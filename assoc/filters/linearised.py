@@ -92,7 +92,7 @@ class GaussianFilter(Filter[Gaussian]):
             return super().step(state, dt, measured, sensor)
         if before.shape[1] != n:
             check_dimension(state, n)
-        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (1, d) or not z.flags.c_contiguous:
+        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (1, d) or not z.flags.carray:
             z = measured_array(measured, 1, d)
         mean, P, rest = _empty((1, n)), _empty((1, n, n)), _empty(d + d * d + 2)
         status = step_kernel(before, state.covariance, motion, z, models, mean, P, rest)
@@ -144,7 +144,7 @@ class GaussianFilter(Filter[Gaussian]):
         if n != self.motion.dim:
             check_dimension(state, self.motion.dim)
         z = measured
-        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (B, d) or not z.flags.c_contiguous:
+        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (B, d) or not z.flags.carray:
             z = measured_array(measured, B, d)
         models = o.packed
         if o.code < 0:

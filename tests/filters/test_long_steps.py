@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from assoc.costs.tracks import gating
 from assoc.errors import InvalidInputError
 from assoc.filters import (
     ConstantVelocity,
@@ -24,6 +25,7 @@ from assoc.filters import (
     UnscentedKalmanFilter,
     paper_rules,
 )
+from assoc.filters.kernels import gaussian, points
 from experiments.filters.endurance import endure
 from experiments.filters.endurance import filters as of_each_kind
 from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
@@ -54,6 +56,25 @@ def problem(one, steps=4, count=3):
     rng = np.random.default_rng(1)
     places = start.mean[:, :3] + np.arange(1, steps + 1)[:, None, None] * start.mean[:, 3:6]
     return start, places + rng.normal(0, 50.0, places.shape)
+
+
+KERNELS = {"ekf": gaussian.update, "unscented": points.unscented, "gate": gating._sweep}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_read_only_measurements_compile_no_kernel_again(name):
+    """Those of scenes are read only, and numba compiles for each kind of array."""
+    one, sensor = every_filter()["ekf" if name == "gate" else name]
+    start, z = problem(one, steps=1)
+    kinds = []
+    for writable in (True, False):
+        z.setflags(write=writable)
+        if name == "gate":
+            gating.near_pairs(one.expected(start, sensor), z[0], (False, True, True), 16.0)
+        else:
+            one.update(start, z[0], sensor)
+        kinds.append(len(KERNELS[name].signatures))
+    assert kinds[0] == kinds[1]
 
 
 def results():

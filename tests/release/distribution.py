@@ -234,7 +234,7 @@ def main() -> int:
     """Run the program; exit code 1 if something is wrong."""
     parser = argparse.ArgumentParser(description="Build the sdist and the wheels, and try them.")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="where to put them")
-    dist = parser.parse_args().folder
+    dist = parser.parse_args().folder.absolute()
     with tempfile.TemporaryDirectory(prefix="assoc-dist-") as name:
         folder = Path(name)
         try:

@@ -144,7 +144,7 @@ def test_nothing_in_the_way_gives_the_shortest_path():
 @sample("seed", range(4), every=3)
 def test_several_obstacles(seed):
     rng = np.random.default_rng(seed)
-    start, goal = Pose(-8, 0, rng.uniform(-3, 3)), Pose(8, 0, rng.uniform(-3, 3))
+    start, goal = Pose(-8.0, 0.0, rng.uniform(-3, 3)), Pose(8.0, 0.0, rng.uniform(-3, 3))
     obstacles = [
         (float(x), float(y), float(r))
         for x, y, r in zip(rng.uniform(-5, 5, 5), rng.uniform(-3, 3, 5), rng.uniform(0.2, 2.0, 5), strict=True)
@@ -153,7 +153,8 @@ def test_several_obstacles(seed):
     check(one, start, goal, 1.0, obstacles, 0.1)
     # turned by a half circle about the middle it is the same problem
     turned = [(-x, -y, r) for x, y, r in obstacles]
-    again = around(Pose(8, 0, start.heading + math.pi), Pose(-8, 0, goal.heading + math.pi), 1.0, turned, margin=0.1)
+    ends = Pose(8.0, 0.0, start.heading + math.pi), Pose(-8.0, 0.0, goal.heading + math.pi)
+    again = around(*ends, 1.0, turned, margin=0.1)
     assert again.length == pytest.approx(one.length, rel=0.02)
 
 

@@ -169,7 +169,7 @@ def test_the_best_children_of_several_parents(drop, problems):
     for _ in range(problems):
         parents, tracks, count = (int(n) for n in rng.integers([1, 0, 1], [6, 5, 5]))
         near = rng.random((count, tracks)) < 0.6
-        track = np.nonzero(near)[1]
+        track = np.nonzero(near)[1].copy()
         first = np.append(0, near.sum(axis=1).cumsum())
         birth = np.where(rng.random(count) < 0.2, -np.inf, rng.normal(-1, 1, count))
         meanings = Meanings(first, track, rng.normal(2, 4, len(track)), birth)

@@ -46,7 +46,9 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate, MOST_PAIRS)
+    # not compiled once more for arrays that are read only, as those of scenes are, or a part of larger ones
+    covariance, z = (np.require(one, requirements=("C", "W")) for one in (expected.covariance, z))
+    tracks, found = _sweep(h, covariance, z, _turning(angular), gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
         # ordered by track: extrapolated to those left
         expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
@@ -151,7 +153,7 @@ def near_both(
     tuple, measurement : int arrays (K,)
         Ordered by tuple, then measurement.
     """
-    arrays = track, near.first, near.found, np.ascontiguousarray(measurements), _turning(angular)
+    arrays = track, near.first, near.found, np.require(measurements, requirements=("C", "W")), _turning(angular)
     return _near_both((expected.mean, _reach(expected.covariance, gate)), *arrays, most)
 
 

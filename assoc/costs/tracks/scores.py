@@ -79,7 +79,8 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     array (K,)
         To be added to the score, at most ln(birth rate).
     """
-    return np.asarray(_log_birth(np.ascontiguousarray(covariances), region, math.log(birth_rate)))
+    covariances, region = (np.require(one, requirements=("C", "W")) for one in (covariances, region))
+    return np.asarray(_log_birth(covariances, region, math.log(birth_rate)))
 
 
 @njit
