@@ -1,5 +1,7 @@
 """What the page on probabilities shows, and that sampled ones are compared with exact sums."""
 
+import pytest
+
 from experiments import probabilities
 from experiments.common.results import Results
 from experiments.pages.measured import probabilities as table
@@ -14,6 +16,7 @@ def test_the_page_shows_every_kind_with_its_goal():
         assert results[f"{name}: seconds"].band == (None, seconds)
 
 
+@pytest.mark.slow
 def test_small_crowds_are_summed_exactly():
     claims = {claim.quantity: claim.ours for claim in probabilities.calibration(3)}
     assert claims["small crowds: summed exactly"] >= 1

@@ -14,6 +14,7 @@ from assoc.plotting.live import LivePage
 from assoc.recordings import Recording, radar_of, read_plots
 from assoc.recordings.on_earth import placed
 from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
+from tests.sizes import sample
 
 pytest.importorskip("pyarrow")
 PLACES = {"north": (47.5, 8.0, 450.0), "south": (46.2, 9.0, 600.0)}
@@ -70,7 +71,7 @@ def described(folder, heights=True, **changes):
     return str(folder / "radars.toml")
 
 
-@pytest.mark.parametrize("heights", [True, False])
+@sample("heights", [True, False], every=2)
 def test_two_radars_to_a_map(tmp_path, heights, capsys):
     file, out = described(tmp_path, heights), str(tmp_path / "tracks.csv")
     assert track.main([file, "-o", out, "--map", str(tmp_path / "tracks.kml")]) == 0

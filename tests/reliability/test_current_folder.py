@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from assoc.simulation import simulate
+from tests.sizes import sample
 
 DEPENDENCIES = {"cloudpickle", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy", "shtab"}
 PLANTED = "import os, sys\nos.write(2, b'executed ' + __name__.encode() + b'\\n')\nos._exit(77)\n"
@@ -51,7 +52,7 @@ def run(words, data, **environment):
     )
 
 
-@pytest.mark.parametrize("way", WAYS)
+@sample("way", WAYS, every=2)
 def test_nothing_there_runs(data, way):
     words = WAYS[way]
     if isinstance(words, str):

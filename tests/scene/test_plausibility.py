@@ -44,7 +44,12 @@ def test_the_list_of_scenarios_is_whole():
     assert recording_names() == ["rotating-radar"]
 
 
-@pytest.mark.parametrize(("name", "values"), SCENARIOS, ids=lambda one: one if isinstance(one, str) else "")
+# the bearings take as long as all others together
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [pytest.param(*one, marks=pytest.mark.slow if one[0] == "bearing-only" else ()) for one in SCENARIOS],
+    ids=lambda one: one if isinstance(one, str) else "",
+)
 @sample("seed", range(4), every=4)
 def test_no_warning_on_any_scenario(name, values, seed, tmp_path):
     if name == "from-tracks":
