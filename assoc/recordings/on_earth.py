@@ -42,8 +42,9 @@ def placed(
     known = np.isfinite(altitudes)
     altitudes = np.where(known, altitudes, np.median(altitudes[known]) if known.any() else _USUAL_ALTITUDE)
     up = heights_above(recording.measurements, altitudes, replace(radar, position=np.zeros(3)), place)
-    # an altitude above the plot's range cannot be right: straight above
-    up = np.clip(up, -recording.ranges, recording.ranges)
+    # straight above the radar a plot would lose its direction: by noise, or by an altitude that is only assumed
+    most = recording.ranges * np.where(known, 0.95, 0.5)
+    up = np.clip(up, -most, most)
     ground = np.sqrt(recording.ranges**2 - up**2)
     local = np.column_stack([ground * np.cos(recording.azimuths), ground * np.sin(recording.azimuths), up])
     latitude, longitude, height = geodetic(local, place).T

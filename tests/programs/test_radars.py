@@ -137,6 +137,10 @@ def test_azimuths_in_the_frame_of_another_place():
     off = np.abs(np.angle(np.exp(1j * (told.azimuths - exact[:, 1]))))
     # without an altitude one is assumed
     assert off[:40].max() < 1e-6 and 1e-5 < off[40:].max() < 2.5e-3
+    # nearer than that altitude, or than its own with noise, a plot keeps its direction
+    near = Recording([0.0, 1.0, 2.0], [3e3, 3e3, 50e3], np.full(3, 0.7), altitudes=[np.nan, 3700.0, 9e3])
+    told, _ = placed(near, radar_of(near, range_noise=40.0, azimuth_noise=1e-3), place, origin)
+    assert np.abs(told.azimuths - 0.7).max() < 0.15
 
 
 def test_asterix_beside_tables(tmp_path, capsys):
