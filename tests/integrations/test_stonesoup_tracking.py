@@ -244,7 +244,7 @@ def test_stone_soup_finds_the_plugin(tmp_path):
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
     (about / "entry_points.txt").write_text(f"[stonesoup.plugins]\nassoc = {points['assoc']}\n")
-    script = "from stonesoup.plugins.assoc import AssignmentAssociator, AssignmentInitiator"
+    script = "from stonesoup.plugins.assoc import AssignmentInitiator, AssocTracker"
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     subprocess.run([sys.executable, "-W", "error", "-c", script], check=True, env={**os.environ, "PYTHONPATH": path})
 
