@@ -230,22 +230,36 @@ def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
     if sensors.code[s] == BEARING:
         # windows are those of located measurements, where there are any
         s, t = t, s
-    rows, others, first, last = _windows(sensors, scan, s, t, limit)
-    counts = np.cumsum(last - first)
-    k = 0
-    while k < len(rows):
-        so_far = counts[k - 1] if k else 0
-        stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
-        low, high = first[k:stop].min(), last[k:stop].max()
-        block = rows[k:stop], others[low:high], first[k:stop] - low, last[k:stop] - low
-        yield _near_within(sensors, scan, t, *block, limit), stop / len(rows)
-        k = stop
+    rows, every = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
+    done = 0.0
+    for others in _alike(scan, every) if sensors.code[t] != BEARING else [every]:
+        window = _windows(sensors, scan, rows, others, limit)
+        counts = np.cumsum(window.last - window.first)
+        k = 0
+        while k < len(window.rows):
+            so_far = counts[k - 1] if k else 0
+            stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
+            first, last = window.first[k:stop], window.last[k:stop]
+            low, high = first.min(), last.max()
+            block = window.rows[k:stop], window.others[low:high], first - low, last - low
+            share = len(others) / len(every) * stop / len(window.rows)
+            yield _near_within(sensors, scan, t, *block, limit), done + share
+            k = stop
+        done += len(others) / len(every)
 
 
-def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> _Windows:
-    """Measurements of sensor t near those of sensor s; if one of the two measures bearings alone, it is t."""
-    rows, others = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
-    if sensors.code[s] == BEARING or not len(others) or not len(rows):
+def _alike(scan: ScanArrays, others: Array) -> list[Array]:
+    """Located measurements by the size of their ellipsoids: a window is as wide as the largest in it asks for."""
+    size = np.frexp(np.sqrt(scan.spread[others, 0] + scan.spread[others, 3]))[1]
+    return [others[size == one] for one in np.unique(size)]
+
+
+def _windows(sensors: SensorArrays, scan: ScanArrays, rows: Array, others: Array, limit: float) -> _Windows:
+    """Measurements of a sensor near those of another; if one of the two measures bearings alone, it is the other."""
+    if not len(others) or not len(rows):
+        return _Windows(rows, others, np.zeros(len(rows), np.int64), np.zeros(len(rows), np.int64))
+    s, t = scan.owner[rows[0]], scan.owner[others[0]]
+    if sensors.code[s] == BEARING:
         return _Windows(rows, others, np.zeros(len(rows), np.int64), np.full(len(rows), len(others)))
     if sensors.code[t] != BEARING:
         return _strips(sensors, scan, rows, others, limit)

@@ -6,6 +6,8 @@ import pytest
 from assoc.costs import pairs
 from assoc.costs.arrays import scan_arrays, sensor_arrays
 from assoc.costs.gating import make_gates
+from assoc.scene import Scene
+from assoc.sensors import Radar2D
 from assoc.simulation import simulate
 
 
@@ -29,7 +31,28 @@ def test_candidates_grow_with_the_measurements():
     counts = []
     for targets in (500, 2000, 8000):
         sensors, scan, gates = _arrays(targets)
-        windows = pairs._windows(sensors, scan, 0, 1, float(gates.pair[0, 1]))
+        rows, others = (np.arange(*scan.start[s : s + 2]) for s in range(2))
+        windows = pairs._windows(sensors, scan, rows, others, float(gates.pair[0, 1]))
         counts.append((windows.last - windows.first).sum() / targets)
     # windows along one axis: 2 and 4 times as many for each target
     assert counts[2] < 1.3 * counts[1] < 1.6 * counts[0]
+
+
+def test_a_position_that_is_hardly_known_widens_few_windows(monkeypatch):
+    rng, looked, near = np.random.default_rng(1), [], pairs._near_within
+    view = [[0.0, 4e5], [-3.1, 3.1]]
+    radars = [Radar2D(position=[x, 0.0, 0.0], noise=[100.0, 1e-3], field_of_view=view) for x in (0.0, 1e4)]
+    far = [rng.random((400, 2)) * [2e5, 6.0] + [2e5, -3.0] for _ in radars]
+    # heights are open: near the second radar a range says little of where a target is
+    close = [far[0], np.append(far[1], [[3e4, 0.0]], axis=0)]
+    monkeypatch.setattr(pairs, "_near_within", lambda *a: looked.append((a[6] - a[5]).sum()) or near(*a))
+    counts = []
+    for measured in (far, close):
+        scene = Scene(radars, [0.0], [measured], region=[[-1e5, 1e5], [-1e5, 1e5], [0.0, 1e4]])
+        sensors = sensor_arrays(scene)
+        gates = make_gates(sensors, 0.999)
+        scan = scan_arrays(sensors, scene.scan(0), float(gates.pair.max()), 1.0)[0]
+        looked.clear()
+        list(pairs._coarse(sensors, scan, gates.pair))
+        counts.append(sum(looked))
+    assert 0 < counts[0] <= counts[1] < counts[0] + 400
