@@ -67,19 +67,9 @@ def _turning(angular: tuple[bool, ...]) -> Array:
 @njit
 def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, most: int) -> tuple[Array, Array]:
     """Pairs whose components are all within reach, sorted by track; at most one more than ``most``."""
-    num, dim = h.shape
+    num = h.shape[0]
     reach = _reach(covariance, gate)
-    total = np.zeros(dim)
-    for t in range(num):
-        for i in range(dim):
-            total[i] += reach[t, i]
-    # the component in which a gate is the smallest share of all measurements; angles have no order
-    axis, widest = -1, 0.0
-    for i in range(dim):
-        if not turning[i]:
-            share = (z[:, i].max() - z[:, i].min()) / max(total[i] / num, 1e-300)
-            if share > widest:
-                axis, widest = i, share
+    axis = _axis(reach, z, turning)
     low, high = np.zeros(num, np.int64), np.full(num, z.shape[0], np.int64)
     most_within = num * z.shape[0]
     order = np.arange(z.shape[0])
@@ -111,6 +101,21 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
         for k in range(ordered.size):
             found[first + k] = ordered[k]
     return tracks[:count].copy(), found[:count].copy()
+
+
+@inner_njit
+def _axis(reach: Array, z: Array, turning: Array) -> int:
+    """The component in which a gate is the smallest share of all measurements; -1: all are angles, without order."""
+    axis, widest = -1, 0.0
+    for i in range(z.shape[1]):
+        if not turning[i]:
+            total = 0.0
+            for t in range(len(reach)):
+                total += reach[t, i]
+            share = (z[:, i].max() - z[:, i].min()) / max(total / len(reach), 1e-300)
+            if share > widest:
+                axis, widest = i, share
+    return axis
 
 
 @inner_njit
@@ -190,15 +195,33 @@ def _near_both(
     rows = np.empty(64 + 2 * track.size, np.int64)
     found = np.empty(rows.size, np.int64)
     count = 0
+    axis = _axis(reach, z, turning) if track.size and len(z) else -1
+    order, along = near, np.empty(0)
+    if axis >= 0:
+        # those near a track in their order along the axis: the gate of a tuple is far narrower than the track's
+        order = near.copy()
+        for t in range(len(first) - 1):
+            part = near[first[t] : first[t + 1]]
+            order[first[t] : first[t + 1]] = part[np.argsort(z[part, axis], kind="mergesort")]
+        along = z[order, axis]
     for row in range(track.size):
-        for k in range(first[track[row]], first[track[row] + 1]):
-            if _inside(h[row], z[near[k]], reach[row], turning):
+        low, high = first[track[row]], first[track[row] + 1]
+        if axis >= 0:
+            start, part = low, along[low:high]
+            low = start + np.searchsorted(part, h[row, axis] - reach[row, axis], side="left")
+            high = start + np.searchsorted(part, h[row, axis] + reach[row, axis], side="right")
+        begin = count
+        for k in range(low, high):
+            if _inside(h[row], z[order[k]], reach[row], turning):
                 if count == rows.size:
                     rows, found = _doubled(rows), _doubled(found)
-                rows[count], found[count] = row, near[k]
+                rows[count], found[count] = row, order[k]
                 count += 1
                 if count > most:
                     return rows[:count].copy(), found[:count].copy()
+        ordered = np.sort(found[begin:count])
+        for k in range(ordered.size):
+            found[begin + k] = ordered[k]
     return rows[:count].copy(), found[:count].copy()
 
 

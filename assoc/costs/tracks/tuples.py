@@ -26,6 +26,8 @@ from assoc.filters.measurement import Measurement
 
 # asking for the memory left would take longer than correcting so few tracks
 _FEW = 100
+# tracks are taken in blocks with about so many pairs: what is corrected for their tuples stays in the cache
+_BLOCK = 4_000
 
 
 class TrackTuples(NamedTuple):
@@ -37,8 +39,6 @@ class TrackTuples(NamedTuple):
     """1-based measurement of each sensor, 0 where it missed, int32 (M, S)."""
     costs: Array
     """(M,)."""
-    states: Any
-    """The corrected states, one for each tuple."""
 
 
 class TrackPairs(NamedTuple):
@@ -132,40 +132,91 @@ def grow_track_tuples(
         There are more tuples than `max_tuples`.
     """
     count = len(states)
-    track = np.arange(count)
-    rows = np.zeros((count, len(sensors)), dtype=np.int32)
-    costs = np.zeros(count)
-    grown = states
-    alone, ahead = -misses.sum(axis=1), _ahead(sensors, terms, misses)
-    for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
-        gate = gate_of(sensor, gate_probability)
-        angles = angular_components(sensor)
+    growth = _Growth(
+        filter, measurements, sensors, terms, _ahead(sensors, terms, misses),
+        [gate_of(sensor, gate_probability) for sensor in sensors], [angular_components(sensor) for sensor in sensors],
+    )  # fmt: skip
+    near = []
+    for z, sensor, angles, gate in zip(measurements, sensors, growth.angles, growth.gates, strict=True):
         parent, found = near_pairs(filter.expected(states, sensor), z, angles, gate)
-        if s:
-            # measurements so far narrow the gate
-            near = Near(np.searchsorted(parent, np.arange(count + 1)), found)
-            parent, found = near_both(filter.expected(grown, sensor), track, near, z, angles, gate, max_tuples)
-        if len(parent) + len(track) > max_tuples:
-            # ordered by tuple: extrapolated to those left
-            about = len(track) + len(parent) * len(track) / (int(parent[-1]) + 1 if len(parent) else 1)
+        near.append(Near(np.searchsorted(parent, np.arange(count + 1)), found))
+    work = np.sum([one.first for one in near], axis=0)
+    blocks: list[TrackTuples] = []
+    low = made = 0
+    while low < count or not blocks:
+        high = min(max(low + 1, int(np.searchsorted(work, work[low] + _BLOCK, side="right")) - 1), count)
+        here = [Near(one.first[low : high + 1] - one.first[low], one.found[one.first[low] : one.first[high]])
+                for one in near]  # fmt: skip
+        block = _grown(growth, states[low:high], misses[low:high], here, max_tuples - made)
+        made += len(block.track)
+        if made > max_tuples:
+            # ordered by track: extrapolated to those left
             raise LimitExceededError(
-                f"about {about:.3g} candidate tuples of tracks and measurements, "
+                f"about {made * work[-1] / work[high]:.3g} candidate tuples of tracks and measurements, "
                 f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
             )
-        done = _corrected(filter, grown, z, sensor, gate, parent, found)
+        blocks.append(block._replace(track=low + block.track))
+        low = high
+    return TrackTuples(*(np.concatenate(arrays) for arrays in zip(*blocks, strict=True)))
+
+
+def corrected(
+    filter: Filter[Any], states: Any, measurements: Sequence[Array], sensors: Sequence[Measurement], rows: Array
+) -> Any:
+    """The states of T tracks corrected by a tuple each, rows (T, S) of 1-based measurements, 0 where one missed."""
+    for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
+        seen, missed = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
+        if len(seen):
+            done = filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor).state
+            states = concatenate([states[missed], done])[np.argsort(np.concatenate([missed, seen]))]
+    return states
+
+
+class _Growth(NamedTuple):
+    """What tuples of all tracks grow by."""
+
+    filter: Filter[Any]
+    measurements: Sequence[Array]
+    sensors: Sequence[Measurement]
+    terms: ScoreTerms
+    ahead: Array
+    gates: list[float]
+    angles: list[tuple[bool, ...]]
+
+
+def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], most: int) -> TrackTuples:
+    """The tuples of some tracks, ordered; it ends early where there are more than `most`."""
+    filter, last = growth.filter, len(growth.sensors) - 1
+    track = np.arange(len(states))
+    rows = np.zeros((len(states), len(growth.sensors)), dtype=np.int32)
+    costs = np.zeros(len(states))
+    alone = -misses.sum(axis=1)
+    for s, (z, sensor, gate) in enumerate(zip(growth.measurements, growth.sensors, growth.gates, strict=True)):
+        if s:
+            # measurements so far narrow the gate
+            expected = filter.expected(states, sensor)
+            parent, found = near_both(expected, track, near[s], z, growth.angles[s], gate, most)
+        else:
+            parent, found = np.repeat(track, np.diff(near[0].first)), near[0].found
+        if len(parent) + len(track) > most:
+            track = np.concatenate([track, track[parent]])
+            return TrackTuples(track, np.zeros((len(track), rows.shape[1]), np.int32), np.zeros(len(track)))
+        done = _corrected(filter, states, z, sensor, gate, parent, found)
         new = rows[done.track]
         new[:, s] = done.measurement + 1
-        missed = costs - misses[track, s]
-        costs = np.concatenate([missed, costs[done.track] - done.log_likelihood - terms.detection[s]])
+        costs = np.concatenate(
+            [costs - misses[track, s], costs[done.track] - done.log_likelihood - growth.terms.detection[s]]
+        )
         rows = np.concatenate([rows, new])
         track = np.concatenate([track, track[done.track]])
-        grown = concatenate([grown, done.states])
         # the sensors left must be able to bring the cost below that of a track all missed
-        hopeful = np.flatnonzero((costs - ahead[s + 1] < alone[track]) | ~rows.any(axis=1))
-        if len(hopeful) < len(rows):
-            costs, rows, track, grown = costs[hopeful], rows[hopeful], track[hopeful], grown[hopeful]
+        hopeful = np.flatnonzero((costs - growth.ahead[s + 1] < alone[track]) | ~rows.any(axis=1))
+        if s < last:
+            states = concatenate([states, done.states])
+            states = states[hopeful] if len(hopeful) < len(rows) else states
+        costs, rows, track = costs[hopeful], rows[hopeful], track[hopeful]
     order = np.lexsort((*rows.T[::-1], track))
-    return TrackTuples(track[order], rows[order], costs[order], grown[order])
+    return TrackTuples(track[order], rows[order], costs[order])
 
 
 def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms, misses: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
 from assoc.costs.tracks.scores import doubted_gain
-from assoc.costs.tracks.tuples import grow_track_tuples
+from assoc.costs.tracks.tuples import corrected, grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
@@ -41,7 +41,9 @@ class MultiSensor(Method):
         solution = progress.work.assign(problem)
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return associated(progress, tuples.states[kept], gain[kept], tuples.rows[kept], born, missed)
+        rows = tuples.rows[kept]
+        states = corrected(settings.filter, tracks.states, scan.measurements, settings.sensors, rows)
+        return associated(progress, states, gain[kept], rows, born, missed)
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
