@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Array, Floats, Ints
 from assoc.packing.kernels.matching import match
-from assoc.ranking.pairs.graph import PairGraph, pair_graph
+from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
 from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
 from assoc.ranking.pairs.sweep import new_work, planned, swept
 
@@ -73,7 +73,7 @@ def pair_probabilities(
         swept(plan.steps, *reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability, alone)
         low, high = probability - rounding, probability + rounding
         return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
-    log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight))
+    log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight, ~plan.kept))
     swept(plan.steps, *reduced(graph, weight, plan.kept, log_free, sizes[0]), probability, alone)
     free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
     free = np.clip(free, 0.0, 1.0)
@@ -105,7 +105,7 @@ class _Plan(NamedTuple):
     """Cluster of each vertex, (V,)."""
     log_lower: Floats
     log_upper: Floats
-    """Bounds on each edge's probability, (K,); -inf and 0 if none is left out."""
+    """Bounds on each edge's probability, (K,); -inf and 0 in clusters of which none is left out."""
 
 
 @njit
@@ -116,7 +116,8 @@ def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
     steps = np.empty((2 * vertices + edges, 4), np.int64)
     limit = np.full(vertices, _LEAST)
     members, work = np.empty(vertices, np.int64), new_work(vertices)
-    lower, upper, known = np.full(edges, -np.inf), np.zeros(edges), False
+    bounds, messages = np.zeros((2, edges)), np.empty((5, 2 * edges))
+    bounds[0] = -np.inf
     count = clusters = 0
     for v in range(vertices):
         while label[v] < 0:
@@ -127,36 +128,16 @@ def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
                 count += added
                 clusters += 1
                 continue
-            if not known:
-                lower, upper = log_bounds(graph, log_weight)
-                known = True
             level = limit[own].max()
+            if level == _LEAST:
+                log_bounds(graph, log_weight, own, messages, bounds)
             for u in own:
                 label[u] = -1
                 limit[u] = level + _STEP
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):
-                    if upper[graph.edge[x]] < level or level >= 0.0:
+                    if bounds[1, graph.edge[x]] < level or level >= 0.0:
                         kept[graph.edge[x]] = False
-    return _Plan(kept, steps[:count], label, lower, upper)
-
-
-@njit
-def cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int, label: Ints, members: Ints) -> int:
-    """Label the cluster of a vertex and list its members; return how many."""
-    members[0], label[start] = start, number
-    size = 1
-    at = 0
-    while at < size:
-        v = members[at]
-        at += 1
-        for x in range(graph.ptr[v], graph.ptr[v + 1]):
-            e = graph.edge[x]
-            u = graph.ends[e, 0] + graph.ends[e, 1] - v
-            if kept[e] and label[u] < 0:
-                label[u] = number
-                members[size] = u
-                size += 1
-    return size
+    return _Plan(kept, steps[:count], label, bounds[0], bounds[1])
 
 
 def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:

@@ -17,8 +17,8 @@ import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
-from assoc.ranking.pairs.events import cluster, reduced
-from assoc.ranking.pairs.graph import PairGraph, pair_graph
+from assoc.ranking.pairs.events import reduced
+from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
 
 _LEAST, _STEP = 1e-4, 4.0
 """Less likely pairs keep their probability; where a cluster is too large, this limit rises by that factor."""

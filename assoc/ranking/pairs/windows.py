@@ -38,8 +38,8 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.run import Run
-from assoc.ranking.pairs.events import cluster, reduced
-from assoc.ranking.pairs.graph import PairGraph, pair_graph
+from assoc.ranking.pairs.events import reduced
+from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
 from assoc.ranking.pairs.messages import log_beliefs
 from assoc.ranking.pairs.sweep import new_work, planned, swept
 
@@ -92,7 +92,7 @@ def window_bounds(
     exact = ~np.append(wide[graph.ends[:, 0]], wide)
     bounds[:, exact] = estimate[exact]
     if wide.any():
-        believed = _believed(graph, weight, log_beliefs(graph, weight))
+        believed = _believed(graph, weight, log_beliefs(graph, weight, wide[graph.ends[:, 0]]))
         estimate[~exact] = believed[~exact]
         centres, work = np.flatnonzero(wide), 0.0 if free.min() > _LIGHTEST else np.inf
         for most in widths[1:]:

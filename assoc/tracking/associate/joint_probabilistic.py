@@ -129,9 +129,13 @@ class JointProbabilistic(Method):
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track, (T, S)."""
-        ids = state.tracks.track_id[:, None]
-        shares = [(ids == pairs.track_id) @ pairs.probability for pairs in state.own]
-        return np.minimum(np.stack(shares, axis=1), 1.0)
+        order = np.argsort(state.tracks.track_id)
+        ids, shares = state.tracks.track_id[order], np.zeros((len(order), len(state.own)))
+        for s, pairs in enumerate(state.own):
+            known = np.isin(pairs.track_id, ids)
+            at = np.searchsorted(ids, pairs.track_id[known])
+            np.add.at(shares[:, s], order[at], pairs.probability[known])
+        return np.minimum(shares, 1.0)
 
     def at_once(self, progress: Progress) -> Association:
         """Process sensor after sensor; measurements that probably belong to no track start new ones."""
