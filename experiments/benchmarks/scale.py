@@ -43,11 +43,11 @@ def measure(targets: int, seed: int) -> dict[str, float | str]:
         "cost": solution.cost,
         "bound": solution.lower_bound,
         "status": solution.status,
-        "peak_mb": _peak_mb(),
+        "peak_mb": peak_mb(),
     }
 
 
-def _peak_mb() -> float:
+def peak_mb() -> float:
     """Return the most memory that this process has had."""
     status = Path("/proc/self/status")
     if status.exists():

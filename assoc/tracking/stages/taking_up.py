@@ -88,31 +88,40 @@ def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) ->
     after[:, len(old) - left :] = True
     # tentative tracks continue only those that are probably gone; existence is log odds
     after &= new.confirmed[:, None] | ((np.arange(len(old)) < len(old) - left) & (old.existence < 0.0))
+    usual, n = settings.initiation.prior(motion)[1][velocity[:, None], velocity], len(place)
+    prior = usual + new.states.covariance[:, velocity[:, None], velocity]
+    width = np.maximum(region[:, 1] - region[:, 0], 1.0)[:n]
+    born = -0.5 * (_square(new.states.mean[:, velocity], prior) + np.linalg.slogdet(2.0 * math.pi * prior)[1])
+    born += math.log(settings.initiation.birth_rate) - np.log(width).sum()
     start, end = np.nonzero(after)
+    if progress.state.identities is None:
+        # too far apart along an axis, even for a manoeuvre or a flight at any usual speed
+        room = -2.0 * born - np.linalg.slogdet(2.0 * math.pi * new.states.covariance[:, both[:, None], both])[1]
+        for axis, rate in zip(place.tolist(), np.diagonal(usual).tolist(), strict=True):
+            variance = new.states.covariance[start, axis, axis] + old.states.covariance[end, axis, axis]
+            flown = np.maximum(new.last_detection[start] - old.last_detection[end], 0.0)
+            away = new.states.mean[start, axis] - old.states.mean[end, axis]
+            near = away**2 <= room[start] * (_WIDER * variance + rate * flown**2)
+            start, end = start[near], end[near]
     off = new.states.mean[start][:, both] - old.states.mean[end][:, both]
     spread = (new.states.covariance[start] + old.states.covariance[end])[:, both[:, None], both]
     # where a track was lost its target may have manoeuvred more than the filter expects
     square, size = _square(off, spread), np.linalg.slogdet(2.0 * math.pi * spread)[1]
     wider = -0.5 * (square / _WIDER + size + len(both) * math.log(_WIDER)) + math.log(_MANOEUVRED)
     continued = np.logaddexp(math.log1p(-_MANOEUVRED - _ANYWHERE) - 0.5 * (square + size), wider)
-    usual, n = settings.initiation.prior(motion)[1][velocity[:, None], velocity], len(place)
     since = np.maximum(new.last_detection[start] - old.last_detection[end], 0.0)
     spread[:, :n, :n] += usual * (since**2)[:, None, None]
     spread[:, n:, n:] += usual
     free = -0.5 * (_square(off, spread) + np.linalg.slogdet(2.0 * math.pi * spread)[1]) + math.log(_ANYWHERE)
     # the likelier a track's target is still there, the less it has flown elsewhere
     continued = np.logaddexp(continued, free - np.logaddexp(0.0, old.existence[end]))
-    prior = usual + new.states.covariance[start][:, velocity[:, None], velocity]
-    width = np.maximum(region[:, 1] - region[:, 0], 1.0)[: len(place)]
-    born = -0.5 * (_square(new.states.mean[start][:, velocity], prior) + np.linalg.slogdet(2.0 * math.pi * prior)[1])
-    born += math.log(settings.initiation.birth_rate) - np.log(width).sum()
     # sensors may have missed it together: no less than a target that is missed until its track ends
     silent = progress.scan.time - old.last_detection[end]
     there = (
         np.maximum(-np.logaddexp(0.0, -old.existence[end]), math.log(OVERLOOKED))
         - silent / settings.life_cycle.lifetime
     )
-    gain = there + continued - born
+    gain = there + continued - born[start]
     if progress.state.identities is not None:
         says, possible = progress.state.identities.of_tracks(old.track_id[end], new.track_id[start])
         gain = np.where(possible, gain + says, -np.inf)

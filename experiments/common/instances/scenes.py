@@ -14,7 +14,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar3D, Sensor
 KM = 1000.0
 
 
-def _single_scan(
+def single_scan(
     sensors: list[Sensor],
     positions: NDArray[np.float64],
     region: NDArray[np.float64],
@@ -57,7 +57,7 @@ def gated(sensors: int, targets: int, seed: int) -> Scene:
         )
         for s in range(sensors)
     ]
-    return _single_scan(group, rng.random((targets, 3)) * extent, region, rng, f"gated {sensors} x {targets}")
+    return single_scan(group, rng.random((targets, 3)) * extent, region, rng, f"gated {sensors} x {targets}")
 
 
 def ghost(targets: int, seed: int) -> Scene:
@@ -82,7 +82,7 @@ def ghost(targets: int, seed: int) -> Scene:
     region = np.array([[0.0, 100.0], [0.0, 100.0], [-0.001, 0.001]]) * KM
     positions = np.zeros((targets, 3))
     positions[:, :2] = rng.random((targets, 2)) * 100.0 * KM
-    return _single_scan(sensors, positions, region, rng, f"ghost {targets}")
+    return single_scan(sensors, positions, region, rng, f"ghost {targets}")
 
 
 def radar_field(targets: int, seed: int) -> Scene:
@@ -107,7 +107,7 @@ def radar_field(targets: int, seed: int) -> Scene:
         for s, angle in enumerate(2 * math.pi * np.arange(3) / 3)
     ]
     positions = region[:, 0] + (region[:, 1] - region[:, 0]) * rng.random((targets, 3))
-    return _single_scan(sensors, positions, region, rng, f"radar field {targets}")
+    return single_scan(sensors, positions, region, rng, f"radar field {targets}")
 
 
 def three_radar(seed: int) -> Scene:

@@ -1,0 +1,111 @@
+"""How time and memory grow with the work: scans, trackers, processes, an hour of air traffic.
+
+    python -m experiments.scale [--quick] [--only PART ...] [--json FILE] [--publish]
+
+*One scan*: from measurements to a certified answer, at a constant density of targets: position sensors, 2-D radars, two
+of these and a bearing sensor. *Trackers*: the worst scan, which is one of the first, and the median of later ones.
+*Processes*: scans solved by one and by two. *Hour*: three radars, 500 aircraft at a time. Each row is a process of its
+own, so that peak memory is its own; processor time of all threads, kernels loaded.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from experiments.common.claims import Claim
+from experiments.common.command import add_only, make_parser, run
+from experiments.scale import one_scan, trackers
+from experiments.scale.alone import Measured, alone
+
+SIZES = {
+    "positions": (1_000, 10_000, 100_000, 340_000, 400_000),
+    "2-D radars": (1_000, 10_000, 30_000),
+    "2-D radars and a bearing": (1_000, 3_000),
+}
+TARGETS = {
+    "nearest-neighbour": (1_000, 3_000, 10_000),
+    "multi-sensor": (1_000, 3_000, 10_000),
+    "joint-probabilistic": (1_000, 3_000, 10_000),
+    "mht": (1_000, 3_000),
+}
+SCANS, LONG = 12, 10_000
+"""Scans of a tracker; fewer of them where there are so many targets."""
+UNITS = {"peak": "MB", "tracked": "%", "seconds": "s", "build": "s", "worst": "s", "median": "s", "greedy": "s",
+         "exact": "s", "lagrangian": "s"}  # fmt: skip
+
+
+def _claims(row: str, found: Measured) -> list[Claim]:
+    print(f"{row}: " + ", ".join(f"{name} {value:.4g}" for name, value in found.items()), flush=True)
+    return [Claim(f"{row}: {name}", UNITS.get(name, ""), ours=value) for name, value in found.items()]
+
+
+def _exponents(row: str, sizes: Sequence[int], rows: Sequence[Measured], names: Sequence[str]) -> list[Claim]:
+    """By what power of the size times grow, between the second size and the last."""
+    first, last = min(1, len(sizes) - 2), -1
+    ratio = math.log(sizes[last] / sizes[first])
+    return [Claim(f"{row}: exponent of {name}", "", ours=math.log(rows[last][name] / rows[first][name]) / ratio)
+            for name in names]  # fmt: skip
+
+
+def scans(quick: bool) -> list[Claim]:
+    """One scan, kind by kind and size by size."""
+    claims = []
+    for kind, sizes in SIZES.items():
+        sizes = sizes[:2] if quick else sizes
+        solvers = tuple(one_scan.SOLVERS) if kind == "positions" else ("exact",)
+        rows = [alone(one_scan.measure, kind, targets, solvers) for targets in sizes]
+        for targets, row in zip(sizes, rows, strict=True):
+            claims += _claims(f"one scan, {kind}, {targets}", row)
+        claims += _exponents(f"one scan, {kind}", sizes, rows, ("build", "tuples", *solvers))
+    return claims
+
+
+def crowds(quick: bool) -> list[Claim]:
+    """Trackers, size by size."""
+    claims = []
+    for kind, sizes in TARGETS.items():
+        sizes = sizes[:1] if quick else sizes
+        rows = [alone(trackers.measure, kind, one, 8 if one >= LONG else SCANS) for one in sizes]
+        for targets, row in zip(sizes, rows, strict=True):
+            claims += _claims(f"{kind}, {targets}", row)
+        claims += [] if quick else _exponents(kind, sizes, rows, ("worst", "median"))
+    return claims
+
+
+def processes(quick: bool) -> list[Claim]:
+    """The same scans by one process and by two."""
+    rows = {jobs: alone(one_scan.solved, jobs, 50 if quick else 1_000) for jobs in (1, 2)}
+    claims = [claim for jobs, row in rows.items() for claim in _claims(f"processes, {jobs}", row)]
+    return [*claims, Claim("processes: one / two, wall", "", ours=rows[1]["wall"] / rows[2]["wall"])]
+
+
+def hours(quick: bool) -> list[Claim]:
+    """An hour of the day, and the day as 24 of them."""
+    if quick:
+        return []
+    row = alone(trackers.hour, "multi-sensor")
+    day = Claim("hour: 24 of them, CPU", "h", ours=24.0 * row["seconds"] / 3600.0)
+    return [*_claims("hour", row), day]
+
+
+PARTS: dict[str, Callable[[bool], list[Claim]]] = {
+    "scans": scans, "trackers": crowds, "processes": processes, "hour": hours
+}  # fmt: skip
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; its exit code."""
+    assert __doc__ is not None
+    parser = make_parser("scale", __doc__)
+    add_only(parser, list(PARTS))
+    chosen = parser.parse_args(arguments)
+
+    def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
+        return [claim for name in chosen.only or PARTS for claim in PARTS[name](quick)]
+
+    return run(parser, chosen, experiment, __doc__)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
