@@ -47,7 +47,14 @@ def follow(kind: str, targets: int, seed: int, about: dict[str, Any]) -> tuple[l
     return spent, {"tracked": 100.0 * float(near.mean()), "confirmed": float(len(places))}
 
 
-HOUR: dict[str, Any] = {"scans": 900, "interval": 4.0, "sensor": "radar", "width": 400_000.0, "height": 12_000.0, "speed": 250.0}
+HOUR: dict[str, Any] = {
+    "scans": 900,
+    "interval": 4.0,
+    "sensor": "radar",
+    "width": 400_000.0,
+    "height": 12_000.0,
+    "speed": 250.0,
+}
 
 
 def hour(kind: str) -> Measured:
