@@ -209,6 +209,43 @@ def linear_programs() -> str:
     return table(["", *heads], rows)
 
 
+def _sizes(r: Results, kind: str) -> list[str]:
+    """Sizes of a row of experiments.scale that have been measured."""
+    return [
+        c.quantity.split(": ")[0].rpartition(", ")[2] for c in r.starting(f"{kind}, ") if c.quantity.endswith("peak")
+    ]
+
+
+def scale_scans() -> str:
+    """One scan: seconds and memory, size by size, and by what power they grow."""
+    r = Results("scale")
+    kinds = [c.quantity.split(": ")[0] for c in r.starting("one scan") if c.quantity.endswith("exponent of build")]
+    what = ("measurements", "tuples", "build", "exact", "lagrangian", "greedy", "peak")
+    rows = []
+    for kind in kinds:
+        for size in _sizes(r, kind):
+            cells = [number(r[q].ours) if (q := f"{kind}, {size}: {one}") in r else "" for one in what]
+            rows.append([f"{kind.removeprefix('one scan, ')}, {int(size):,}", *cells])
+        powers = [number(r[q].ours) if (q := f"{kind}: exponent of {one}") in r else "" for one in what]
+        rows.append([f"{kind.removeprefix('one scan, ')}: grows with the power", *powers])
+    return table(["targets", *what[:2], *(f"`{one}`, s" for one in what[2:6]), "peak, MB"], rows)
+
+
+def scale_trackers() -> str:
+    """A scan of trackers in crowds: worst and median, and memory."""
+    r = Results("scale")
+    named = [c.quantity.rpartition(", ")[0] for c in r.claims if c.quantity.endswith(": worst scan")]
+    rows = []
+    for kind in dict.fromkeys(named):
+        for size in _sizes(r, kind):
+            what = ("worst", "worst scan", "median", "peak", "tracked")
+            rows.append([f"`{kind}`, {int(size):,}", *(number(r[f"{kind}, {size}: {one}"].ours) for one in what)])
+        if f"{kind}: exponent of worst" in r:
+            worst, median = (number(r[f"{kind}: exponent of {one}"].ours) for one in ("worst", "median"))
+            rows.append([f"`{kind}`: grows with the power", worst, "", median, "", ""])
+    return table(["tracker, targets", "worst scan, s", "which", "median, s", "peak, MB", "tracked, %"], rows)
+
+
 def first_call() -> str:
     """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
     if not result_file("cold_start").exists():
@@ -371,6 +408,8 @@ TABLES = {
     "first-call": first_call,
     "linear-programs": linear_programs,
     "scan-time": scan_time,
+    "scale-scans": scale_scans,
+    "scale-trackers": scale_trackers,
     "ghost-rankings": ghost_rankings,
     "probabilities": probabilities,
     "sizes": sizes,

@@ -31,6 +31,8 @@ TARGETS = {
 }
 SCANS, LONG = 12, 10_000
 """Scans of a tracker; fewer of them where there are so many targets."""
+BYTES = 64
+"""Of a plot or of a row of a track: eight numbers."""
 UNITS = {"peak": "MB", "tracked": "%", "seconds": "s", "build": "s", "worst": "s", "median": "s", "greedy": "s",
          "exact": "s", "lagrangian": "s"}  # fmt: skip
 
@@ -81,12 +83,30 @@ def processes(quick: bool) -> list[Claim]:
 
 
 def hours(quick: bool) -> list[Claim]:
-    """An hour of the day, and the day as 24 of them."""
+    """An hour of the day, and what follows from it."""
     if quick:
         return []
     row = alone(trackers.hour, "multi-sensor")
-    day = Claim("hour: 24 of them, CPU", "h", ours=24.0 * row["seconds"] / 3600.0)
-    return [*_claims("hour", row), day]
+    return [*_claims("hour", row), *extrapolated(row)]
+
+
+def extrapolated(row: Measured) -> list[Claim]:
+    """The day as 24 such hours, and a plan for 1,000 radars, three over each area: rows of BYTES."""
+    areas = 1_000 / 3
+    plots, tracks = row["plots"] * BYTES / 1e9, trackers.HOUR["scans"] * trackers.AIRCRAFT * BYTES / 1e9
+    # a mean and a covariance of six numbers for each track, from both sides
+    stitch = 2 * trackers.AIRCRAFT * 8 * (6 + 36) / 1e6
+    day = 24.0 * row["seconds"] / 3600.0
+    return [
+        Claim("a day as 24 of these hours: CPU", "h", ours=day),
+        Claim("plan, an area and an hour: plots in", "MB", ours=1e3 * plots),
+        Claim("plan, an area and an hour: tracks out", "MB", ours=1e3 * tracks),
+        Claim("plan, an area and an hour: states of tracks at a border", "MB", ours=stitch),
+        Claim("plan, 1000 radars and a day: plots", "", ours=24.0 * areas * row["plots"]),
+        Claim("plan, 1000 radars and a day: plots in", "GB", ours=24.0 * areas * plots),
+        Claim("plan, 1000 radars and a day: tracks out", "GB", ours=24.0 * areas * tracks),
+        Claim("plan, 1000 radars and a day: CPU of tracking", "h", ours=areas * day),
+    ]
 
 
 PARTS: dict[str, Callable[[bool], list[Claim]]] = {

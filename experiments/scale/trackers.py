@@ -47,6 +47,7 @@ def follow(kind: str, targets: int, seed: int, about: dict[str, Any]) -> tuple[l
     return spent, {"tracked": 100.0 * float(near.mean()), "confirmed": float(len(places))}
 
 
+AIRCRAFT = 500
 HOUR: dict[str, Any] = {
     "scans": 900,
     "interval": 4.0,
@@ -61,7 +62,7 @@ def hour(kind: str) -> Measured:
     """Processor time and plots of an hour: three radars that turn in 4 s, 500 aircraft at a time."""
     assoc.warm_up()
     follow(kind, 100, 0, {**HOUR, "scans": 20})
-    scene = simulate("crowd", 1, targets=500, **HOUR)
-    spent, found = follow(kind, 500, 1, HOUR)
+    scene = simulate("crowd", 1, targets=AIRCRAFT, **HOUR)
+    spent, found = follow(kind, AIRCRAFT, 1, HOUR)
     plots = sum(len(z) for scan in scene.measurements for z in scan)
     return {"seconds": sum(spent), "plots": float(plots), "tracked": found["tracked"]}
