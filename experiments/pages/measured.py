@@ -393,7 +393,26 @@ def prior() -> str:
     return table(["scene, cost", *heads, "proven optima"], rows)
 
 
+def recordings_speed() -> str:
+    """Plots a second and memory of recordings, and what two processes gain."""
+    r = Results("scale.recordings")
+    runs = [claim.quantity.rpartition(":")[0] for claim in r.claims if claim.quantity.endswith(": memory")]
+    rows = []
+    for run in runs:
+        rate, memory = r[f"{run}: plots a second"], r[f"{run}: memory"]
+        goals = number((rate.band or (0.0,))[0] or 0.0), number((memory.band or (0.0, 0.0))[1] or 0.0)
+        rows.append([run, _judged(rate), goals[0], _judged(memory), goals[1]])
+    wall, spent = (r[f"two processes: {kind} time"] for kind in ("wall", "processor"))
+    text = table(["tracker, recording", "plots/s", "goal, at least", "MB", "goal, at most"], rows)
+    return (
+        f"{text}\n\nTwo processes with slices of 400 s took {number(spent.ours)} times the processor time of one "
+        f"without, and were {_judged(wall)} times as quick by the wall (our goal: 1.7, on a quiet machine). Bold: goal "
+        "missed."
+    )
+
+
 TABLES = {
+    "recordings-speed": recordings_speed,
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
     "phases": phases,
