@@ -73,14 +73,14 @@ def joint() -> str:
 
 def autoferry() -> str:
     """The boats of the Autoferry recordings: GOSPA of every tracker."""
-    r = Results("real.autoferry")
+    r, known = Results("real.autoferry"), SHOWN | {ADAPTING: _HEADS[ADAPTING]}
     shown = []
     for which in SETS:
-        names = [name for name in SHOWN if f"{which}, {name}, mean: GOSPA" in r]
+        names = [name for name in known if f"{which}, {name}, mean: GOSPA" in r]
         for name in names:
             start = f"{which}, {name}, "
-            each = [c for c in r.starting(start) if "scenario" in c.quantity]
-            shown.append([which, SHOWN[name], *(f"{c.ours:.1f}" for c in each), f"{r[start + 'mean: GOSPA'].ours:.1f}"])
+            each = r.starting(f"{start}scenario")
+            shown.append([which, known[name], *(f"{c.ours:.1f}" for c in each), f"{r[start + 'mean: GOSPA'].ours:.1f}"])
     start = next(c.quantity for c in r.claims).rpartition(", scenario")[0]
     numbers = [c.quantity.rpartition("scenario ")[2].partition(":")[0] for c in r.starting(f"{start}, scenario")]
     heads = ["GOSPA, m", "tracker", *(f"scenario {n}" for n in numbers), "mean"]

@@ -49,10 +49,11 @@ class Result(NamedTuple):
 
 
 def make(name: str, scene: Scene) -> Tracker:
-    """The tracker with the one setting for all scenarios."""
-    return TRACKERS[name](
+    """The tracker with the one setting for all scenarios; "adapting" also learns its sensors."""
+    kind, _, adapting = name.partition(", ")
+    return TRACKERS[kind](
         scene.sensors, two_speeds(PROCESS_NOISE, 2), region=scene.region, initiation=Initiation(speed=SPEED),
-        life_cycle=LifeCycle(deletion_time=PATIENCE),
+        life_cycle=LifeCycle(deletion_time=PATIENCE), adapt=bool(adapting),
     )  # fmt: skip
 
 
@@ -184,7 +185,7 @@ def experiment(folder: Path, quick: bool, names: Sequence[str], sets: Sequence[s
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    names = ("oracle", *TRACKERS)
+    names = ("oracle", *TRACKERS, "multi-sensor, adapting")
     parser = make_parser("real.autoferry", __doc__)
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="folder of the scenarios' files")
     parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help="these trackers alone")
