@@ -2,6 +2,7 @@
 
 from experiments.common.results import Results, number, table
 from experiments.pages.trackers import SHOWN, labels, mean, with_size
+from experiments.real.air_traffic import UNITS, WAYS, WHAT
 from experiments.real.autoferry import SETS
 from experiments.trackers.real_scenes import ADAPTING, JOINT, ROWS, SITES
 
@@ -87,7 +88,42 @@ def autoferry() -> str:
     return table(heads, shown, lambda column: column > 1)
 
 
+_ACCURACY = {
+    "plots as they come: RMSE": "plots as they come",
+    "plots, registered: RMSE": "registered",
+    "plots, noise alone: RMSE": "noise alone",
+    "reference, as they come: RMSE": "reference, not registered",
+    "reference, registered: RMSE": "reference",
+    "tracks as shown, registered: RMSE": "tracks as shown live",
+    "reference, registered: squared error / stated": "squared error / stated",
+}
+_TRAFFIC = "real.air_traffic"
+
+
+def air_traffic() -> str:
+    """How far plots and reference trajectories are from the flights."""
+    r = Results(_TRAFFIC)
+    rows = [
+        [kind, *(mean(r[f"{kind}, {one}"]) for one in _ACCURACY)] for kind in labels(r, f", {next(iter(_ACCURACY))}")
+    ]
+    return with_size(r, table(["RMSE, m", *_ACCURACY.values()], rows))
+
+
+def air_traffic_association() -> str:
+    """Wrong plots and mixed tracks, by way to associate."""
+    r = Results(_TRAFFIC)
+    rows = [
+        [kind, way, *(mean(r[f"{kind}, {way}: {what}"], 2) for what in WHAT)]
+        for kind in labels(r, f", {next(iter(_ACCURACY))}")
+        for way in WAYS
+    ]
+    return table(["flights", "by", *(f"{what}{', %' if UNITS[what] else ''}" for what in WHAT)], rows,
+                 lambda column: column > 1)  # fmt: skip
+
+
 TABLES = {
+    "air-traffic": air_traffic,
+    "air-traffic-association": air_traffic_association,
     "as-they-are": rows,
     "as-they-are-without": without,
     "as-they-are-joint": joint,

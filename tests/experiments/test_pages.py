@@ -18,6 +18,7 @@ from tests.release import licences
 BY_HAND = ("choosing", "dependencies", "registration")
 """Pages without slots: what is measured stands in their tables."""
 FIXED = {
+    "air_traffic": "0.06 0.1 0.5 0.9 0.95 1 5 6 8 10 15 20 40 60 66 137 250 300 3,704",
     "choosing": "0.5 0.7 0.87 0.95 0.98 1 2 12 87 100 128 300 4096",
     "concepts": "0.99 0.999 01 1 2",
     "dependencies": "3.11 64 430",
