@@ -25,7 +25,8 @@ from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
 from assoc.ranking.sampler import estimates
-from assoc.ranking.tuple_bounds import LIGHTEST, ROUNDING, tuple_bounds
+from assoc.ranking.tuple_bounds import LIGHTEST, ROUNDING
+from assoc.ranking.tuple_sums import WIDEST, sums_and_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -137,14 +138,19 @@ def marginals(
     a = 1 gives the plain partition function, a = 0 the number of solutions times the weight of the next one; U is
     the least bound over several a.
 
-    With dummies ``ranking/tuple_bounds.py`` bounds each tuple by another way, a recursion over the measurements near
-    it, which does not weaken as scenes grow; with two sensors ``ranking/pairs/windows.py`` does, by exact sums. The
-    narrower bound counts, and where these leave no width to speak of, nothing is listed.
+    Two other ways do not weaken as scenes grow: clusters in which few measurements are open at a time are summed
+    (``ranking/sweep.py``, ``ranking/tuple_sums.py``); with dummies ``ranking/tuple_bounds.py`` bounds each tuple by a
+    recursion over the measurements near it, and with two sensors ``ranking/pairs/windows.py`` by sums around it. The
+    narrowest bound counts, and where these leave no width to speak of, nothing is listed.
     """
     checked_k(k)
     if method not in METHODS:
         raise InvalidInputError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    run = Run(0, time_limit=checked_time_limit(time_limit))
+    return bounded(problem, k, Run(0, time_limit=checked_time_limit(time_limit)), method)
+
+
+def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: int = WIDEST) -> Marginals:
+    """`marginals`, with sums over clusters of three sensors and more that have at most ``widest`` vertices open."""
     # the fallback for clusters that there is no time for
     prepare_fallback(prepare(problem).packing, run)
     tuples, index = distinct(problem.tuples)
@@ -156,10 +162,9 @@ def marginals(
     listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
     narrow = _NARROW if len(problem.sizes) > 2 else _NARROW_PAIRS
-    two = len(problem.sizes) == 2
-    known = _without_listing(problem, index, len(tuples), run) if two or method != "estimate" else None
+    known = _without_listing(problem, index, len(tuples), run, widest, method != "estimate")
     for cluster, which in _clusters(problem):
-        if known is not None and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
+        if known is not None and len(which) and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
             waiting[which] = False
             probability[index[which]], lower[index[which]], upper[index[which]] = known[:, index[which]]
             continue
@@ -187,31 +192,35 @@ def marginals(
         upper = np.maximum(upper, lower)
         probability = np.where(narrower, known[0], probability)
     probability = np.clip(probability, lower, upper)
-    widest, spread = float((upper - lower).max(initial=0.0)), float(np.nan_to_num(error).max(initial=0.0))
-    return Marginals(tuples.astype(np.int32), probability, lower, upper, widest, listed, spread)
+    unseen, spread = float((upper - lower).max(initial=0.0)), float(np.nan_to_num(error).max(initial=0.0))
+    return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed, spread)
 
 
-def _without_listing(problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run) -> Floats | None:
-    """Estimate and bounds of each distinct tuple, (3, T), by windows or the recursion; None where neither applies."""
-    if not problem.dummy or run.should_stop():
+def _without_listing(
+    problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run, widest: int, recursion: bool
+) -> Floats | None:
+    """Estimate and bounds of each distinct tuple, (3, T), by sums, windows or the recursion; None without time."""
+    if run.should_stop():
         return None
     share = run.part(0, None if run.time_limit is None else 0.4 * run.time_limit)
     columns = price_all_columns(problem, share)
-    found = _of_two_lists(columns, problem.sizes, share) if len(problem.sizes) == 2 else tuple_bounds(columns, share)
-    if found is None:
-        return None
+    two = len(problem.sizes) == 2 and problem.dummy
+    found = _of_two_lists(columns, problem.sizes, share) if two else sums_and_bounds(columns, share, widest, recursion)
     # logarithms of weights are differences of costs, which may cancel
     counts = -columns.weights > LIGHTEST
     used = columns.rows[counts]
     single = prepare(problem).single_cost
-    largest = np.abs(problem.costs[columns.origin[counts]]).max(initial=0.0)
-    largest += np.abs(single[used[used >= 0]]).max(initial=0.0)
+    largest = float(np.abs(problem.costs[columns.origin[counts]]).max(initial=0.0))
+    if problem.dummy:
+        largest += np.abs(single[used[used >= 0]]).max(initial=0.0)
+    largest += np.abs(columns.duals).max(initial=0.0)
     sums = 4.0 * (used.shape[1] + 2) * columns.slack.size * largest
     rounding = float(np.finfo(float).eps * sums)
     estimate, lower, upper = found
     lower, upper = np.maximum(lower - rounding, 0.0), np.minimum(upper + rounding, 1.0)
     known = np.repeat([[0.0], [0.0], [1.0]], num, axis=1)
-    known[:, index[np.append(columns.origin, columns.single)]] = np.clip(estimate, lower, upper), lower, upper
+    where = np.append(columns.origin, columns.single)
+    known[:, index[where]] = np.stack([np.clip(estimate, lower, upper), lower, upper])[:, : len(where)]
     return known
 
 

@@ -27,8 +27,8 @@ from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
 
 _CHAINS = 4
-# moves of a chain for each measurement, at least and at most; those between two checks of the time
-_MOVES, _LEAST, _MOST, _AT_ONCE = 150, 5_000, 100_000, 5_000
+# moves of a chain: a few, some more for each measurement, and at most; those between two checks of the time
+_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 66, 100_000, 5_000
 # share of the moves that a chain forgets
 _FORGOTTEN = 0.2
 # combinations of a move; where there are more, the solution stays
@@ -79,7 +79,7 @@ def estimates(columns: AllColumns, starts: list[Ints], run: Run, length: float =
     """
     problem = _problem(columns)
     rows, num = columns.slack.size, len(columns.weights)
-    moves = int(length * np.clip(_MOVES * rows, _LEAST, _MOST))
+    moves = int(length * min(_LEAST + _MOVES * rows, _MOST))
     chains = []
     for c in range(_CHAINS):
         owner = np.full(rows, -1, dtype=np.int32)

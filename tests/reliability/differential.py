@@ -31,7 +31,8 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
-from assoc.ranking.marginals import marginals
+from assoc.ranking.marginals import bounded
+from assoc.ranking.tuple_sums import WIDEST
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
@@ -172,8 +173,8 @@ WAYS: dict[str, Way] = {
     "liar": _by_a_liar,
     "after a liar": _after_a_liar,
 }
-LISTED = {"marginals 1": 1, "marginals 2": 2}
-"""Ways to probabilities: from how many solutions."""
+LISTED = {"marginals 1": (1, WIDEST), "marginals 2": (2, 0), "marginals left out": (1, 3)}
+"""Ways to probabilities: from how many solutions, and with how many measurements open in sums over clusters."""
 PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start", "after a liar")
 """Ways that promise the optimum on problems of this size."""
 
@@ -236,10 +237,12 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
         yield "lists a solution twice"
 
 
-def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, k: int) -> Iterator[str]:
+def interval_faults(
+    problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, k: int, widest: int
+) -> Iterator[str]:
     """What is wrong with the probabilities from k solutions; ``truth`` None: there is no solution."""
     results: list[Any] = []
-    yield from answered(lambda: marginals(problem, k), truth is not None, results)
+    yield from answered(lambda: bounded(problem, k, Run(0), "auto", widest), truth is not None, results)
     if not results or truth is None:
         return
     found = results[0]
@@ -292,7 +295,7 @@ def judge(case: Case, names: list[str]) -> list[str]:
     lines = []
     for name in names:
         if name in LISTED:
-            found = interval_faults(case.problem, truth, LISTED[name])
+            found = interval_faults(case.problem, truth, *LISTED[name])
         else:
             found = faults(case.problem, ranks, name, WAYS[name])
         lines += [f"{name} {text}" for text in found]

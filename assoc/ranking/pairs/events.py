@@ -1,6 +1,6 @@
 """Probability of each pair of two lists among all joint events, as a guaranteed interval.
 
-Clusters of pairs are summed exactly (`assoc.ranking.pairs.sweep`) as long as few of their vertices are open at a time.
+Clusters of pairs are summed exactly (`assoc.ranking.sweep`) as long as few of their vertices are open at a time.
 Where too many would be, the least likely pairs are left out until the rest can be summed. The error is bounded. Let D
 be the left-out pairs that touch a remaining cluster. In events without pairs of D the cluster is independent, hence
 
@@ -18,23 +18,18 @@ IEEE J. Oceanic Engineering 8, 1983.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
-from assoc._types import Array, Floats, Ints
+from assoc._types import Array, Floats
 from assoc.packing.kernels.matching import match
-from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
+from assoc.ranking.pairs.graph import PairGraph, pair_graph
 from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
-from assoc.ranking.pairs.sweep import new_work, planned, swept
+from assoc.ranking.sums import plan_clusters, sum_clusters
 
 _NARROWEST = 2
 """Open vertices needed for a star, a vertex and its neighbours."""
-_LEAST, _STEP = math.log(1e-12), math.log(4.0)
-"""Where too many vertices would be open, pairs below this probability are left out; then it rises by this factor."""
 _ROUNDING = 1e-12
 
 
@@ -66,78 +61,42 @@ def pair_probabilities(
         return PairIntervals(*np.zeros((3, 0)))
     graph = pair_graph(first, second, sizes)
     weight = np.ascontiguousarray(log_weight, dtype=np.float64)
-    plan = _plan(graph, weight, max(_NARROWEST, int(states).bit_length() - 1))
+    most = max(_NARROWEST, int(states).bit_length() - 1)
+    plan = plan_clusters(graph.graph, np.zeros(len(first)), most, False)
     probability, alone = np.zeros(len(first)), np.ones(sum(sizes))
     rounding = _ROUNDING + 8.0 * np.finfo(float).eps * sum(sizes) * float(np.abs(weight).max())
-    if plan.kept.all():
-        swept(plan.steps, *reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability, alone)
+    if plan.label.min() >= 0:
+        weights, free = reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0])
+        sum_clusters(plan, weights, free, np.inf, probability, alone)
         low, high = probability - rounding, probability + rounding
         return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
+    # bounds are only of the clusters that are too wide
+    bounds = np.zeros((2, len(first)))
+    bounds[0] = -np.inf
+    log_bounds(graph, weight, np.flatnonzero(plan.label < 0), np.empty((5, 2 * len(first))), bounds)
+    plan = plan_clusters(graph.graph, bounds[1], most, True)
     log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight, ~plan.kept))
-    swept(plan.steps, *reduced(graph, weight, plan.kept, log_free, sizes[0]), probability, alone)
-    free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
-    free = np.clip(free, 0.0, 1.0)
+    weights, left = reduced(graph, weight, plan.kept, log_free, sizes[0])
+    sum_clusters(plan, weights, left, np.inf, probability, alone)
+    paired = np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
+    unpaired = np.clip(1.0 - paired, 0.0, 1.0)
     # left-out pairs, by their replacements at the first list's end
     out = np.flatnonzero(~plan.kept)
     index = np.empty(len(first), dtype=np.int64)
     count = graph.ptr[sizes[0]]
     index[graph.edge[:count]] = np.arange(count)
-    least, most = np.exp(plan.log_lower), np.exp(plan.log_upper)
+    least, highest = np.exp(bounds)
     ends = graph.ends[out]
-    probability[out] = (free[graph.ends[:, 0]] * np.exp(log_part[index] - log_free[graph.ends[:, 0]]))[out]
-    width = np.bincount(plan.label, -free * np.expm1(-log_free))
+    probability[out] = (unpaired[graph.ends[:, 0]] * np.exp(log_part[index] - log_free[graph.ends[:, 0]]))[out]
+    width = np.bincount(plan.label, -unpaired * np.expm1(-log_free))
     first_label, second_label = plan.label[ends].T
     apart = first_label != second_label
-    np.add.at(width, first_label, most[out])
-    np.add.at(width, second_label[apart], most[out][apart])
+    np.add.at(width, first_label, highest[out])
+    np.add.at(width, second_label[apart], highest[out][apart])
     around = np.where(plan.kept, width[plan.label[graph.ends[:, 0]]], np.inf)
     lower = np.maximum(probability - around, least) - rounding
-    upper = np.minimum(probability + around, most) + rounding
+    upper = np.minimum(probability + around, highest) + rounding
     return PairIntervals(np.clip(probability, lower, upper), np.maximum(lower, 0.0), np.minimum(upper, 1.0))
-
-
-class _Plan(NamedTuple):
-    kept: NDArray[np.bool_]
-    """Edges that are summed, bool (K,)."""
-    steps: Ints
-    """Steps of the sweep over all clusters."""
-    label: Ints
-    """Cluster of each vertex, (V,)."""
-    log_lower: Floats
-    log_upper: Floats
-    """Bounds on each edge's probability, (K,); -inf and 0 in clusters of which none is left out."""
-
-
-@njit
-def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
-    """Leave pairs out until every cluster can be summed with at most ``most`` open vertices."""
-    vertices, edges = graph.ptr.size - 1, log_weight.size
-    kept, label = np.ones(edges, np.bool_), np.full(vertices, -1, np.int64)
-    steps = np.empty((2 * vertices + edges, 4), np.int64)
-    limit = np.full(vertices, _LEAST)
-    members, work = np.empty(vertices, np.int64), new_work(vertices)
-    bounds, messages = np.zeros((2, edges)), np.empty((5, 2 * edges))
-    bounds[0] = -np.inf
-    count = clusters = 0
-    for v in range(vertices):
-        while label[v] < 0:
-            size = cluster(graph, kept, v, clusters, label, members)
-            own = members[:size]
-            added = planned(graph, kept, own, most, steps[count:], work)
-            if added >= 0:
-                count += added
-                clusters += 1
-                continue
-            level = limit[own].max()
-            if level == _LEAST:
-                log_bounds(graph, log_weight, own, messages, bounds)
-            for u in own:
-                label[u] = -1
-                limit[u] = level + _STEP
-                for x in range(graph.ptr[u], graph.ptr[u + 1]):
-                    if bounds[1, graph.edge[x]] < level or level >= 0.0:
-                        kept[graph.edge[x]] = False
-    return _Plan(kept, steps[:count], label, bounds[0], bounds[1])
 
 
 def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
 from assoc._types import Array, Ints
+from assoc.ranking.sweep import Graph
 
 
 class PairGraph(NamedTuple):
@@ -24,12 +23,15 @@ class PairGraph(NamedTuple):
         Edge of each edge end.
     mate : int64 array (2 K,)
         Index of the edge's other end.
+    graph : Graph
+        The first three, as sweeps take them.
     """
 
     ends: Ints
     ptr: Ints
     edge: Ints
     mate: Ints
+    graph: Graph
 
 
 def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph:
@@ -42,23 +44,5 @@ def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph
     np.cumsum(np.bincount(vertex, minlength=sum(sizes)), out=ptr[1:])
     index = np.empty(2 * count, dtype=np.int64)
     index[order] = np.arange(2 * count)
-    return PairGraph(ends, ptr, order % max(count, 1), index[(order + count) % max(2 * count, 1)])
-
-
-@njit
-def cluster(graph: PairGraph, kept: NDArray[np.bool_], start: int, number: int, label: Ints, members: Ints) -> int:
-    """Label the cluster of a vertex and list its members; return how many."""
-    members[0], label[start] = start, number
-    size = 1
-    at = 0
-    while at < size:
-        v = members[at]
-        at += 1
-        for x in range(graph.ptr[v], graph.ptr[v + 1]):
-            e = graph.edge[x]
-            u = graph.ends[e, 0] + graph.ends[e, 1] - v
-            if kept[e] and label[u] < 0:
-                label[u] = number
-                members[size] = u
-                size += 1
-    return size
+    edge = order % max(count, 1)
+    return PairGraph(ends, ptr, edge, index[(order + count) % max(2 * count, 1)], Graph(ends, ptr, edge))

@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
-from assoc.ranking.pairs.graph import PairGraph, cluster
+from assoc.ranking.pairs.graph import PairGraph
+from assoc.ranking.sweep import cluster
 
 _ROUNDS, _SETTLED = 400, 1e-10
 """Belief propagation ends after so many messages of each vertex of a cluster, or when they change by less than this."""
@@ -119,7 +120,7 @@ def log_beliefs(graph: PairGraph, log_weight: Floats, wanted: NDArray[np.bool_])
     for start in range(vertices):
         if label[start] >= 0:
             continue
-        size = cluster(graph, every, start, start, label, members)
+        size = cluster(graph.graph, every, start, start, label, members)
         if not _any_of(graph, members[:size], wanted):
             continue
         queue, count, left = np.sort(members[:size]), size, _ROUNDS * size

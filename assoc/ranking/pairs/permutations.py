@@ -18,7 +18,8 @@ import numpy as np
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.events import reduced
-from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
+from assoc.ranking.pairs.graph import PairGraph, pair_graph
+from assoc.ranking.sweep import cluster
 
 _LEAST, _STEP = 1e-4, 4.0
 """Less likely pairs keep their probability; where a cluster is too large, this limit rises by that factor."""
@@ -55,7 +56,7 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
     limit = np.full(free.size, _LEAST)
     for v in range(rows):
         while label[v] < 0:
-            own = members[: cluster(graph, kept, v, v, label, members)]
+            own = members[: cluster(graph.graph, kept, v, v, label, members)]
             if own.size <= most:
                 _permute(graph, weights, free, kept, np.sort(own), rows, share)
                 break

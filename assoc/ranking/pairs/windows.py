@@ -1,6 +1,6 @@
 """Bounds on the probability of each pair of two lists: exact sums over clusters, or over windows of large ones.
 
-Clusters that the sweep can sum (`assoc.ranking.pairs.sweep`) are summed. Elsewhere, let R be a set of vertices, a
+Clusters that the sweep can sum (`assoc.ranking.sweep`) are summed. Elsewhere, let R be a set of vertices, a
 window. With P(v; G) the probability that v is unmatched in a joint event of the graph G, a pair uv has the probability
 
     P(uv) = w_uv P(v; G - u) / (1 + sum over neighbours i of u of w_ui P(i; G - u)),
@@ -33,15 +33,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.run import Run
 from assoc.ranking.pairs.events import reduced
-from assoc.ranking.pairs.graph import PairGraph, cluster, pair_graph
+from assoc.ranking.pairs.graph import PairGraph, pair_graph
 from assoc.ranking.pairs.messages import log_beliefs
-from assoc.ranking.pairs.sweep import new_work, planned, swept
+from assoc.ranking.sums import plan_clusters, sum_clusters
+from assoc.ranking.sweep import most_steps, new_work, planned, room, swept
 
 WIDTHS = (16, 9, 12)
 # vertices of the largest window tried, for each open one
@@ -88,7 +88,10 @@ def window_bounds(
     graph = pair_graph(first, second, sizes)
     weight = np.ascontiguousarray(log_weight, dtype=np.float64)
     weights, free = reduced(graph, weight, np.ones(num, dtype=bool), np.zeros(vertices), sizes[0])
-    wide = _sum_clusters(graph, weights, free, widths[0], run.deadline(), estimate)
+    plan = plan_clusters(graph.graph, np.zeros(num), widths[0], False)
+    estimate[num:] = 1.0
+    summed = sum_clusters(plan, weights, free, run.deadline(), estimate[:num], estimate[num:])
+    wide = (plan.label < 0) | (plan.label >= summed)
     exact = ~np.append(wide[graph.ends[:, 0]], wide)
     bounds[:, exact] = estimate[exact]
     if wide.any():
@@ -103,31 +106,6 @@ def window_bounds(
     rounding = _ROUNDING + 8.0 * float(np.finfo(float).eps) * vertices * float(np.abs(weight).max())
     lower, upper = np.maximum(bounds[0] - rounding, 0.0), np.minimum(bounds[1] + rounding, 1.0)
     return np.clip(estimate, lower, upper), lower, upper
-
-
-@njit
-def _sum_clusters(
-    graph: PairGraph, weights: Floats, free: Floats, most: int, deadline: float, probability: Floats
-) -> NDArray[np.bool_]:
-    """Sum the clusters that fit and that there is time for, into (K + V,); return the vertices of the others."""
-    vertices = free.size
-    kept, label, members = (
-        np.ones(weights.size, np.bool_),
-        np.full(vertices, -1, np.int64),
-        np.empty(vertices, np.int64),
-    )
-    steps, work = np.empty((2 * vertices + weights.size, 4), np.int64), new_work(vertices)
-    wide, alone = np.zeros(vertices, np.bool_), probability[weights.size :]
-    alone[:] = 1.0
-    for v in range(vertices):
-        if label[v] < 0:
-            own = members[: cluster(graph, kept, v, v, label, members)]
-            count = planned(graph, kept, own, most, steps, work)
-            if count < 0 or is_over(deadline):
-                wide[own] = True
-            else:
-                swept(steps[:count], weights, free, probability, alone)
-    return wide
 
 
 @njit
@@ -157,8 +135,12 @@ def _bound(
     """
     ptr, edge, ends = graph.ptr, graph.edge, graph.ends
     vertices = free.size
-    inside, kept, work = np.zeros(vertices, np.bool_), np.zeros(weights.size, np.bool_), new_work(vertices)
-    members, steps = np.empty(_SIZE * most, np.int64), np.empty((2 * _SIZE * most + weights.size, 4), np.int64)
+    inside, kept, work = (
+        np.zeros(vertices, np.bool_),
+        np.zeros(weights.size, np.bool_),
+        new_work(vertices, weights.size),
+    )
+    members, steps = np.empty(_SIZE * most, np.int64), np.empty((most_steps(_SIZE * most, weights.size), 3), np.int64)
     # for each edge end bounds on the term of the edge there, in reduced weights
     low, high = np.empty(edge.size), np.empty(edge.size)
     # weights of unmatched vertices, and probabilities of pairs and unmatched vertices, where as much as possible of the
@@ -176,7 +158,7 @@ def _bound(
             for v in own:
                 for x in range(ptr[v], ptr[v + 1]):
                     kept[edge[x]] = inside[ends[edge[x], 0]] and inside[ends[edge[x], 1]]
-            length = planned(graph, kept, own, most, steps, work)
+            length = planned(graph.graph, kept, own, most, steps, work)
             if length < 0:
                 smaller = 4 * count // 5
                 for v in members[smaller:count]:
@@ -195,9 +177,10 @@ def _bound(
                         low[x], high[x] = _outside(graph, weights, free, inside, v, edge[x])
                         left[side, v] += high[x]
                         left[1 - side, v] += low[x]
+            buffer = np.empty(room(steps[:length]))
             for side in range(2):
                 alone[side, own] = 1.0
-                swept(steps[:length], weights, left[side], pair[side], alone[side])
+                swept(steps[:length], weights, left[side], pair[side], alone[side], buffer)
             for v in own:
                 side = 1 if v == ends[edge[ptr[v]], 1] else 0
                 for x in range(ptr[v], ptr[v + 1]):
