@@ -22,7 +22,7 @@ FIXED = {
     "choosing": "0.5 0.7 0.87 0.95 0.98 1 2 12 87 100 128 300 4096",
     "concepts": "0.99 0.999 01 1 2",
     "dependencies": "3.11 64 430",
-    "probabilities": "0 0.02 1 12 80",
+    "probabilities": "0 0.02 1 12 20 22 80",
     "scaling": "0.001 4 500 1,000 3,000 10,000",
     "tracking_measured": "0 0.6 1 2 5 10 15 20 30 80 219 400 500",
     "which_solver": "0.001",
