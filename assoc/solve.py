@@ -75,6 +75,7 @@ _OPTIONS = (
     Option("proof", "FILE", "write a proof for 'assoc check' as JSON, and its problem beside it as .txt",
            Output(".json", strict=True, streams=False)),
     Option("gate_loss", "", "bound what the gates may have cost (takes about three times as long)", only=_SCENES),
+    Option("marginals", "", "how probable each target is among all associations of its scan"),
     COMMON["import"],
     *verbosity("all parameters, and how cost and bound change while a scan is solved"),
 )  # fmt: skip
@@ -261,6 +262,7 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
         gating=given.some(parameter.name for parameter in _GATING),
         pheromone=given["report"] is not None and not given["tiles"],
         gate_loss=bool(given["gate_loss"]),
+        marginals=bool(given["marginals"]),
         watch=log,
         **given.some(("seed", "time_limit", "kbest", "tiles")),
     )

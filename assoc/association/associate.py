@@ -24,6 +24,7 @@ def associate(
     jobs: int = 1,
     gating: Mapping[str, Any] | None = None,
     gate_loss: bool = False,
+    marginals: bool = False,
     **parameters: Any,
 ) -> Association:
     """Find for every scan which measurements come from the same target, and which are false alarms.
@@ -46,6 +47,8 @@ def associate(
     gate_loss : bool, default False
         Whether to bound the loss by gating of each scan (``ScanAssociation.gate_loss``): the scan is built
         and solved once more without gates, which takes about three times as long.
+    marginals : bool, default False
+        Whether to compute how probable each target is (``ScanAssociation.probabilities``, ``assoc.marginals``).
     **parameters
         Parameters of the solver (``assoc.solvers.parameters(solver)``).
 
@@ -65,5 +68,6 @@ def associate(
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
     gates = {} if gating is None else gating
-    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, gate_loss=bool(gate_loss))
+    asked: Any = {"gate_loss": bool(gate_loss), "marginals": bool(marginals)}
+    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, **asked)
     return plan.gather(plan.run(plan.items(), jobs))

@@ -64,7 +64,8 @@ class Association:
 
         Columns: ``scan``, ``time``, ``target`` (its number within the scan), ``sensor_1`` .. ``sensor_S``
         (the measurement of each sensor, 0: missed), ``x``, ``y``, ``z`` and standard deviations ``sigma_x``,
-        ``sigma_y``, ``sigma_z`` in metres (NaN without a scene).
+        ``sigma_y``, ``sigma_z`` in metres (NaN without a scene); where they were asked for, ``probability``,
+        ``probability_lower`` and ``probability_upper``.
         """
         import pandas as pd
 
@@ -202,6 +203,9 @@ def frame_of_scan(scan: ScanAssociation, count: int) -> pd.DataFrame:
         position, sigma = scan.positions, np.sqrt(np.diagonal(scan.covariances, axis1=1, axis2=2))
     names = [*(f"sensor_{s + 1}" for s in range(count)), "x", "y", "z", "sigma_x", "sigma_y", "sigma_z"]
     values = [*scan.targets.T, *[np.zeros(number, np.int32)] * (count - width), *position.T, *sigma.T]
+    if scan.probabilities is not None:
+        names += ["probability_lower", "probability", "probability_upper"]
+        values += [*scan.probabilities.T]
     part = pd.DataFrame({"scan": scan.scan, "time": scan.time, "target": np.arange(number)})
     return part.assign(**dict(zip(names, values, strict=True)))
 

@@ -24,6 +24,7 @@ from assoc.errors import InvalidInputError
 from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
+from assoc.ranking.marginals import marginals
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution, TracePoint
@@ -61,6 +62,8 @@ class Plan:
         Whether to bound the loss by gating for each scan of a scene.
     tiles : int
         Above 1: build and solve each scan of a scene in so many tiles of space; see `assoc.association.tiles`.
+    marginals : bool
+        Whether to compute the probability of each target.
     """
 
     sources: Sequence[Source]
@@ -74,6 +77,7 @@ class Plan:
     watch: Callable[[int, TracePoint], object] | None = None
     gate_loss: bool = False
     tiles: int = 0
+    marginals: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", whole_seed(self.seed))
@@ -107,7 +111,8 @@ class Plan:
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
             solutions, history = self._solve(source, self.seed, 0)
-            return self._best([_of_problem(source, solution) for solution in solutions], history, compiled)
+            found = [_of_problem(source, solution) for solution in solutions]
+            return self._best(self._with_probabilities(source, found), history, compiled)
         return self.associate(source, source.scan(item[1]))
 
     def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
@@ -123,7 +128,18 @@ class Plan:
         if self.gate_loss:
             bound = bound_without_gates(scene, scan, self.gating, self.time_limit)
             scans = [replace(ranked, gate_loss=max(0.0, ranked.solution.cost - bound)) for ranked in scans]
-        return self._best(scans, history, compiled)
+        return self._best(self._with_probabilities(problem, scans), history, compiled)
+
+    def _with_probabilities(self, problem: AssignmentProblem, scans: list[ScanAssociation]) -> list[ScanAssociation]:
+        if not self.marginals:
+            return scans
+        found = marginals(problem, time_limit=self.time_limit)
+        values = np.stack([found.lower, found.probability, found.upper], axis=1)
+        row = {key: number for number, key in enumerate(map(tuple, found.tuples.tolist()))}
+        return [
+            replace(scan, probabilities=values[[row[key] for key in map(tuple, scan.targets.tolist())]].reshape(-1, 3))
+            for scan in scans
+        ]
 
     def _tiled(self, item: tuple[int, int], jobs: int, scheduler: str | None) -> ScanAssociation:
         source, compiled = self.sources[item[0]], compile_seconds()

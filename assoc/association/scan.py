@@ -53,6 +53,9 @@ class ScanAssociation(Shown):
     gate_loss : float or None
         Bound of the cost above the optimum of all tuples of negative cost, gated or not; infinite if unknown, None if
         not requested.
+    probabilities : array (T, 3) or None
+        Probability of each target among all associations of the scan, if requested: lower bound, estimate, upper bound
+        (``assoc.marginals``).
     """
 
     scan: int
@@ -69,6 +72,14 @@ class ScanAssociation(Shown):
     pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
     gate_loss: float | None = None
+    probabilities: NDArray[np.float64] | None = None
+
+    @property
+    def least_probable(self) -> float | None:
+        """Probability of the target that is most in doubt; None where none is known."""
+        if self.probabilities is None or not len(self.probabilities):
+            return None
+        return float(self.probabilities[:, 1].min())
 
     @property
     def false_alarms(self) -> int:
@@ -92,6 +103,9 @@ class ScanAssociation(Shown):
         if self.positions is not None and self.covariances is not None:
             for entry, position, spread in zip(targets, self.positions, self.covariances, strict=True):
                 entry.update(position=position.tolist(), covariance=spread.tolist())
+        if self.probabilities is not None:
+            for entry, (lower, probability, upper) in zip(targets, self.probabilities.tolist(), strict=True):
+                entry.update(probability=probability, probability_lower=lower, probability_upper=upper)
         content = {
             "scan": self.scan,
             "time": self.time,

@@ -50,7 +50,9 @@ def rows(
     truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
     losses = any(scan.gate_loss is not None for scan in scans)
     headers = [*(["file"] if several else []), *_HEADERS]
-    headers += [*(["gate loss"] if losses else []), *(["correct"] if truth else [])]
+    probable = any(scan.probabilities is not None for scan in scans)
+    headers += [*(["gate loss"] if losses else []), *(["least sure"] if probable else [])]
+    headers += ["correct"] if truth else []
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
     cells = []
@@ -71,6 +73,8 @@ def rows(
         ]
         if losses:
             row.append(_loss(scan))
+        if probable:
+            row.append("" if scan.least_probable is None else f"{scan.least_probable:.3f}")
         if truth:
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
@@ -107,12 +111,13 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
     ranked = any(scan.ranked for scan in scans)
     losses = any(scan.gate_loss is not None for scan in scans)
+    probable = any(scan.probabilities is not None for scan in scans)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
         + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
-        + ["compile_time", *(["gate_loss"] if losses else [])]
+        + ["compile_time", *(["gate_loss"] if losses else []), *(["least_probable"] if probable else [])]
     )
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
@@ -123,5 +128,6 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
             + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
             + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
             + ([scan.gate_loss] if losses else [])
+            + ([scan.least_probable] if probable else [])
         )
     return text.getvalue()

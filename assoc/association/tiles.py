@@ -126,10 +126,11 @@ def solve_in_tiles(
     gating = plan.gating
     probability = gating.get("gate_probability", GATE_PROBABILITY)
     auto = gating.get("target_density") == "auto"
-    if scan.times is not None or probability == 1 or auto or gating.get("all_tuples") or plan.kbest or plan.gate_loss:
+    more = plan.kbest or plan.gate_loss or plan.marginals
+    if scan.times is not None or probability == 1 or auto or gating.get("all_tuples") or more:
         raise InvalidInputError(
             "tiles: expected measurements of one instant, a gate probability below 1, no target_density 'auto', and "
-            "one association of each scan without its gate loss"
+            "one association of each scan without its gate loss or probabilities"
         )
     answers = list(
         spread(SolveTile(plan, scene), tiles_of(scene, scan, count, probability), jobs=jobs, scheduler=scheduler,

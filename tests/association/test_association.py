@@ -205,3 +205,26 @@ def test_positions_at_another_time_follow_the_speed():
         assert len(one.targets) > 2
         np.testing.assert_allclose(one.positions, expected[0])
         np.testing.assert_allclose(one.covariances, expected[1])
+
+
+@pytest.mark.parametrize("kbest", [None, 3])
+def test_probabilities_of_targets_are_the_marginals_of_their_tuples(kbest):
+    scene = simulate("crowd", 3, targets=8, scans=2, width=900.0, height=700.0, noise=60.0)
+    plan = Plan((scene,), "exact", kbest=kbest, marginals=True)
+    result = plan.gather(plan.run(plan.items()))
+    for k, scan in enumerate(result.scans):
+        found = assoc.marginals(assoc.build_problem(scene, k))
+        known = dict(zip(map(tuple, found.tuples.tolist()), found.probability.tolist(), strict=True))
+        for one in scan.ranked or (scan,):
+            assert one.probabilities[:, 1].tolist() == [known[tuple(row)] for row in one.targets.tolist()]
+            assert (np.diff(one.probabilities, axis=1) >= 0.0).all()
+            assert one.least_probable == one.probabilities[:, 1].min()
+            entry = one.to_dict()["targets"][0]
+            assert entry["probability_lower"] <= entry["probability"] <= entry["probability_upper"]
+    # something is in doubt
+    assert min(scan.least_probable for scan in result.scans) < 0.9
+    frame = result.to_frame()
+    assert frame["probability"].tolist() == [p for scan in result.scans for p in scan.probabilities[:, 1]]
+    assert to_csv(result.scans, ["a", "a"]).splitlines()[0].endswith(",least_probable")
+    plain = associate(scene)
+    assert plain.scans[0].probabilities is None and "probability" not in plain.to_frame()

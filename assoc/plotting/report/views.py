@@ -123,6 +123,7 @@ def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> di
         "ranked": [number(other.solution.cost) for other in one.ranked],
         "tuples": tuples.tolist(),
         "costs": plain_numbers(costs, 4),
+        "probabilities": None if one.probabilities is None else [plain_numbers(row, 4) for row in one.probabilities],
         "trace": _trace(one),
         "view": None,
     }

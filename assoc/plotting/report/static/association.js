@@ -74,8 +74,15 @@ const drawDetail = () => {
 const drawTargets = () => {
   const scan = data.scans[state.scan];
   const box = byId('targets');
-  const table = simpleTable(['target', 'tuple', 'cost'], scan.tuples.map((_, t) => [t + 1, tupleText(scan, t), short(scan.costs[t], 5)]));
-  [...table.tBodies[0].rows].forEach((row, t) => {
+  const sure = scan.probabilities;
+  const order = scan.tuples.map((_, t) => t);
+  // those most in doubt first
+  if (sure) order.sort((a, b) => sure[a][1] - sure[b][1]);
+  const percent = (value) => `${short(100 * value, 3)} %`;
+  const cells = (t) => [t + 1, tupleText(scan, t), short(scan.costs[t], 5), ...(sure ? [percent(sure[t][1]), `${percent(sure[t][0])} to ${percent(sure[t][2])}`] : [])];
+  const table = simpleTable(['target', 'tuple', 'cost', ...(sure ? ['probability', 'proved'] : [])], order.map(cells));
+  [...table.tBodies[0].rows].forEach((row, place) => {
+    const t = order[place];
     row.dataset.row = String(t);
     row.tabIndex = 0;
     if (t === state.chosen) row.setAttribute('aria-current', 'true');
