@@ -9,11 +9,13 @@ import shutil
 import tomllib
 from dataclasses import fields
 from functools import reduce
+from glob import glob
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType
 
+import pandas as pd
 import pytest
 
 import assoc
@@ -350,6 +352,8 @@ def inputs(tmp_path_factory):
     own = (ROOT / "docs" / "own_solver.md").read_text(encoding="utf-8")
     cells = re.findall(r"```\{code-cell\}\n(.*?)```", own, re.DOTALL)
     (folder / "mine.py").write_text(next(cell for cell in cells if "register(" in cell), encoding="utf-8")
+    (folder / "day").mkdir()
+    pd.read_csv(folder / "plots.csv").to_parquet(folder / "day" / "1.parquet")
     if find_spec("asterix"):
         from assoc.integrations.asterix import write_plots
 
@@ -375,6 +379,8 @@ def test_commands_of_the_pages_run(page, inputs, tmp_path, monkeypatch, capsys):
             for flag, fewer in (("--repeats", "2"), ("--tune", "4")):
                 if flag in words:
                     words[words.index(flag) + 1] = fewer
+        # as a shell does
+        words = [name for word in words for name in (sorted(glob(word)) if "*" in word else [word])]
         assert program(words[0]).main(words[1:]) == 0, (words, capsys.readouterr().err)
 
 

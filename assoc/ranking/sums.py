@@ -34,13 +34,18 @@ class Plan(NamedTuple):
     """Numbers that the largest sweep holds."""
 
 
-@njit
 def plan_clusters(graph: Graph, log_upper: Floats, most: int, drop: bool) -> Plan:
     """Plan the sweeps over all clusters that have at most ``most`` vertices open.
 
     With ``drop``, tuples whose probability is known to be small (``log_upper``, (K,)) are left out where needed,
     the least likely ones first, until every cluster can be summed.
     """
+    return Plan(*_planned(graph, log_upper, most, drop))
+
+
+@njit
+def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[NDArray[np.bool_], Ints, Ints, Ints, int]:
+    """The fields of a `Plan`."""
     vertices, edges = graph.ptr.size - 1, log_upper.size
     kept, label = np.ones(edges, np.bool_), np.full(vertices, -1, np.int64)
     wide = np.zeros(vertices, np.bool_)
@@ -71,7 +76,7 @@ def plan_clusters(graph: Graph, log_upper: Floats, most: int, drop: bool) -> Pla
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):
                     if log_upper[graph.edge[x]] < level or level >= 0.0:
                         kept[graph.edge[x]] = False
-    return Plan(kept, steps[:count], ends[:clusters], label, largest)
+    return kept, steps[:count], ends[:clusters], label, largest
 
 
 def sum_clusters(plan: Plan, weights: Floats, free: Floats, deadline: float, probability: Floats, alone: Floats) -> int:
