@@ -5,6 +5,7 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import sys
@@ -153,6 +154,8 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
         **given.some(("interval", "horizon", "wait")),
     )
     tracker.warm_up()
+    # what is loaded by now stays: looking through it for garbage would hold up a step
+    gc.freeze()
     note = height_note(scene.sensors, len(tracker.positions))
     if note is not None:
         _say(given, note)

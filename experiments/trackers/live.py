@@ -8,6 +8,7 @@ CPU times of a step, from the plot that ends an interval to the picture, and wal
 machine hold what others do.
 """
 
+import gc
 import time
 from functools import partial
 
@@ -38,6 +39,7 @@ def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
 
     tracker = LiveTracker(scene, make, interval=INTERVAL, turns=TURNS, tell=lambda line: None)
     tracker.warm_up()
+    gc.freeze()  # as the program does
     found, tracks = [], 0
     for plot in replayed(scene, 0.0):
         cpu, wall = time.process_time(), time.perf_counter()
