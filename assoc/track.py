@@ -10,53 +10,43 @@ import os
 import shlex
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
-from assoc._cli.options import Given, Parser, check_scheduler, flag_of
-from assoc._cli.program import Program, command, prepare_streams, write_all
+from assoc._cli.options import Given, Parser, check_scheduler
+from assoc._cli.program import Program, command, prepare_streams
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import EarlyEnd
 from assoc._cli.track.options import (
-    CUTOFF,
     OF_PLOTS,
     OF_SCENES,
     RADAR,
     TRACKERS,
-    TRACKS,
     make_tracker,
     read_options,
     track_parser,
     with_further,
 )
-from assoc._cli.track.radars_file import ASTERIX, read_asterix_plots
-from assoc._files.output import STDOUT, is_stream
+from assoc._cli.track.plots import Windows, as_options, is_asterix, stored_plots
+from assoc._cli.track.results import Judged, Tracked, write_and_print
+from assoc._files.output import is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
-from assoc._text.times import decimals
-from assoc.errors import InvalidInputError, LimitExceededError, warn
+from assoc.errors import InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
-    from assoc.metrics import CtMtIt
-    from assoc.recordings import Recording, Window
+    from assoc.recordings import Window
     from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
-    from assoc.tracking import Tracker, TrackTable
+    from assoc.tracking import Tracker
     from assoc.tracking.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
-_USUAL = {
-    "range_noise": "30 to 150 m are usual",
-    "azimuth_noise": "0.05 to 0.2 degrees are usual",
-    "rotation": "4 to 12 seconds are usual",
-}
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
 # seconds of a slice
@@ -100,34 +90,6 @@ def _track(words: list[str]) -> None:
         _make_tracks(given, settings)
 
 
-class _Tracked(NamedTuple):
-    """Tracks of a scene or of plots, and how many of all scans were tracked."""
-
-    tracker: Tracker
-    table: TrackTable
-    scene: Any
-    plots: Any
-    num_tracked: int
-    total: int
-    whole: PlotTracks | None = None
-    """For reports."""
-    missing: Sequence[str] = ()
-    """Files and slices that they lack."""
-
-
-class _Judged(NamedTuple):
-    """Tracks of plots against the plots' identities."""
-
-    ends: Any
-    """The tracker's time after each window, seconds."""
-    sizes: list[int]
-    """Plots of each window."""
-    sourced: bool
-    """Whether the aircraft are known, and not only codes."""
-    rates: CtMtIt | None
-    kept: tuple[int, int] | None
-
-
 def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     file = given["file"]
     started, compiled = time.perf_counter(), compile_seconds()
@@ -139,17 +101,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     elapsed = time.perf_counter() - started - compiling
     if given["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
-    write_all(
-        (given["map"], lambda: _write_map(given["map"], found.table)),
-        (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
-        (given["output"], lambda: _write_tracks(given["output"], found.table)),
-        (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
-        (given["report"], lambda: _write_report(given, found)),
-        (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
-        (given["check"], lambda: print_lines(str(found.tracker.health))),
-        (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
-        (found.plots, lambda: _print_rates(found.plots, given["identity"])),
-    )
+    write_and_print(found, given, elapsed, compiling)
     _EARLY_END.say(f"the tracks of {found.num_tracked} of {found.total} scans are written")
     if found.missing:
         again = "; the same command does what is left" if given["jobs"] or given["scheduler"] or given["slice"] else ""
@@ -173,11 +125,7 @@ def _has_plots(file: str) -> bool:
     return not file.lower().endswith(".toml") and not _is_npz(file)
 
 
-def _is_asterix(file: str) -> bool:
-    return file.lower().endswith(ASTERIX)
-
-
-def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     """Track the radars of a description."""
     from assoc._cli.track.radars_file import read_radars
     from assoc.tracking import smoothed, track_scene
@@ -206,10 +154,10 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         named, tracks = tracks, smoothed(tracker, scene, decisions)
         tracks.take_names(named)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
-    return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
+    return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
-def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
@@ -238,7 +186,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     if given["smooth"]:
         tracks = smoothed(tracker, scene, decisions)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
-    return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
+    return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
 def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
@@ -256,7 +204,7 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
     return found.correct(scene)
 
 
-def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     import numpy as np
 
     from assoc.recordings import radar_of, with_heights
@@ -266,7 +214,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     from assoc.tracking.track_table import LongTable
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
-    kind, identity = "ASTERIX files" if _is_asterix(file) else "tables", given["identity"] or "score-only"
+    kind, identity = "ASTERIX files" if is_asterix(file) else "tables", given["identity"] or "score-only"
     given.check_use((*OF_SCENES, *OF_PLOTS), input="plots", format=kind, window=given["window"], identity=identity)
     name = given["tracker"] or "mht"
     if name in ("multi-sensor", "static"):
@@ -274,10 +222,10 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         raise InvalidInputError(f"--tracker: {name} takes scenes; for plots use one of {others}")
     if given["map"] and given["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    stored, notes, left = _stored_plots(given)
+    stored, notes, left = stored_plots(given)
     survey = stored.survey
-    with _as_options():
-        windows = _Windows(stored, given, settings.get("seed", 0))
+    with as_options():
+        windows = Windows(stored, given, settings.get("seed", 0))
         print_lines(survey.summary(notes))
         radar = radar_of(survey, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
@@ -287,13 +235,13 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     if sliced and (whole or given["check"]):
         raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map, --asterix, --check")
 
-    def track(scans: Iterator[Window]) -> tuple[Any, _Judged, PlotTracks | None]:
+    def track(scans: Iterator[Window]) -> tuple[Any, Judged, PlotTracks | None]:
         if whole:
             recording = joined([*stored], notes, os.path.basename(file))
             done = track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
             done.table.origin = given["origin"]
             sizes = [len(window) for window in done.windows]
-            return done.table, _Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
+            return done.table, Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
         takers = TakenPlots(survey.named, stored.addressed)
         table, ends, sizes = LongTable(given["origin"]), [], []
         for followed in follow(tracker, scans, forget=True):
@@ -305,7 +253,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
             if len(ends) % FORGET == 0:
                 takers.keep(may_return(tracker))
         table.finish()
-        return table, _Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
+        return table, Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
 
     if sliced:
         table, judged, missing = _in_slices(given, tracker, windows, stored)
@@ -322,12 +270,10 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
         plots = plots and plots._replace(rates=None, kept=None)
         (table if whole else table.names).take_names(TrackTable())
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return _Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing])
+    return Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing])
 
 
-def _in_slices(
-    given: Given, tracker: Tracker, windows: _Windows, stored: StoredPlots
-) -> tuple[Any, _Judged, list[str]]:
+def _in_slices(given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots) -> tuple[Any, Judged, list[str]]:
     """Track slices of the recording, write their tracks, and name what is missing."""
     import numpy as np
 
@@ -359,118 +305,7 @@ def _in_slices(
         table.finish()
         missing = slices.missing()
     times = np.concatenate([np.zeros(0), *ends])
-    return table, _Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
-
-
-@contextmanager
-def _as_options() -> Iterator[None]:
-    """Name in errors the options instead of the library's arguments, with usual values."""
-    try:
-        yield
-    except InvalidInputError as error:
-        text = str(error)
-        if " rotation time " in text:
-            text = f"rotation: {text}"
-        name, _, rest = text.partition(": ")
-        flags = {**{argument: flag for flag, argument in RADAR.items()}, "rotation": "rotation"}
-        if name not in flags:
-            raise
-        usual = f" ({_USUAL[name]})" if name in _USUAL else ""
-        raise InvalidInputError(f"{flag_of(flags[name])}: {rest}{usual}") from None
-
-
-def _stored_plots(given: Given) -> tuple[StoredPlots, Mapping[str, int], list[str]]:
-    """The plots of the files, read part by part, what reading had to correct, and what could not be read."""
-    import numpy as np
-
-    from assoc.recordings.survey import StoredPlots
-
-    files, notes = given["files"], Counter[str]()
-    left: list[str] = []
-    first = {}
-    for file in files:
-        try:
-            first[file] = next(_parts(file, given, Counter())).times[0] if len(files) > 1 else 0.0
-        except InvalidInputError as error:
-            left.append(str(error))
-    if len(left) == len(files):
-        raise InvalidInputError(left[0])
-
-    def parts() -> Iterator[Recording]:
-        end, behind, latest = -math.inf, "", np.zeros((0, 2))
-        for file in sorted(first, key=lambda file: float(first[file])):
-            before, late, last = end, 0, None
-            try:
-                for part in _parts(file, given, notes):
-                    # a file may begin at the instant at which the one before ends, with other plots
-                    twice = (part.measurements[:, None] == latest).all(axis=2).any(axis=1) & (part.times == before)
-                    kept = (part.times >= before) & ~twice
-                    late += len(part) - int(kept.sum())
-                    if kept.any():
-                        part = part.take(kept)
-                        end, last = float(part.times[-1]), part
-                        yield part
-            except InvalidInputError as error:
-                if len(files) == 1:
-                    raise
-                left.append(str(error))
-            if late:
-                left.append(f"{late} plots of {file}, which are before the end of {behind}")
-            if last is not None:
-                behind, latest = file, last.measurements[last.times == end]
-
-    stored = StoredPlots(parts())
-    for line in left:
-        warn(f"left out: {line}")
-    if given["rates"] and not stored.survey.named:
-        raise InvalidInputError(f"--rates: {files[0]}: no plot has an identity (column mode3 or aircraft)")
-    return stored, notes, left
-
-
-def _parts(file: str, given: Given, notes: Counter[str]) -> Iterator[Recording]:
-    """The plots of a file part by part; what reading had to correct is counted in the notes."""
-    from assoc.recordings.reading import PlotReader
-
-    if _is_asterix(file):
-        content, source = read_asterix_plots(file, given["radar"], "--radar")
-        yield content.plots[source]
-        notes.update(content.plots[source].notes)
-    else:
-        reader = PlotReader(file)
-        yield from reader
-        notes.update(reader.notes)
-
-
-class _Windows:
-    """The plots, grouped into scans, one after the other."""
-
-    def __init__(self, stored: StoredPlots, given: Given, seed: int) -> None:
-        from assoc.recordings import estimate_rotation
-
-        self._stored, self._kind, self._seed = stored, given["window"], seed
-        self.rotation = given["rotation"] or 1.0
-        if self._kind in ("ctw", "ctw-time"):
-            self.rotation = given["rotation"] or estimate_rotation(stored)
-
-    def __iter__(self) -> Iterator[Window]:
-        import numpy as np
-
-        from assoc.recordings import Window, irregular_groups
-        from assoc.recordings.recording import joined
-        from assoc.recordings.windows import windows_in_turn
-
-        if self._kind == "none":
-            begin = 0
-            for part in self._stored:
-                for row in range(len(part)):
-                    window = Window.of(part, np.array([row]), begin + row)
-                    yield replace(window, rows=window.rows + begin)
-                begin += len(part)
-        elif self._kind == "irregular":
-            yield from irregular_groups(joined([*self._stored], {}, ""), np.random.default_rng(self._seed))
-        else:
-            by: Any = "antenna" if self._kind == "ctw" else "time"
-            yield from windows_in_turn(self._stored, self._stored.survey, self.rotation, by=by)
+    return table, Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
 
 
 def _watched(
@@ -489,115 +324,6 @@ def _watched(
     if not bar.done:
         _EARLY_END.say("")
     return found, bar.done
-
-
-def _write_map(path: str, tracks: TrackTable) -> None:
-    from assoc.exports.maps import write_map
-
-    write_map(path, tracks.to_frame())
-
-
-def _write_asterix(path: str, found: _Tracked) -> None:
-    from assoc.integrations.asterix import write_tracks
-
-    frame = found.table.to_frame()
-    if found.table.identities:
-        # aircraft with a transponder have heights by Mode C, if any sensor has heights by it
-        mode_c = found.plots or any("height" in one.components[: one.dim] for one in found.tracker.sensors)
-        frame["barometric"] = bool(mode_c) & ((frame["address_hex"] != "") | (frame["mode3_oct"] != ""))
-    write_tracks(path, frame)
-
-
-def _write_tracks(path: str, tracks: Any) -> None:
-    if not hasattr(tracks, "to_csv"):
-        tracks.write(path)
-    elif TRACKS.ending(path) == ".parquet":
-        tracks.to_parquet(path)
-    else:
-        tracks.to_csv(path)
-
-
-def _write_report(given: Given, found: _Tracked) -> None:
-    from assoc.plotting.report import write_tracking_report
-
-    tracker = found.tracker
-    used = {
-        "tracker": tracker.name,
-        "solver": tracker.settings.solver if tracker.solver_calls else "none",
-        "filter": given["filter"],
-        "scans": found.num_tracked,
-    }
-    write_tracking_report(
-        given["report"],
-        found.table.to_frame(),
-        found.scene,
-        name=given["file"],
-        settings=used,
-        cutoff=given["cutoff"] or CUTOFF,
-        words=given.words,
-        plots=found.whole,
-    )
-
-
-def _write_rates(path: str, plots: _Judged) -> None:
-    from assoc._files.output import write_text
-
-    assert plots.rates is not None
-    lines = ["window,time,plots,ct,mt,it"]
-    for number_of, row in zip(plots.rates.windows.tolist(), plots.rates.per_window.tolist(), strict=True):
-        cells = ["" if math.isnan(value) else f"{value:.2f}" for value in row]
-        lines.append(f"{number_of + 1},{decimals(plots.ends[number_of], 6)},{plots.sizes[number_of]},{','.join(cells)}")
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def _print_rates(plots: _Judged, identity: str | None) -> None:
-    if plots.kept is not None:
-        kept, judged = plots.kept
-        # identities that made the tracks are no evidence of their quality
-        note = " (identities were used to make them)" if identity == "use" and not plots.sourced else ""
-        print_lines(f"{kept} of {judged} tracks with an identity kept one{note}")
-    if plots.rates is None:
-        return
-    rates, known = plots.rates, "aircraft" if plots.sourced else "Mode 3"
-    figures = ", ".join(
-        f"{name} {'-' if math.isnan(value) else f'{value:.1f} %'}"
-        for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
-    )
-    print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
-
-
-def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float) -> None:
-    from assoc.tracking.filter_choice import height_note
-
-    tracker, rows = found.tracker, found.table
-    name = "stdout" if output == STDOUT else printable(output)
-    print_lines(f"{name}: {len(rows.confirmed_ids())} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
-    each = 1e3 * elapsed / max(found.num_tracked, 1)
-    # several trackers never need the solver, or only for the rest of their own search
-    used = tracker.settings.solver if tracker.solver_calls else "no solver used"
-    spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
-    print_lines(f"{tracker.name}, {used}: {spent}")
-    worst = sorted(rows.inconsistent().items(), key=lambda one: -one[1])
-    if worst:
-        shown = ", ".join(f"{track} ({nis:.2g})" for track, nis in worst[:5]) + (", ..." if len(worst) > 5 else "")
-        print_lines(f"tracks that do not agree with their measurements (NIS, at most 1 expected): {shown}")
-    note = height_note(tracker.sensors, len(tracker.filter.motion.position))
-    if note is not None:
-        print_lines(note)
-
-
-def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:
-    """Print the metrics against the truth."""
-    from assoc.metrics import Trajectories, summarise
-    from assoc.tracking.track_table import against_truth
-
-    compared = against_truth(scene, Trajectories(*tracks.arrays()))
-    found, level = summarise(*compared, cutoff), ", horizontally" if compared[0].positions.shape[1] == 2 else ""
-    print_lines(
-        f"against the truth (cutoff {cutoff:g} m{level}): root mean square GOSPA {found.gospa:.4g} m "
-        f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
-        f"false {found.gospa_false:.4g}), {found.identity.switches} identity switches"
-    )
 
 
 def parser() -> Parser:

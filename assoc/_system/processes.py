@@ -37,26 +37,7 @@ def start_python(path: Sequence[str], **options: Any) -> subprocess.Popen[bytes]
 def parallel_map(
     task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True
 ) -> Generator[Any]:
-    """Yield ``task(item)`` for each item.
-
-    Parameters
-    ----------
-    task : callable
-        Sent once to each process, so it may hold data that all items share.
-    items : iterable
-        Small. If the results need no order, it is read only as far as the processes need.
-    jobs : int
-        Number of processes; 1 works in this process.
-    ordered : bool
-        Whether results come in the order of the items, or as they arrive.
-
-    Raises
-    ------
-    LimitExceededError
-        A process died or could not start, or memory does not suffice for ``jobs`` processes.
-    InvalidInputError
-        The task cannot be sent to another process, or its result cannot be sent back.
-    """
+    """Yield ``task(item)`` for each item, made by ``jobs`` processes; the rest is as of `engine.spread`."""
     if isinstance(items, Sized):
         jobs = min(jobs, len(items))
     if jobs <= 1:
