@@ -108,13 +108,7 @@ def positive(value: object, what: str, *, zero: bool = False) -> float:
 
 
 def whole_seed(seed: object) -> int:
-    """Return a seed as an int; for None a random one.
-
-    Raises
-    ------
-    InvalidInputError
-        It is neither None nor a whole number >= 0.
-    """
+    """Return a seed, a whole number >= 0, as an int; for None a random one."""
     if seed is None:
         return secrets.randbits(63)
     if not is_whole(seed, 0):

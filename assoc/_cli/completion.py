@@ -21,13 +21,7 @@ Parsers = Mapping[str, "argparse.ArgumentParser | Parsers"]
 
 
 def script(shell: str, programs: Parsers) -> str:
-    """Return a script for a shell.
-
-    Raises
-    ------
-    InvalidInputError
-        The shell is unknown.
-    """
+    """Return a script for a shell, one of `SHELLS`."""
     if shell not in SHELLS:
         raise InvalidInputError(f"completion: expected one of {', '.join(SHELLS)}, got {shell!r}")
     parser = argparse.ArgumentParser("assoc")

@@ -15,13 +15,7 @@ _LARGEST = 1_000_000
 
 
 def read_toml(path: str) -> dict[str, Any]:
-    """Read a TOML file; keys may have dashes for underscores.
-
-    Raises
-    ------
-    InvalidInputError
-        It cannot be read, or is not TOML.
-    """
+    """Read a TOML file; keys may have dashes for underscores."""
     import tomllib  # only with --config
 
     try:
@@ -34,13 +28,7 @@ def read_toml(path: str) -> dict[str, Any]:
 
 
 def import_modules(names: str | None) -> None:
-    """Import modules by their names, separated by commas; modules in the current folder are found.
-
-    Raises
-    ------
-    InvalidInputError
-        A module is missing or cannot be imported.
-    """
+    """Import modules by their names, separated by commas; modules in the current folder are found."""
     if names is None:
         return
     folder = os.getcwd()

@@ -29,33 +29,18 @@ def flag_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a program.
-
-    Attributes
-    ----------
-    name : str
-        Name with underscores for the dashes of its flag.
-    metavar : str
-        Placeholder for its value in the help; empty for an option without a value.
-    help : str
-    kind : callable
-        Converts its value; see `assoc._cli.values`.
-    only : mapping
-        Scope: by the name of another option or choice, the value that this option is for.
-    rest : mapping
-        Further arguments for argparse.
-    short : str
-        Short flag.
-    positional : bool
-        Whether it is positional, without a flag.
-    """
+    """An option of a program."""
 
     name: str
+    """With underscores for the dashes of its flag."""
     metavar: str
+    """Placeholder for its value in the help; empty for an option without a value."""
     help: str
     kind: Kind = text
     only: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Scope: by the name of another option or choice, the values that this option is for."""
     rest: Mapping[str, Any] = field(default_factory=dict)
+    """Further arguments for argparse."""
     short: str = ""
     positional: bool = False
 
@@ -86,17 +71,7 @@ class Option:
 
 
 class Given(dict[str, Any]):
-    """Values of options by name, None if not given.
-
-    Attributes
-    ----------
-    words : list of str
-        The command line.
-    outputs : dict of Output
-        The options that name output files.
-    file : str
-        The TOML file from which values were read.
-    """
+    """Values of options by name, None if not given; the words of the line, its outputs, and the TOML file it names."""
 
     def __init__(self, values: Mapping[str, Any], words: Sequence[str]) -> None:
         super().__init__(values)
@@ -131,18 +106,10 @@ class Given(dict[str, Any]):
         reserved: Iterable[str] = (),
         new_folder: str | None = None,
     ) -> None:
-        """Refuse, before the work, outputs that cannot be written.
+        """Refuse, before the work, outputs that cannot be written, or that would overwrite an input.
 
-        Parameters
-        ----------
-        inputs : iterable of str
-            Files to read.
-        also : iterable of str
-            Further files to write.
-        reserved : iterable of str
-            Other files that must not be overwritten.
-        new_folder : str, optional
-            A folder that the program will create.
+        `also` are further files to write, `reserved` others that must not be overwritten; the program will make
+        `new_folder`.
         """
         read = [path for path in inputs if path]
         for path in read:
@@ -163,13 +130,7 @@ class Given(dict[str, Any]):
             self.outputs[name](value, flag_of(name))
 
     def check_use(self, options: Iterable[Option], **chosen: str) -> None:
-        """Refuse options of the command line that do not apply to what was chosen.
-
-        Raises
-        ------
-        InvalidInputError
-            An option does not apply.
-        """
+        """Refuse options of the command line that do not apply to what was chosen."""
         for option in options:
             for what, allowed in option.only.items():
                 if self.of_line(option.name) and chosen[what] not in allowed:
@@ -195,13 +156,7 @@ class Parser(argparse.ArgumentParser):
             self.declared[option.name] = option
 
     def read(self, words: Sequence[str]) -> Given:
-        """Read a command line.
-
-        Raises
-        ------
-        InvalidInputError
-            A value is invalid for its option.
-        """
+        """Read a command line; a value that is invalid for its option is refused."""
         parsed = vars(self.parse_args(words))
         given = Given({}, words)
         for name, option in self.declared.items():
@@ -244,13 +199,7 @@ def _real_path(path: str) -> str:
 def read_config(
     path: str | None, options: Iterable[Option], solvers: Sequence[str]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read options, and tables of solvers' parameters, from a TOML file if one is given.
-
-    Raises
-    ------
-    InvalidInputError
-        The file cannot be read, or has an unknown key or a wrong value.
-    """
+    """Read options, and tables of solvers' parameters, from a TOML file if one is given."""
     values: dict[str, Any] = {}
     tables: dict[str, Any] = {}
     known = {option.name: option for option in options}

@@ -23,24 +23,13 @@ _MAY_BE_MISSING = ("ortools", "pandas")
 
 @dataclass(frozen=True)
 class Program:
-    """A program.
-
-    Attributes
-    ----------
-    name : str
-        Prefix of its messages.
-    run : callable
-        Does the work of a command line.
-    listen : callable
-        Sets what signals do, if the program is the whole process.
-    interruption : Interruption, optional
-        Records which signal ended it.
-    """
+    """A program: its name in messages, what it does, and what signals do where it is the whole process."""
 
     name: str
     run: Callable[[list[str]], None]
     listen: Callable[[], object]
     interruption: Interruption | None = None
+    """Records which signal ended it."""
 
     def start(self, arguments: Sequence[str] | None = None) -> int:
         """Run the program as the whole process; returns its exit code."""
@@ -103,18 +92,7 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
 
 
 def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
-    """Write the requested outputs; if one fails the others are written all the same, so that no result is lost.
-
-    Parameters
-    ----------
-    *outputs : (object, callable)
-        The file name or another value, None if it is not requested; the function that writes it.
-
-    Raises
-    ------
-    InvalidInputError
-        The first error of an output.
-    """
+    """Write the outputs that are asked for (not None); if one fails the others are written, then it raises."""
     errors = []
     for asked, write in outputs:
         try:

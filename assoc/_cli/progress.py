@@ -21,17 +21,7 @@ _SOON = 0.5
 
 
 class ProgressBar:
-    """Shows progress on stderr, if that is a terminal.
-
-    Parameters
-    ----------
-    label : str
-        What the program is doing.
-    unit : str
-        Name of the counted items, in the plural.
-    shown : bool, default True
-        Whether to show anything.
-    """
+    """Shows progress on stderr, if that is a terminal: what is done (`label`), counted in `unit`, a plural."""
 
     def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit

@@ -27,13 +27,7 @@ def with_scan_table(
 ) -> Iterator[Item]:
     """Yield the scans, and print a row for each of the first when the tracker has processed it.
 
-    Parameters
-    ----------
-    scans : iterable
-        Input of the tracker, one after the other.
-    tracker : Tracker
-    describe : callable
-        Returns the time of a scan, in seconds, and its number of measurements for each sensor.
+    `describe` returns the time of a scan, in seconds, and its number of measurements for each sensor.
     """
     if not sys.stdout.isatty():
         yield from scans

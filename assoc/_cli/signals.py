@@ -39,21 +39,10 @@ def ending_signals() -> dict[int, str]:
 
 
 class Interruption:
-    """Whether and how a signal ended a program, and the program's last line.
+    """Whether and how a signal ended the program `name`, and the program's last line.
 
-    Parameters
-    ----------
-    name : str
-        Name of the program.
-
-    Attributes
-    ----------
-    message : str
-        What the user should know: what is kept, and how to continue.
-    word : str
-        Name of the signal in messages.
-    code : int
-        Exit code; 0 before a signal.
+    `message` says what is kept and how to continue, `word` names the signal; `code` is the exit code, 0 before a
+    signal.
     """
 
     def __init__(self, name: str) -> None:
@@ -94,13 +83,7 @@ class Interruption:
 
     @contextmanager
     def reported(self, clean_up: Callable[[], object]) -> Iterator[None]:
-        """End the program with its last line if a signal interrupts the block.
-
-        Parameters
-        ----------
-        clean_up : callable
-            Called before the line is printed.
-        """
+        """Call `clean_up` and end the program with its last line if a signal interrupts the block."""
         try:
             yield
         except BaseException as error:
@@ -115,11 +98,6 @@ class EarlyEnd:
     """Lets a signal end a program's work early, so that finished results are written; a second signal ends it at once.
 
     Outside `work` a signal ends the program at once.
-
-    Parameters
-    ----------
-    name : str
-        Name of the program.
     """
 
     def __init__(self, name: str) -> None:

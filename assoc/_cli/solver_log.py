@@ -16,15 +16,7 @@ _HEADERS = f"{'scan':>6} {'seconds':>9} {'iteration':>10} {'cost':>14} {'bound':
 
 
 class SolverLog:
-    """Shows cost, lower bound and gap of the current scan.
-
-    Parameters
-    ----------
-    bar : ProgressBar
-        Shows them as its note, and prints the lines.
-    verbose : bool
-        Print lines: the history of each scan, thinned out, and its result.
-    """
+    """Shows cost, bound and gap of the current scan as the bar's note; `verbose`: as thinned out lines, too."""
 
     def __init__(self, bar: ProgressBar, verbose: bool) -> None:
         self._bar = bar

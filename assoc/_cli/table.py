@@ -67,19 +67,8 @@ def print_table(
     """Print a table to stdout.
 
     Headers of a table that is too wide for the terminal are broken into several lines. If that is not enough the table
-    is split into several, one below the other, or each row is printed as a list.
-
-    Parameters
-    ----------
-    headers : sequence of str
-    rows : sequence of sequences of str
-        Control characters are printed as escapes.
-    keys : int, default 1
-        Number of first columns that identify a row; each part of a split table begins with them.
-    left : sequence of str
-        Headers of the left-aligned columns.
-    joined : sequence of str
-        Headers of the columns that stay beside the column before them.
+    is split into several, one below the other, each beginning with the first `keys` columns; or each row is printed as
+    a list. Columns named in `left` are left-aligned, those in `joined` stay beside the column before them.
     """
     if sys.stdout.isatty():
         lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
@@ -134,17 +123,9 @@ def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[s
 
 
 class GrowingTable:
-    """A table on a terminal whose rows are printed as they come; the first row sets the widths of columns.
+    """A table on a terminal whose rows are printed as they come, `most` times; the first row sets the widths.
 
-    Parameters
-    ----------
-    headers : sequence of str
-    widths : mapping
-        By header: width that later cells may need, if larger than in the first row.
-    left : sequence of str
-        Headers of the left-aligned columns.
-    most : int
-        Number of times that rows are printed; later ones are not.
+    `widths` are what later cells may need, by header; columns named in `left` are left-aligned.
     """
 
     def __init__(self, headers: Sequence[str], widths: Mapping[str, int], left: Sequence[str], most: int) -> None:

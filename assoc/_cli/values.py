@@ -113,16 +113,9 @@ class OneOf:
 class Output:
     """Files to write, whose formats are known by the endings of their names.
 
-    Parameters
-    ----------
-    *endings : str
-        Endings that the name may have.
-    strict : bool, default False
-        Whether the name must have one of them; otherwise it must only not have that of another format.
-    streams : bool, default True
-        Whether stdout and pipes are allowed, with the format of the first ending.
-    extras : dict, optional
-        By ending, "" for all: the package that writes it, and the extra of assoc that installs it.
+    A `strict` name must have one of the endings; otherwise only not that of another format. With `streams`, stdout and
+    pipes are allowed, in the format of the first ending. `extras`: by ending, "" for all, the package that writes it
+    and the extra of assoc that installs it.
     """
 
     def __init__(
@@ -156,13 +149,7 @@ csv_table = Output(".csv")
 
 
 def scan_range(value: str, count: int, name: str, label: str = "--scans") -> range:
-    """Read A:B or A, within the scans of the source ``name``.
-
-    Raises
-    ------
-    InvalidInputError
-        The text has another form, or the range goes beyond the scans.
-    """
+    """Read A:B or A, within the scans of the source ``name``."""
     first, colon, last = value.partition(":")
     try:
         start = int(first) if first or not colon else 0

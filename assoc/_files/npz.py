@@ -32,19 +32,10 @@ _TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_
 
 
 class Field(NamedTuple):
-    """The expected type of an array in an npz file.
-
-    Parameters
-    ----------
-    kind : {"float", "int", "str", "bool"}
-        "float" also takes integers; the array is returned as float64, int64, str or bool.
-    ndim : int
-        Number of dimensions.
-    required : bool
-        Whether a file without it is refused.
-    """
+    """The expected type of an array in an npz file."""
 
     kind: str
+    """"float" (takes integers, too), "int", "str" or "bool": what the array is returned as."""
     ndim: int
     required: bool = True
 
@@ -78,29 +69,11 @@ def save_npz(
 def load_npz(
     path: str | os.PathLike[str], format_name: str, version: int, fields: Mapping[str, Field]
 ) -> dict[str, Array]:
-    """Read an npz file written by `save_npz`; any other file is refused with one line.
+    """Read an npz file written by `save_npz`; any other file is refused with one line that begins with the path.
 
     Nothing in the file is executed (no pickles). No memory is allocated for an array before its header is checked
-    against the size of the data in the file.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    format_name, version : str, int
-        Expected values of its fields "format" and "version"; older versions are read, later ones refused.
-    fields : mapping of str to Field
-        The arrays to read; others are ignored.
-
-    Returns
-    -------
-    dict of str to ndarray
-        The arrays, contiguous, without optional ones that are missing from the file.
-
-    Raises
-    ------
-    InvalidInputError
-        Not a readable file of this format; the message begins with the path.
+    against the size of the data in the file. Older versions are read, later ones refused; arrays that are not in
+    `fields` are ignored, and optional ones that are missing are missing in the result.
     """
     file = Path(path)
     try:

@@ -22,19 +22,7 @@ STDOUT = "-"
 
 
 def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) -> None:
-    """Refuse, before the work starts, a path where no file can be written.
-
-    Parameters
-    ----------
-    path : path-like
-    folder_to_come : path-like, optional
-        A folder that need not exist yet.
-
-    Raises
-    ------
-    InvalidInputError
-        The path is a folder or a disk, or lies in a folder that is missing or not writable.
-    """
+    """Refuse, before the work starts, a path where no file can be written; `folder_to_come` need not exist yet."""
     if path == STDOUT:
         return
     try:
@@ -74,19 +62,9 @@ def is_stream(path: FilePath) -> bool:
 def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> None:
     """Write a file so that readers see the old content or all of the new, never a part.
 
-    A pipe or device is written to directly, in one piece. A symbolic link stays, and its target is replaced.
-
-    Parameters
-    ----------
-    path : path-like
-        Where the file goes.
-    writer : callable
-        Called with a binary file object, to which it writes the content. If it raises, nothing is left behind.
-
-    Raises
-    ------
-    InvalidInputError
-        The path is a folder, its folder does not exist, or it cannot be written.
+    A pipe or device is written to directly, in one piece. A symbolic link stays, and its target is replaced. `writer`
+    writes to a binary file object; if it raises, nothing is left behind. A path that cannot be written raises
+    InvalidInputError.
     """
     check_writable(path)
     number = 1 if path == STDOUT else _standard_stream(path)
@@ -101,12 +79,7 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
 def written_gradually(path: FilePath) -> Iterator[IO[bytes]]:
     """A binary file to write to bit by bit: it takes its name at the end, and after an error nothing is left behind.
 
-    A pipe or device gets the content at once.
-
-    Raises
-    ------
-    InvalidInputError
-        As by `write_atomically`.
+    A pipe or device gets the content at once. Errors are those of `write_atomically`.
     """
     check_writable(path)
     number = 1 if path == STDOUT else _standard_stream(path)

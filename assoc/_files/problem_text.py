@@ -25,17 +25,7 @@ _MOST_INDEX = 2**31
 def write_problem_text(
     path: FilePath, tuples: NDArray[np.int32], costs: NDArray[np.float64], sizes: NDArray[np.int32], dummy: bool
 ) -> None:
-    """Write a problem, completely or not at all.
-
-    Parameters
-    ----------
-    path : path-like
-    tuples : int array, shape (M, S)
-    costs : float array, shape (M,)
-        Written as the shortest decimals that read back as the same numbers.
-    sizes : int array, shape (S,)
-    dummy : bool
-    """
+    """Write a problem, completely or not at all; costs are the shortest decimals that read back as the same numbers."""
     lines = [FIRST_LINE, "sizes " + " ".join(map(str, sizes.tolist())), f"dummies {'yes' if dummy else 'no'}"]
     lines.append(f"tuples {len(costs)}")
     lines += [f"{cost!r} {' '.join(map(str, row))}" for cost, row in zip(costs.tolist(), tuples.tolist(), strict=True)]
@@ -51,13 +41,7 @@ def is_text(path: FilePath) -> bool:
 
 
 def read_problem_text(path: FilePath) -> dict[str, Any]:
-    """Read a problem as text: tuples, costs, sizes, dummy.
-
-    Raises
-    ------
-    InvalidInputError
-        The file is damaged or of another format.
-    """
+    """Read a problem as text: tuples, costs, sizes, dummy."""
     every = read_lines(path, _LONGEST_LINE, _LARGEST)
     rows = (line for line in every if line.strip() and not line.startswith("#"))
     lines = list(islice(rows, 4))

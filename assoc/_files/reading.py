@@ -111,10 +111,7 @@ class _Counted(io.RawIOBase):
 def open_input(path: FilePath, most: int = MOST_BYTES) -> IO[bytes]:
     """Open a file; names that end in .xz, .gz, .bz2 or .zip are decompressed.
 
-    Raises
-    ------
-    InvalidInputError
-        It cannot be read, or it turns out larger than ``most`` or than compressed files may be.
+    InvalidInputError, now or while it is read, if it is larger than ``most`` or than compressed files may be.
     """
     return io.BufferedReader(_Counted(path, most), 1 << 16)
 
@@ -128,13 +125,7 @@ def read_bytes(path: FilePath, most: int = MOST_BYTES) -> bytes:
 def read_lines(
     path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYTES, *, fallback: str = ""
 ) -> Iterator[str]:
-    """Yield the lines of a text file (UTF-8; or of the encoding ``fallback``) one by one.
-
-    Raises
-    ------
-    InvalidInputError
-        As `open_input`; or a line is longer than ``longest`` bytes, or is not text.
-    """
+    """Yield the lines of a text file (UTF-8, or the encoding ``fallback``), each at most ``longest`` bytes."""
     with open_input(path, most) as file:
         number = 0
         while line := file.readline(longest + 1):
@@ -153,13 +144,7 @@ def read_lines(
 
 
 def check_regular(path: FilePath) -> None:
-    """Refuse a link, pipe, device or folder that others may have put in the place of a file.
-
-    Raises
-    ------
-    InvalidInputError
-        The path exists and is not a regular file.
-    """
+    """Refuse a link, pipe, device or folder that others may have put in the place of a file."""
     with suppress(FileNotFoundError):
         if not stat.S_ISREG(os.lstat(path).st_mode):
             raise InvalidInputError(f"{path}: is a link, a pipe or a folder, expected a file")
@@ -168,18 +153,8 @@ def check_regular(path: FilePath) -> None:
 def open_regular(path: FilePath, mode: str = "rb") -> IO[bytes]:
     """Open a file in a folder that others may write to: follows no link, and waits for no pipe or device.
 
-    Parameters
-    ----------
-    path : path-like
-    mode : {"rb", "ab"}
-        "ab" is not buffered, and creates the file.
-
-    Raises
-    ------
-    InvalidInputError
-        It is not a regular file.
-    OSError
-        As `open`.
+    Mode "ab" is not buffered, and creates the file. Raises OSError as `open` does, InvalidInputError for what is no
+    file.
     """
 
     def opener(name: str, flags: int) -> int:

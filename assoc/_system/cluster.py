@@ -20,13 +20,7 @@ class LostError(InvalidInputError):
 
 
 def connect(address: str, timeout: float = 10.0) -> Any:
-    """Connect to a scheduler.
-
-    Raises
-    ------
-    InvalidInputError
-        dask is not installed, or nothing answers at the address within ``timeout`` seconds.
-    """
+    """Connect to a scheduler, which must answer within ``timeout`` seconds."""
     try:
         from distributed import Client
     except ImportError:
@@ -137,22 +131,10 @@ def _call(task: Callable[[Any], Any], item: tuple[int, Any]) -> tuple[int, Any]:
 
 
 def dask_map(task: Callable[[Any], Any], items: Iterable[Any], address: str, *, ordered: bool = True) -> Generator[Any]:
-    """Yield ``task(item)`` for each item, from the workers of the scheduler at ``address``.
+    """Yield ``task(item)`` for each item, from the workers of the scheduler at ``address``; see `engine.spread`.
 
     The task is sent to every worker once. Workers may come and go: the items of a lost worker are repeated by another.
-
-    Parameters
-    ----------
-    task, items, ordered
-        As for `assoc._system.engine.spread`.
-    address : str
-
-    Raises
-    ------
-    InvalidInputError
-        See `connect`; or a worker cannot do the work.
-    LostError
-        The connection is lost, or workers were lost in several attempts at an item.
+    `LostError` if the connection is lost, or workers in several attempts at an item.
     """
     client = connect(address)
     arrived: dict[int, Any] = {}

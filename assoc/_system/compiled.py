@@ -96,22 +96,11 @@ _kept: set[Any] = set()
 
 
 def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> bool:
-    """Let another process call ``prepare``, if the disk holds no compiled code of a kernel.
+    """Let another process call ``prepare``, if the disk holds no compiled code of a kernel; return whether it does.
 
-    On two cores this halves the wait at the first hard problem after an installation.
-
-    Parameters
-    ----------
-    kernel : Dispatcher
-    prepare : callable
-        A function at the top level of a module, which calls the kernel.
-    anyway : bool
-        Also where this thread interprets nothing, so that all it needs must be compiled.
-
-    Returns
-    -------
-    bool
-        Whether another process was started.
+    On two cores this halves the wait at the first hard problem after an installation. ``prepare`` is a function at the
+    top level of a module, which calls the kernel. ``anyway``: also where this thread interprets nothing, so that all it
+    needs must be compiled.
     """
     if _under_way or kernel in _kept or not (anyway or may_use_processes()):
         return False

@@ -46,20 +46,7 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
 
 
 def check_extra(package: str, extra: str) -> None:
-    """Raise at once, without importing anything, if an optional package is missing.
-
-    Parameters
-    ----------
-    package : str
-        Name of the top-level package.
-    extra : str
-        The extra of assoc that installs it.
-
-    Raises
-    ------
-    MissingExtraError
-        An ImportError; its message names the command.
-    """
+    """Raise `MissingExtraError`, without importing anything, if a package that an extra installs is missing."""
     try:
         found = find_spec(package) is not None
     except (ImportError, ValueError):  # ValueError: sys.modules holds None

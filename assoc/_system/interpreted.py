@@ -69,22 +69,10 @@ thread = _Thread()
 def first_small(
     kernel: Any, compiled: Callable[..., Any], small: int, stand_in: Callable[..., Any] | None
 ) -> Callable[..., Any]:
-    """Return the function that handles arguments of new types: it loads, interprets or compiles.
+    """Return the function, for ``kernel._compile_for_args``, that handles new types: it loads, interprets or compiles.
 
-    Parameters
-    ----------
-    kernel : Dispatcher
-    compiled : callable
-        Loads or compiles the kernel; returns None where it is to be interpreted.
-    small : int
-        Elements of the arguments up to which a call may be interpreted.
-    stand_in : callable, optional
-        Called instead of the Python function where that cannot be interpreted.
-
-    Returns
-    -------
-    callable
-        For ``kernel._compile_for_args``; returns the function to call with the same arguments.
+    ``compiled`` loads or compiles the kernel, or returns None where it is to be interpreted. A call may be interpreted
+    whose arguments have at most ``small`` elements; by ``stand_in``, if the Python function itself cannot be.
     """
     function = stand_in or kernel.py_func
     spent = 0.0

@@ -23,23 +23,10 @@ _SHARE = 0.9
 
 
 def require(needed: float, what: str, advice: str, *, here: bool = True) -> None:
-    """Refuse work that would take more memory than there is.
+    """Refuse work that would take more memory, ``needed`` bytes at the peak, than there is: LimitExceededError.
 
-    Parameters
-    ----------
-    needed : float
-        Bytes at the peak.
-    what : str
-        What the memory is for, naming the argument that causes it; the message begins with it.
-    advice : str
-        What to change.
-    here : bool
-        Whether this process takes the memory, so that the limit of its address space applies.
-
-    Raises
-    ------
-    LimitExceededError
-        Less is available.
+    The message begins with ``what`` the memory is for, which names the argument that causes it, and ends with
+    ``advice``. ``here``: this process takes the memory, so that the limit of its address space applies.
     """
     if needed <= _SMALL:
         return

@@ -67,15 +67,9 @@ def make(
 ) -> Any:
     """Make a kernel, with a cache where there is a folder for one.
 
-    Parameters
-    ----------
-    function : callable
-    may_wait : callable
-        Returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
-    inner : bool
-        Whether only kernels call it.
-    literal : bool
-        Whether calls from kernels compile it anew for each literal number and each width of whole numbers.
+    ``may_wait`` returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
+    ``inner``: only kernels call it. ``literal``: calls from kernels compile it anew for each literal number and each
+    width of whole numbers.
     """
     chosen = _INNER_OPTIONS if inner else _OPTIONS
     pipeline = _InnerCompiler if inner else _COMPILER.Compiler

@@ -19,20 +19,9 @@ _SECONDS = 10.0
 def bound_without_gates(scene: Scene, scan: Scan, gating: Mapping[str, Any], time_limit: float | None) -> float:
     """Lower bound of the cost of an association of any tuples of negative cost, gated or not.
 
-    The cost of an association above it bounds the loss by gating (``ScanAssociation.gate_loss``).
-
-    Parameters
-    ----------
-    scene, scan
-    gating : mapping
-        Options of `assoc.build_problem`, of which ``gate_probability`` has no effect.
-    time_limit : float, optional
-        Seconds for the bound; 10 without one. It is valid after any time, and better after a longer one.
-
-    Returns
-    -------
-    float
-        In the unit of costs; -infinite if there are more tuples than ``max_tuples`` without gates.
+    The cost of an association above it bounds the loss by gating (``ScanAssociation.gate_loss``). It is valid after any
+    time, and better after a longer one (10 s without ``time_limit``); -infinite if there are more tuples than
+    ``max_tuples`` without gates. ``gating`` is as for `assoc.build_problem`; its ``gate_probability`` has no effect.
     """
     try:
         everything = build_problem(scene, scan, **{**gating, "gate_probability": 1.0})

@@ -43,28 +43,7 @@ _NODES = 30
 
 @dataclass(frozen=True)
 class Plan:
-    """How to associate scans; one plan serves all processes.
-
-    Attributes
-    ----------
-    sources : sequence of Scene or AssignmentProblem
-    solver, seed, time_limit, parameters
-        As in ``associate``.
-    gating : mapping
-        Options of ``assoc.build_problem``.
-    kbest : int, optional
-        Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
-    pheromone : bool
-        Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
-    watch : callable, optional
-        Called with the number of a scan and each TracePoint of its solver, in this process only.
-    gate_loss : bool
-        Whether to bound the loss by gating for each scan of a scene.
-    tiles : int
-        Above 1: build and solve each scan of a scene in so many tiles of space; see `assoc.association.tiles`.
-    marginals : bool
-        Whether to compute the probability of each target.
-    """
+    """How to associate scans, by the options of ``associate``; one plan serves all processes."""
 
     sources: Sequence[Source]
     solver: str
@@ -72,11 +51,16 @@ class Plan:
     time_limit: float | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     gating: Mapping[str, Any] = field(default_factory=dict)
+    """Options of ``assoc.build_problem``."""
     kbest: int | None = None
+    """Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver."""
     pheromone: bool = False
+    """Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it."""
     watch: Callable[[int, TracePoint], object] | None = None
+    """Called with the number of a scan and each TracePoint of its solver, in this process only."""
     gate_loss: bool = False
     tiles: int = 0
+    """Above 1: build and solve each scan of a scene in so many tiles of space; see `assoc.association.tiles`."""
     marginals: bool = False
 
     def __post_init__(self) -> None:

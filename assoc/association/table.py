@@ -28,20 +28,11 @@ def rows(
     truth: bool | None = None,
     brief: bool = False,
 ) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells for people.
+    """Headers and cells for people; ``brief``, for a terminal, leaves out folders and bounds, and gaps that are closed.
 
-    Parameters
-    ----------
-    scans : sequence of ScanAssociation
-    files : sequence of str
-        The file of each scan, also of those before and after these; shown only if there are several.
-    first : int, default 0
-        Which of the files is that of the first scan.
-    truth : bool, optional
-        Whether there is a column of correct tuples; by default if the truth of one of the scans is known.
-    brief : bool, default False
-        For a terminal: leave out the folders of files and the lower bound, and say the gap only of scans that are
-        not certified optimal, in place of their status.
+    ``files`` are those of all scans, of which the first here has the number ``first``; they are shown if there are
+    several. There is a column of correct tuples if ``truth`` says so, or without it if the truth of one of the scans is
+    known.
     """
     if brief:
         files = _short_names(files)

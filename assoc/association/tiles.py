@@ -111,17 +111,9 @@ def solve_in_tiles(
 ) -> tuple[Solution, Array, Array]:
     """Associate a scan in about so many tiles, as an `assoc.association.plan.Plan` says.
 
-    Returns
-    -------
-    Solution
-        Its cost and bound are those of the whole scan; its `indices` are empty, since the problem is nowhere in one
-        piece.
-    targets, costs : arrays (K, S), (K,)
-
-    Raises
-    ------
-    InvalidInputError
-        Measurements have times of their own, or the gates have no reach: probability 1, density "auto", all tuples.
+    Returns the solution, whose cost and bound are those of the whole scan and whose `indices` are empty, since the
+    problem is nowhere in one piece; targets (K, S) and costs (K,). Refused are measurements with times of their own,
+    and gates without a reach: probability 1, density "auto", all tuples.
     """
     gating = plan.gating
     probability = gating.get("gate_probability", GATE_PROBABILITY)

@@ -147,18 +147,13 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
 
 @njit
 def convert(sensors: SensorArrays, z: Array, owner: Array, reach: float, least: float) -> tuple[Array, Array, Array]:
-    """Convert measurements (N, 3) to positions.
+    """Convert measurements (N, 3) to positions (N, 3), their spread (N, 6) for the gate and information (N, 6).
 
-    The covariance is the linearised one, widened where the measurement bends so much that its ellipsoid of
-    chi-square value `least` would not hold all positions within `reach`, the largest gate: by the sagitta of
-    the arc for radars, and by the ground ranges of all heights sought where the height is open.
-
-    Returns
-    -------
-    centre (N, 3), spread (N, 6), information (N, 6)
-        Position, covariance as (xx, xy, xz, yy, yz, zz) for the gate, and the inverse covariance for a start,
-        which does not depend on the gate. Zeros for bearings, and of x and y alone for measurements that
-        leave the height open.
+    The spread is the linearised covariance (xx, xy, xz, yy, yz, zz), widened where the measurement bends so much that
+    its ellipsoid of chi-square value `least` would not hold all positions within `reach`, the largest gate: by the
+    sagitta of the arc for radars, and by the ground ranges of all heights sought where the height is open. The
+    information is the inverse covariance for a start, which does not depend on the gate. Zeros for bearings, and of x
+    and y alone for measurements that leave the height open.
     """
     # out of the record first: a field read in the loop costs a reference count each time
     code, dim, position, covariance = sensors.code, sensors.dim, sensors.position, sensors.covariance

@@ -231,19 +231,11 @@ def _locate(members: Array, middle: Three, half: Three) -> tuple[float, float, f
 
 @njit
 def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> tuple[Array, Array, Array]:
-    """Fit a position to each tuple.
+    """Fit a position to each tuple: chi-square (K,), positions (K, 3), covariances (K, 3, 3).
 
-    Parameters
-    ----------
-    rows : int32 (K, S)
-        Measurement (row of `scan`) of each sensor, or -1.
-    gating : bool
-        If true, positions and covariances come back empty, and chi-square is infinite where the height lies
-        beyond those sought (`assoc.costs.arrays.HEIGHTS`) and no sensor measures full positions.
-
-    Returns
-    -------
-    chi-square (K,), position (K, 3), covariance (K, 3, 3)
+    `rows`, int32 (K, S), are the measurement (row of `scan`) of each sensor, or -1. If `gating`, positions and
+    covariances come back empty, and chi-square is infinite where the height lies beyond those sought
+    (`assoc.costs.arrays.HEIGHTS`) and no sensor measures full positions.
     """
     total = len(rows)
     kept = 0 if gating else total

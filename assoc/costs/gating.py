@@ -40,18 +40,10 @@ def chi_square_quantiles(probability: float, largest: int) -> Array:
 
 
 def degrees_of_freedom(sensors: SensorArrays, detected: Array) -> Array:
-    """Degrees of freedom of the residuals of tuples.
+    """Degrees of freedom (K,) of the residuals of tuples, of the sensors that `detected`, bool (K, S), a target.
 
-    Components measured, less the coordinates found from them: three if a sensor of the tuple measures full
-    positions, else two (a height found from slant ranges alone is not counted, which widens the gate).
-
-    Parameters
-    ----------
-    detected : bool ndarray (K, S)
-
-    Returns
-    -------
-    int ndarray (K,)
+    Components measured, less the coordinates found from them: three if a sensor of the tuple measures full positions,
+    else two (a height found from slant ranges alone is not counted, which widens the gate).
     """
     coordinates = np.where(detected[:, sensors.full].any(axis=1), 3, 2)
     # whole numbers all the same: the product is quick for floats alone

@@ -29,11 +29,8 @@ def _extend(
 ) -> tuple[Array, Array, int]:
     """Grow each tuple by each measurement of sensor t that pairs with all its members.
 
-    With `middle` and `half` only azimuths in that interval are taken. Stops once `limit` are exceeded.
-
-    Returns
-    -------
-    parent (K,), measurement (K,) and the number of rows that were grown
+    With `middle` and `half` only azimuths in that interval are taken. Stops once `limit` are exceeded. Returns parents
+    (K,), measurements (K,) and the number of rows that were grown.
     """
     parent, added = np.empty(1024, np.int64), np.empty(1024, np.int32)
     count = 0
@@ -104,25 +101,14 @@ def grow(
     number: int,
     max_tuples: int,
 ) -> tuple[Array, Array]:
-    """Candidate tuples of two or more measurements.
+    """Candidate tuples of two or more measurements: the row of `scan` for each sensor, or -1, (K, S), and costs (K,).
 
-    A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint
-    gate of its degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms.
-    Range rates and the prior of positions have no part in the gates; their price is part of the cost.
-    On the way, a tuple is given up only if no tuple that contains it can be a candidate: chi-square values
-    only grow with a tuple, so one above the largest gate ahead, or above all that further detections can take
-    off the cost, is of no use.
-
-    Returns
-    -------
-    rows (K, S) : int32
-        Row of `scan` for each sensor, or -1.
-    costs (K,)
-
-    Raises
-    ------
-    LimitExceededError
-        More than `max_tuples` tuples; `number` is the scan to name.
+    A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint gate of its
+    degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms. Range rates and the
+    prior of positions have no part in the gates; their price is part of the cost. On the way, a tuple is given up only
+    if no tuple that contains it can be a candidate: chi-square values only grow with a tuple, so one above the largest
+    gate ahead, or above all that further detections can take off the cost, is of no use. LimitExceededError, naming the
+    scan `number`, for more than `max_tuples`.
     """
     count = len(sensors.dim)
     second_owner = scan.owner[pairs.second]

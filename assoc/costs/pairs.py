@@ -309,10 +309,7 @@ def _strips(sensors: SensorArrays, scan: ScanArrays, rows: Array, others: Array,
 def compatible_pairs(sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int) -> Pairs:
     """All pairs of measurements of different sensors that pass the pair gate.
 
-    Raises
-    ------
-    LimitExceededError
-        More than `max_tuples` pairs pass; `number` is the scan to name.
+    LimitExceededError, naming the scan `number`, if more than `max_tuples` pass.
     """
     count = len(sensors.dim)
     kept, values, so_far = [np.empty((0, 2), np.int32)], [np.empty(0)], 0

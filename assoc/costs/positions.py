@@ -46,21 +46,7 @@ def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> 
 
 
 def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array, Array]:
-    """`positions_and_covariances` of measurements of one sensor, each by itself.
-
-    Parameters
-    ----------
-    scene : Scene
-        Sensors and region.
-    sensor : int
-        Number of the sensor, from 0.
-    measured : array (n, d)
-        Its measurements; finite, of its dimension.
-
-    Returns
-    -------
-    positions (n, 3), covariances (n, 3, 3)
-    """
+    """`positions_and_covariances` of checked measurements (n, d) of one sensor, by its number, each by itself."""
     sensors = sensor_arrays(scene)
     if sensors.code[sensor] == POSITION:
         # the covariance of a position sensor does not depend on the position
@@ -123,13 +109,7 @@ def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, A
 
 
 def checked_tuples(tuples: Array, sizes: Array) -> Array:
-    """Tuples (K, S) of 1-based measurements of a scan with so many of each sensor (S,), 0 where one missed.
-
-    Raises
-    ------
-    InvalidInputError
-        The shape is another, an index is out of range, or a tuple has no measurement.
-    """
+    """Tuples (K, S) of 1-based measurements of a scan with so many of each sensor (S,), 0 where one missed; checked."""
     count, wanted = len(sizes), np.asarray(tuples)
     if wanted.size == 0:
         wanted = np.zeros((0, count), dtype=np.int64)

@@ -90,12 +90,8 @@ def prices(
 ) -> Array:
     """Twice the prices of tuples, (K,); 0 or more, and it hardly ever falls when a tuple grows.
 
-    Parameters
-    ----------
-    rows : int32 (K, S)
-        Row of `scan` for each sensor, or -1.
-    rates, prior
-        None: no such price.
+    `rows`, int32 (K, S), are the row of `scan` for each sensor, or -1. Without `rates` or `prior` there is no such
+    price.
     """
     _, positions, covariances = fit(sensors, scan, rows, False)
     total = np.zeros(len(rows))

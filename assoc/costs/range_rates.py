@@ -80,12 +80,7 @@ def range_rates(scene: Scene, scan: Scan, speed: float | Sequence[float]) -> Ran
 def prices(sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Array, positions: Array) -> Array:
     """The price q of the range rates of tuples, (K,), twice what it adds to a cost, by a Kalman filter.
 
-    Parameters
-    ----------
-    rows : int32 (K, S)
-        Row of `scan` for each sensor, or -1.
-    positions : (K, 3)
-        Of the tuples.
+    `rows`, int32 (K, S), are the row of `scan` for each sensor, or -1, `positions` (K, 3) those of the tuples.
     """
     result = np.zeros(len(rows))
     P, v, k, u = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)

@@ -31,23 +31,11 @@ _TRIED = (9, 9, 5)
 
 
 def share_in_view(sensor: Sensor, positions: Array, covariances: Array | None, sector: Array | None = None) -> Array:
-    """Probability that targets lie where a sensor looks.
+    """Probability (B,) that targets lie in a sensor's view; 0 or 1 where it is within 1e-6 of either.
 
     Each component of a measurement is taken as Gaussian, with the sensor's derivatives at the mean, and as independent
-    of the others.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    positions, covariances : arrays (B, 3), (B, 3, 3)
-        Of the targets, metres; without covariances the positions are exact.
-    sector : array (2,), optional
-        First and last azimuth of this look; see `assoc.Scene`.
-
-    Returns
-    -------
-    array (B,)
-        0 or 1 where it is within 1e-6 of either.
+    of the others. Positions (B, 3), metres, are exact without covariances (B, 3, 3). `sector` (2,), of a scan: its
+    first and last azimuth; see `assoc.Scene`.
     """
     share = np.ones(len(positions))
     if sector is not None and not sector[1] > sector[0]:
@@ -88,13 +76,8 @@ def _within(mean: Array, spread: Array, limits: tuple[float, float], angular: bo
 class Views:
     """The views of S sensors, for targets of a filter's states; one kernel for all of them.
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-    axes : sequence of int
-        Components of a state that are the position.
-    by_range : array (S, BANDS), optional
-        See `assoc.costs.tracks.scores.ScoreTerms`.
+    `axes` are the components of a state that are the position; `by_range` (S, BANDS): see
+    `assoc.costs.tracks.scores.ScoreTerms`.
     """
 
     def __init__(self, sensors: Sequence[Sensor], axes: Sequence[int], by_range: Array | None = None) -> None:
@@ -149,17 +132,10 @@ def _bounds(sensor: Sensor) -> Array:
 
 @njit
 def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axes: Array, soft: bool) -> Array:
-    """`share_in_view` of B mixtures of m Gaussians, or of their means alone; (B, S).
+    """`share_in_view` of B mixtures of m Gaussians, or (not `soft`) of their means alone; (B, S).
 
-    Parameters
-    ----------
-    bounds : array (S, 15 + BANDS)
-        See `_bounds`; then reach and relative detection probability in each band.
-    weights, means, covariances : arrays (B, m), (B, m, n), (B, m, n, n)
-    axes : int64 array
-        Components that are the position.
-    soft : bool
-        Whether the covariances count.
+    `bounds` (S, 15 + BANDS): see `_bounds`; then reach and relative detection probability in each band. Mixtures are
+    weights (B, m), means (B, m, n), covariances (B, m, n, n); `axes`: components that are the position.
     """
     B, m = weights.shape
     S, d = bounds.shape[0], axes.size

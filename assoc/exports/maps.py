@@ -40,12 +40,7 @@ def coordinates(positions: Array, origin: Origin) -> Array:
 def followed_targets(times: Array, ids: Array, positions: Array, scene: Scene) -> dict[int, str]:
     """Name of the true target that each track followed most; tracks that followed none are left out.
 
-    Parameters
-    ----------
-    times, ids, positions
-        Rows of tracks (`TrackTable.arrays`).
-    scene : Scene
-        Must have the truth.
+    `times`, `ids` and `positions` are rows of tracks (`TrackTable.arrays`); the scene must have the truth.
     """
     if scene.truth is None:
         return {}

@@ -321,21 +321,7 @@ def check_dimension(state: Gaussian, dim: int) -> Gaussian:
 
 
 def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
-    """Predict each target by its time step.
-
-    Parameters
-    ----------
-    filter : Filter
-    state
-        B targets.
-    dt : array (B,)
-        Seconds, 0 or more.
-
-    Raises
-    ------
-    InvalidInputError
-        A time step is negative.
-    """
+    """Predict each of B targets by its time step (B,), seconds, 0 or more."""
     if not len(dt):
         return state
     low, high = float(dt.min()), float(dt.max())

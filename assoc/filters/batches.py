@@ -67,12 +67,9 @@ class Batch:
 
 
 def concatenate(states: Sequence[Any]) -> Any:
-    """Return one batch with the targets of several.
+    """Return one batch with the targets of several of one filter, at least one.
 
-    Parameters
-    ----------
-    states : sequence of states of one filter
-        At least one. Histories that some do not have yet are filled with zeros.
+    Histories that some do not have yet are filled with zeros.
     """
     present = [state for state in states if len(state)] or list(states[:1])
     if len(present) == 1:

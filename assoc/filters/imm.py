@@ -60,16 +60,7 @@ _MOST_STEPS = 64
 def transition_rates(transition: Array, interval: float) -> Array:
     """Rates per second of the continuous-time Markov chain with these probabilities over `interval` seconds.
 
-    Parameters
-    ----------
-    transition : array (m, m)
-        Rows of probabilities.
-    interval : float
-
-    Raises
-    ------
-    InvalidInputError
-        No chain in continuous time has these probabilities.
+    InvalidInputError where no chain in continuous time has them.
     """
     # away from a negative or zero eigenvalue the logarithm is real
     values = np.linalg.eigvals(transition)

@@ -13,33 +13,11 @@ from assoc.filters.state import Gaussian, gaussian
 
 
 def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
-    """Match the moments of weighted mixtures.
+    """Match the moments of weighted mixtures: K Gaussians or Mixtures become one for each of B targets.
 
-    Mixtures of models stay such: each model is merged by itself.
+    Mixtures of models stay such: each model is merged by itself. Every target has at least one state; `target` (K,) is
+    that of each, from 0, and the weights (K,) of one target sum to 1. States of another kind are refused.
 
-    Parameters
-    ----------
-    states : Gaussian or Mixture
-        K of them.
-    target : int array (K,)
-        Target of each state, from 0; every target has at least one.
-    weights : array (K,)
-        0 or more; those of one target sum to 1.
-    count : int
-        Number of targets, B.
-
-    Returns
-    -------
-    Gaussian or Mixture
-        B of them.
-
-    Raises
-    ------
-    InvalidInputError
-        States of another kind.
-
-    References
-    ----------
     Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 1.4.16.
     """
     if not isinstance(states, (Gaussian, Mixture)):

@@ -100,13 +100,7 @@ class Trajectories(Shown):
 
 
 def columns_of_rows(**columns: Array) -> list[Array]:
-    """Columns as arrays of one shape (n,).
-
-    Raises
-    ------
-    InvalidInputError
-        Their shapes differ.
-    """
+    """Columns as arrays of one shape (n,); refused where their shapes differ."""
     arrays = [np.asarray(column) for column in columns.values()]
     if arrays[0].ndim != 1 or any(array.shape != arrays[0].shape for array in arrays):
         *names, last = columns
@@ -116,18 +110,9 @@ def columns_of_rows(**columns: Array) -> list[Array]:
 
 
 def last_at_each_instant(times: Array, ids: Array) -> Array:
-    """Rows that are the last of their identity at their instant, in the order given.
+    """Rows that are the last of their identity at their instant, ascending.
 
     Several scans may have the same time, as of sensors that report in turn: each lists targets and tracks again.
-
-    Parameters
-    ----------
-    times, ids : arrays (n,)
-
-    Returns
-    -------
-    int array
-        Row numbers, ascending.
     """
     ticks = np.round(np.asarray(times, dtype=np.float64) / SAME_TIME)
     order = np.lexsort((ids, ticks))
@@ -138,15 +123,7 @@ def last_at_each_instant(times: Array, ids: Array) -> Array:
 def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, Array, Array]]:
     """Each instant of the truth or the tracks, earliest first: its time and the rows of both, by their ids.
 
-    Parameters
-    ----------
-    truth, tracks : Trajectories
-        Of the same dimension (an empty one goes with any).
-
-    Yields
-    ------
-    time : float
-    truth_rows, track_rows : int arrays
+    Both have the same dimension (an empty one goes with any).
     """
     if len(truth) and len(tracks) and truth.dim != tracks.dim:
         raise InvalidInputError(f"positions: the truth has {truth.dim} dimensions, the tracks have {tracks.dim}")

@@ -20,24 +20,16 @@ _FAR, _SMALL = 2.0**12, 2.0**-10
 
 
 class Conditioned(NamedTuple):
-    """A replacement for another problem, with costs in a range that doubles can order.
-
-    Attributes
-    ----------
-    problem : AssignmentProblem
-        The same tuples at equal or lower costs, in another unit.
-    unit : float
-        The unit of its costs, a power of two.
-    lowered : bool array, shape (M,), or None
-        Tuples that cost less than in the other problem; None if the problem is unchanged.
-    known : float
-        Solutions that cost less than this, in the other problem's unit, have no lowered tuple.
-    """
+    """A replacement for another problem, with costs in a range that doubles can order."""
 
     problem: AssignmentProblem
+    """The same tuples at equal or lower costs, in another unit."""
     unit: float = 1.0
+    """The unit of its costs, a power of two."""
     lowered: NDArray[np.bool_] | None = None
+    """Tuples that cost less than in the other problem, (M,); None if the problem is unchanged."""
     known: float = math.inf
+    """Solutions that cost less than this, in the other problem's unit, have no lowered tuple."""
 
     def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
         """The solution as one of the other problem; its bounds are valid there, as no cost is lower there."""
@@ -68,24 +60,16 @@ class PreparedArrays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A problem in packing form, and the data to convert solutions back.
-
-    Attributes
-    ----------
-    packing : Packing
-        ``packing.origin`` are rows of ``problem.tuples``, ``packing.row_origin`` global row numbers.
-    offset : float
-        Cost of all measurements as false alarms, all singletons (0 without dummies).
-    single : int64 array
-        With dummies, the cheapest singleton tuple of each global row; empty without.
-    single_cost : float array
-        Its cost.
-    """
+    """A problem in packing form, and the data to convert solutions back."""
 
     packing: Packing
+    """``origin`` are rows of ``problem.tuples``, ``row_origin`` global row numbers."""
     offset: float
+    """Cost of all measurements as false alarms, all singletons (0 without dummies)."""
     single: NDArray[np.int64]
+    """With dummies, the cheapest singleton tuple of each global row; empty without."""
     single_cost: NDArray[np.float64]
+    """Its cost."""
 
     @property
     def arrays(self) -> PreparedArrays:

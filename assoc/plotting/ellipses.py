@@ -14,19 +14,9 @@ _CORNERS = 49
 
 
 def ellipses(centres: Array, covariances: Array, probability: float) -> tuple[Array, Array]:
-    """Ellipses that contain two-dimensional normal distributions with a probability, as one line with gaps.
+    """Ellipses that contain normal distributions with a probability, as one line x, y (n * 50,) with NaN between them.
 
-    Parameters
-    ----------
-    centres : ndarray (n, 2 or more)
-    covariances : ndarray (n, 2 or more, 2 or more)
-        x and y come first.
-    probability : float
-
-    Returns
-    -------
-    x, y : ndarray (n * 50,)
-        NaN between ellipses.
+    Of centres (n, 2 or more) and covariances (n, 2 or more, 2 or more) the first two count.
     """
     values, vectors = np.linalg.eigh(covariances[:, :2, :2])
     # the chi-square distribution of two degrees of freedom has a closed form

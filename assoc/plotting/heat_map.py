@@ -83,21 +83,10 @@ def plot_heat_map(
 def cells(
     study: pd.DataFrame, measure: str, across: str, up: str, *, intervals: bool = True
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Means and 95 % intervals of a measure over two parameters, in displayed units.
+    """Means and 95 % intervals of a measure over two parameters of one solver's runs, in displayed units.
 
-    Parameters
-    ----------
-    study : DataFrame
-        Runs of one solver.
-    measure, across, up : str
-    intervals : bool, default True
-        Whether to compute the intervals, which takes most of the time; otherwise they are NaN.
-
-    Returns
-    -------
-    xs, ys : arrays of the parameters' values
-    middle, low, high : float arrays (ys, xs)
-        NaN where there is no run.
+    Returns the parameters' values, and middle, low and high (ys, xs), NaN where there is no run. Intervals take most of
+    the time; without them they are NaN.
     """
     factor = FACTORS.get(measure, 1.0)
     xs, ys = (np.array(sorted(study[name].dropna().unique().tolist()), dtype=object) for name in (across, up))

@@ -13,13 +13,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
 
 
 def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
-    """The scan of a scene to which an association belongs.
-
-    Raises
-    ------
-    InvalidInputError
-        The scene has no such scan, or its measurements differ.
-    """
+    """The scan of a scene to which an association belongs; refused where there is none, or its measurements differ."""
     scan = scene.scan(association.scan)
     if tuple(scan.sizes) != tuple(association.sizes):
         had, has = list(map(int, association.sizes)), scan.sizes.tolist()
@@ -30,21 +24,9 @@ def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
 
 
 def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:
-    """Positions of measurements, given the coordinates that a sensor does not measure.
+    """Positions (n, 3), metres, of measurements (n, d), given the coordinates that a sensor does not measure.
 
-    Parameters
-    ----------
-    sensor : Sensor
-    measurements : ndarray (n, d)
-    heights : float or ndarray (n,)
-        Heights above the plane z = 0, for sensors that do not measure them, metres.
-    distances : float or ndarray (n,)
-        Ground distances, for sensors that measure only a bearing, metres.
-
-    Returns
-    -------
-    ndarray (n, 3)
-        Metres.
+    These are heights above the plane z = 0 and, for a bearing alone, ground distances; each a number or (n,), metres.
     """
     z = np.asarray(measurements, dtype=np.float64)
     height = np.broadcast_to(np.asarray(heights, dtype=np.float64), (len(z),))
@@ -65,16 +47,7 @@ def places(sensor: Sensor, measurements: Array, heights: Array | float, distance
 
 
 def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array:
-    """Distance at which a ray from the sensor leaves the region, metres (n,); 0 if they do not intersect.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    bearings : ndarray (n,)
-        Azimuths, rad.
-    region : ndarray (3, 2)
-        Bounds of x, y, z.
-    """
+    """Distance (n,), metres, at which rays of these azimuths leave the region (3, 2); 0 if they do not intersect."""
     direction = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (region[None, :2, :] - sensor.position[None, :2, None]) / direction[:, :, None]

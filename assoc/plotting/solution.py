@@ -107,15 +107,10 @@ def _bearings(ax: Any, site: Array, ends: Array, label: Array) -> None:
 
 
 def measured_places(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:
-    """Where to draw the measurements of an associated scan.
+    """Where to draw the measurements of each sensor in an associated scan, (n, 3), metres, and their targets (n,).
 
-    Coordinates that a sensor does not measure (height, distance along a bearing) are those of the associated target; a
-    false alarm of a bearing ends at the border of the region.
-
-    Returns
-    -------
-    list over sensors of (places (n, 3), labels (n,))
-        Metres; row in ``association.targets`` of each measurement, -1 for false alarms.
+    Coordinates that a sensor does not measure (height, distance along a bearing) are those of the associated target, a
+    row of ``association.targets``; a false alarm, -1, of a bearing ends at the border of the region.
     """
     scan = scene.scan(association.scan).aligned(scene.sensors)
     scene = scene.at(scan.time)

@@ -30,25 +30,10 @@ _MOST_CURVES = 8
 
 
 def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> list[Path]:
-    """Draw the heat maps and the convergence curves of a study into its folder.
+    """Draw the heat maps and the convergence curves of a study, or of the runs in `frame`, into its folder.
 
-    Parameters
-    ----------
-    folder : path-like
-    frame : DataFrame, optional
-        The runs to show; default: all.
-
-    Returns
-    -------
-    list of Path
-        ``heatmap.png`` (one for each solver, with its name, if there are several) and ``convergence.png``.
-
-    Raises
-    ------
-    MissingExtraError
-        matplotlib is not installed.
-    InvalidInputError
-        A file cannot be written, or the study has no runs.
+    The files are ``heatmap.png`` (one for each solver, with its name, if there are several) and ``convergence.png``. A
+    study without runs is refused.
     """
     frame = load(folder) if frame is None else frame
     if frame.empty:
@@ -66,13 +51,7 @@ def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None
 
 
 def new_figure() -> Any:
-    """Return an empty figure that needs no screen and no pyplot.
-
-    Raises
-    ------
-    MissingExtraError
-        matplotlib is not installed.
-    """
+    """Return an empty figure that needs no screen and no pyplot."""
     figure = load_extra("matplotlib.figure", "plot").Figure(layout="constrained")
     load_extra("matplotlib.backends.backend_agg", "plot").FigureCanvasAgg(figure)
     return figure
@@ -91,21 +70,9 @@ def save_png(path: Path, figure: Any) -> Path:
 
 
 def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
-    """Draw each measure over two parameters, side by side for the values of the others.
+    """Draw each measure over two parameters of one solver's runs, side by side for the values of the others.
 
-    With one parameter, or too many values for a map, the measures are drawn over each parameter.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        Runs of one solver.
-    figure : matplotlib.figure.Figure
-        Empty.
-
-    Returns
-    -------
-    Figure
-        The same.
+    With one parameter, or too many values for a map, the measures are drawn over each parameter. Returns the figure.
     """
     names = varied(frame)
     panels = [name for name in _PANELS if not np.isnan(measured(frame, name)).all()]
@@ -166,19 +133,7 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[str], figur
 def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     """Draw the mean cost above the best known, over iterations and over time, one curve for each setting.
 
-    The eight settings with the smallest mean gaps are named, the others are grey.
-
-    Parameters
-    ----------
-    frame, traces : DataFrame
-        From `load` and `load_traces`.
-    figure : matplotlib.figure.Figure
-        Empty.
-
-    Returns
-    -------
-    Figure
-        The same.
+    The eight settings with the smallest mean gaps are named, the others are grey. Returns the figure.
     """
     traces = with_excess(frame, traces)
     summary = summarize(frame).sort_values(["gap", "time"], kind="stable")

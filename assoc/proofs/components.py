@@ -22,27 +22,18 @@ _ONE = 10**check.DECIMALS
 
 
 class Parts(NamedTuple):
-    """A problem's columns as a packing, and the data to convert results back.
-
-    Attributes
-    ----------
-    packing : Packing
-        ``row_origin`` are global row numbers.
-    duals : float array, shape (R,)
-        Multipliers of the packing.
-    alone : float array
-        Cost of each global row as a false alarm (0 without dummies); multipliers are relative to these.
-    rows : list of (sensor, index)
-        Sensor and index of each global row.
-    unit : float
-        Costs of solutions are multiples of it.
-    """
+    """A problem's columns as a packing, and the data to convert results back."""
 
     packing: Packing
+    """``row_origin`` are global row numbers."""
     duals: Floats
+    """Multipliers of the packing, (R,)."""
     alone: Floats
+    """Cost of each global row as a false alarm (0 without dummies); multipliers are relative to these."""
     rows: list[check.Row]
+    """Sensor and index of each global row."""
     unit: float
+    """Costs of solutions are multiples of it."""
 
 
 def packing_of(columns: list[check.Column], exact: check.Problem, alone: Floats, granularity: float) -> Packing:

@@ -32,24 +32,15 @@ _DIGITS = (2, 4, 6, 9)
 
 @dataclass(slots=True)
 class Node:
-    """A node of the tree: a leaf, where ``pair`` is None.
-
-    Attributes
-    ----------
-    duals : float array, shape (rows and cuts,)
-        Multipliers; at a node with a pair they determine the dropped columns, and are empty if none are dropped.
-    bound : float
-        Lower bound of this node, which they prove.
-    pair : (int, int) or None
-        Two rows.
-    children : (int, int)
-        Indices of the nodes with the rows together and apart.
-    """
+    """A node of the tree: a leaf, where ``pair`` is None."""
 
     duals: Floats
+    """Of rows and cuts; at a node with a pair they determine the dropped columns; empty if none are dropped."""
     bound: float
+    """Lower bound of this node, which they prove."""
     pair: tuple[int, int] | None = None
     children: tuple[int, int] = (0, 0)
+    """Indices of the nodes with the rows together and apart."""
 
 
 @dataclass(slots=True)
@@ -67,24 +58,16 @@ class Tree:
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """The goal and the limits of a tree.
-
-    Attributes
-    ----------
-    target : float
-        Weight of the known solution.
-    enough : float
-        A node is closed when its bound reaches this.
-    nodes : int
-        Most nodes; open nodes then become leaves, with their bounds.
-    deadline : float
-        Time limit (clock.py).
-    """
+    """The goal and the limits of a tree."""
 
     target: float
+    """Weight of the known solution."""
     enough: float
+    """A node is closed when its bound reaches this."""
     nodes: int
+    """Most nodes; open nodes then become leaves, with their bounds."""
     deadline: float
+    """Time limit (clock.py)."""
 
 
 class _Open(NamedTuple):
@@ -97,17 +80,9 @@ class _Open(NamedTuple):
 
 
 def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> Tree:
-    """Return a tree that proves the best bound within the limits of its aim.
+    """Return a tree that proves the best bound within the limits of its aim, from multipliers (R,) to start with.
 
-    Parameters
-    ----------
-    component : Packing
-        One component.
-    duals : float array, shape (R,)
-        Multipliers to start from.
-    aim : Aim
-    base : float array, shape (R,)
-        Added to the multipliers when they are written, and before they are rounded.
+    ``base`` (R,) is added to the multipliers when they are written, and before they are rounded.
     """
     search = _Search(component, duals, aim, base)
     while search.waiting:

@@ -99,10 +99,7 @@ def write_proof(
 def exact_problem(problem: AssignmentProblem) -> check.Problem:
     """Return a problem as the checker reads it from text: each cost as its shortest decimal representation.
 
-    Raises
-    ------
-    InvalidInputError
-        A cost has more decimals than the checker reads.
+    A cost with more decimals than the checker reads is refused.
     """
     costs: dict[tuple[int, ...], int] = {}
     for indices, cost in zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True):

@@ -20,13 +20,7 @@ Origin = tuple[float, float, float]
 
 
 def checked_origin(origin: object) -> Origin:
-    """Return a latitude, a longitude and a height as three floats.
-
-    Raises
-    ------
-    InvalidInputError
-        They are not numbers, or not a position on the earth in radians and metres.
-    """
+    """Return a position on the earth, radians and metres, as three floats; anything else is refused."""
     lat, lon, height = finite_array(origin, "origin", (3,)).tolist()
     for name, value, most in (("latitude", lat, math.pi / 2), ("longitude", lon, 2 * math.pi)):
         if abs(value) > most * (1 + 1e-12):
@@ -52,19 +46,9 @@ def earth_centered(latitude: Array, longitude: Array, height: Array) -> Array:
 
 
 def east_north_up(latitude: Array, longitude: Array, height: Array, origin: Origin) -> Array:
-    """Coordinates in the tangent plane at an origin.
+    """Coordinates (n, 3), east, north and up in metres, in the plane that touches the ellipsoid at an origin.
 
-    Parameters
-    ----------
-    latitude, longitude, height : arrays (n,)
-        Geodetic, radians and metres above the ellipsoid.
-    origin : tuple of latitude, longitude, height
-        Where the plane touches.
-
-    Returns
-    -------
-    array (n, 3)
-        East (x), north (y), up (z) in metres.
+    Latitudes and longitudes (n,) are geodetic, radians; heights metres above the ellipsoid.
     """
     away = earth_centered(latitude, longitude, height) - _place(origin)
     result: Array = away @ _axes(origin).T
@@ -72,19 +56,9 @@ def east_north_up(latitude: Array, longitude: Array, height: Array, origin: Orig
 
 
 def geodetic(positions: Array, origin: Origin) -> Array:
-    """Latitude, longitude and height of positions in the tangent plane: the inverse of `east_north_up`.
+    """Latitude, longitude and height (n, 3) of positions (n, 3) in the tangent plane: the inverse of `east_north_up`.
 
-    Parameters
-    ----------
-    positions : array (n, 3)
-        East (x), north (y), up (z) in metres.
-    origin : tuple of latitude, longitude, height
-        Where the plane touches, radians and metres.
-
-    Returns
-    -------
-    array (n, 3)
-        Radians, radians in (-pi, pi], metres above the ellipsoid; exact to 1e-6 m from 100 km below it on.
+    Radians, radians in (-pi, pi], metres above the ellipsoid; exact to 1e-6 m from 100 km below it on.
     """
     x, y, z = (np.asarray(positions, dtype=np.float64).reshape(-1, 3) @ _axes(origin) + _place(origin)).T
     squared_eccentricity = FLATTENING * (2 - FLATTENING)

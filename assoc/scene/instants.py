@@ -13,13 +13,8 @@ from assoc.errors import InvalidInputError
 def as_seconds(times: Any, what: str) -> Any:
     """Turn dates into seconds since 1970-01-01 UTC, and durations into seconds; anything else is returned unchanged.
 
-    Taken are arrays of numpy's datetime64 and timedelta64, Python's datetimes and timedeltas, and what pandas makes
-    of them. A date without a time zone is one of UTC.
-
-    Raises
-    ------
-    InvalidInputError
-        A date is missing (NaT), or dates are mixed with numbers; the message names `what`.
+    Taken are arrays of numpy's datetime64 and timedelta64, Python's datetimes and timedeltas, and what pandas makes of
+    them. A date without a time zone is one of UTC. A missing date (NaT), or dates mixed with numbers, are refused.
     """
     array = np.asarray(times)
     if array.dtype == object and array.size:

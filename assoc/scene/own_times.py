@@ -18,21 +18,9 @@ _SLACK = 1e-9
 
 
 def checked_times(times: object, measurements: Sequence[Array], end: float, where: str) -> tuple[Array, ...]:
-    """Times of a scan's measurements, read-only arrays (n_s,), none of them after the time of the scan.
+    """Times of a scan's measurements, read-only arrays (n_s,), finite, and none of them after the time of the scan.
 
-    Parameters
-    ----------
-    times : sequence over sensors of array_like (n_s,)
-    measurements : sequence over sensors of arrays (n_s, d_s)
-    end : float
-        Time of the scan, seconds.
-    where : str
-        Beginning of messages.
-
-    Raises
-    ------
-    InvalidInputError
-        The shape is another, a time is not finite, or lies after `end`.
+    `where` is the beginning of messages.
     """
     count = len(measurements)
     known = isinstance(times, (list, tuple)) or (isinstance(times, np.ndarray) and times.ndim > 0)
@@ -50,13 +38,7 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
 
 
 def checked_sectors(sectors: object, sensors: int, where: str) -> Array:
-    """The sectors that sensors covered in a scan, read-only (S, 2).
-
-    Raises
-    ------
-    InvalidInputError
-        The shape is another, a number is not finite, or a sector is wider than a turn.
-    """
+    """The sectors that sensors covered in a scan, read-only (S, 2), finite, and none wider than a turn."""
     array = finite_array(sectors, where, (sensors, 2))
     width = array[:, 1] - array[:, 0]
     wrong = (width < 0) | (width > FULL_TURN * (1 + _SLACK))

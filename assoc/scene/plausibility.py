@@ -31,13 +31,7 @@ _WITHIN = 0.2
 
 
 def implausible(sensors: Sequence[Sensor], measurements: Sequence[Sequence[Array]]) -> tuple[str, ...]:
-    """Return one line for each sensor and component whose measurements do not fit the sensor's parameters.
-
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-    measurements : sequence over scans of sequences over sensors of arrays (n, d_s)
-    """
+    """Return one line for each sensor and component whose measurements do not fit the sensor's parameters."""
     found = []
     for s, sensor in enumerate(sensors):
         if not any(len(scan[s]) for scan in measurements):

@@ -12,16 +12,8 @@ from assoc._types import Array
 def dwells(times: Array, positions: Array, rotation: float) -> Array:
     """Times (L,), seconds, at which an antenna at the origin points at a moving aircraft.
 
-    The antenna points north at time 0 and turns clockwise.
-
-    Parameters
-    ----------
-    times : array (K,)
-        Seconds, ascending, in steps much shorter than a rotation.
-    positions : array (K, 3)
-        Where the aircraft is then, metres.
-    rotation : float
-        Seconds for a turn.
+    The antenna points north at time 0 and turns clockwise, in `rotation` seconds. Positions (K, 3), metres, are those
+    at the times (K,), seconds, ascending, in steps much shorter than a rotation.
     """
     bearing = np.unwrap(np.arctan2(positions[:, 0], positions[:, 1]))
     # turns that the antenna is ahead of the aircraft: a dwell is where this is a whole number

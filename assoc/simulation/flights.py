@@ -25,30 +25,15 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """An aircraft at constant speed.
-
-    Parameters
-    ----------
-    position : array (2,)
-        At time 0, metres.
-    heading : float
-        From +x towards +y, radians.
-    speed : float
-        m/s.
-    height : float
-        At time 0, metres.
-    climb : float
-        m/s, until `level` is reached.
-    level : float
-        Metres.
-    turns : sequence of Turn
-    """
+    """An aircraft at constant speed, m/s: at time 0 at `position` (2,) and `height`, metres."""
 
     position: Array
     heading: float
+    """From +x towards +y, radians."""
     speed: float
     height: float
     climb: float = 0.0
+    """m/s, until `level` (metres) is reached."""
     level: float = 0.0
     turns: Sequence[Turn] = ()
 

@@ -15,13 +15,7 @@ _STRANGE = 60.0
 def frame_velocities(reports: Reports, points: Array, origin: tuple[float, float, float]) -> Array:
     """Velocities in a scene's frame from those east, north and up at each target, (n, 3), m/s; NaN where not known.
 
-    Parameters
-    ----------
-    reports : Reports
-    positions : array (n, 3)
-        Where they are in the frame, metres.
-    origin : tuple of latitude, longitude, height
-        Where the frame's plane touches the ellipsoid.
+    `points` (n, 3), metres, are where the targets are in the frame, whose plane touches the ellipsoid at `origin`.
     """
     velocity = np.full((len(reports), 3), np.nan)
     known = ~np.isnan(reports.velocity).any(axis=1)
@@ -39,27 +33,13 @@ def frame_velocities(reports: Reports, points: Array, origin: tuple[float, float
 def resample(
     reports: Reports, points: Array, times: Array, max_gap: float, velocities: Array | None = None
 ) -> tuple[list[Array], list[Array]]:
-    """Positions of the targets at given times, on curves through neighbouring reports.
+    """Ids (T_k,) and positions (T_k, 3) of the targets at each of the times, on curves through neighbouring reports.
 
     Between two reports a target follows the cubic (Hermite) curve of their positions and velocities. A velocity that is
-    unknown, or does not fit the positions, is that of the parabola through the neighbouring reports; where these are
-    missing, or the curve would leave the straight line by more than a fourth of its length, the target flies straight.
-
-    Parameters
-    ----------
-    reports : Reports
-    positions : array (n, 3)
-        Where they are in the scene's frame, metres.
-    times : array (K,)
-        Seconds.
-    max_gap : float
-        Between reports further apart than this (s) a target is absent.
-    velocities : array (n, 3), optional
-        In the scene's frame, m/s, NaN where not known.
-
-    Returns
-    -------
-    ids, positions : lists over times of arrays (T_k,) and (T_k, 3)
+    unknown (NaN), or does not fit the positions, is that of the parabola through the neighbouring reports; where these
+    are missing, or the curve would leave the straight line by more than a fourth of its length, the target flies
+    straight. Between reports further apart than `max_gap`, s, it is absent. `points` and `velocities`, (n, 3), are in
+    the scene's frame.
     """
     ids: list[list[int]] = [[] for _ in times]
     positions: list[list[Array]] = [[] for _ in times]

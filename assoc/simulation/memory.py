@@ -12,21 +12,10 @@ MOST = 10_000_000
 
 
 def require_scene_memory(scans: float, sensors: float, targets: float, false_alarms: float, names: str) -> None:
-    """Refuse a scene that would take more memory than there is.
+    """Refuse a scene that would take more memory than there is; the message names the parameter that asks for most.
 
-    Parameters
-    ----------
-    scans, sensors, targets : float
-        How many.
-    false_alarms : float
-        Mean number of a sensor in a scan.
-    names : str
-        Names of the caller's parameters in the same order, separated by spaces.
-
-    Raises
-    ------
-    LimitExceededError
-        The message names the parameter that asks for most.
+    `false_alarms` is the mean number of a sensor in a scan; `names` are the caller's parameters in the order of these,
+    separated by spaces.
     """
     needed = _SENSOR * sensors + scans * (
         sensors * (_REPORT + _MEASUREMENT * (float(targets) + false_alarms)) + _PLACE * targets

@@ -91,21 +91,10 @@ def _require_rows(given: Sequence[Array], target_ids: Sequence[Array], what: str
 
 
 def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequence[Array]) -> list[Array]:
-    """Velocities of targets whose positions alone are known, by differences from scan to scan.
+    """Velocities (T_k, 3), m/s, of targets whose positions alone are known, by differences from scan to scan.
 
     Central differences between neighbouring scans, one-sided at the ends of a target's presence; across its absence
     only of one that is there for a single scan.
-
-    Parameters
-    ----------
-    times : array (K,)
-        Seconds.
-    target_ids, positions
-        As for `observe`.
-
-    Returns
-    -------
-    list over scans of arrays (T_k, 3), m/s
     """
     scan = np.repeat(np.arange(len(times)), [len(ids) for ids in target_ids])
     if not len(scan):

@@ -22,15 +22,7 @@ def on_circle(center: Array, radius: float, count: int) -> Array:
 
 
 def azimuth_interval(position: Array, region: Array) -> tuple[float, float]:
-    """Smallest interval of azimuths (rad) under which a box is seen; its end may lie beyond pi.
-
-    Parameters
-    ----------
-    position : array (3,)
-        Of the sensor, metres.
-    region : array (3, 2)
-        Lower and upper bounds of x, y, z, metres.
-    """
+    """Smallest interval of azimuths (rad) under which a box (3, 2) is seen; its end may lie beyond pi."""
     low, high = region[:2, 0], region[:2, 1]
     here = position[:2]
     if ((low < here) & (here < high)).all():
@@ -88,20 +80,8 @@ def radar_over(
 ) -> Sensor:
     """Make a radar (range, azimuth, elevation, range rate on request) whose field of view just covers a region.
 
-    Parameters
-    ----------
-    region : array (3, 2)
-        Lower and upper bounds of x, y, z, metres.
-    position : array (3,)
-        Of the radar, metres.
-    range_noise, angle_noise : float
-        Standard deviations in metres, and in radians for azimuth and elevation alike.
-    detection_probability, false_alarm_rate, name
-        As in `assoc.sensors.Sensor`.
-    range_rate_noise : float
-        Standard deviation of the range rate, m/s; 0: the radar measures none.
-    fastest : float
-        Largest speed of a target, m/s.
+    Noises are standard deviations: of range in metres, of both angles in radians, of range rate in m/s (0: none is
+    measured). `fastest` is the largest speed of a target, m/s.
     """
     noise = [range_noise, angle_noise, angle_noise]
     view = [

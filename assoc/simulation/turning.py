@@ -38,13 +38,7 @@ class Path(NamedTuple):
 
 
 def parse_turns(text: str, radars: int | None = None) -> list[float]:
-    """Seconds for a turn of each radar, from a text with commas.
-
-    Raises
-    ------
-    InvalidInputError
-        Not numbers above 0, or not as many as there are radars.
-    """
+    """Seconds for a turn of each radar, from a text with commas; refused if not as many as there are radars."""
     try:
         turns = [float(part) for part in text.split(",")]
     except ValueError:
@@ -73,30 +67,9 @@ def observe_in_turns(
     probability P_d and measured with Gaussian noise; false alarms are those of `assoc.simulation.observation.observe`
     in each turn, at the time at which the antenna points at them. A scan holds the measurements since the one before.
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-        That measure an azimuth.
-    turns : sequence of float
-        Seconds for a turn of each antenna; none shorter than the time between two scans.
-    start : float
-        When the first scan begins, seconds.
-    times : array (K,)
-        Ends of the scans.
-    paths : sequence of Path
-    rng : numpy.random.Generator
-    region, name
-        As in `assoc.Scene`.
-
-    Returns
-    -------
-    Scene
-        With the times of measurements, the sectors scanned, and the truth at the end of each scan.
-
-    Raises
-    ------
-    InvalidInputError
-        Scans are longer than a turn.
+    All sensors measure an azimuth; `turns` are seconds for a turn of each, none shorter than the time between two
+    scans. The first scan begins at `start`, seconds, and `times` (K,) are the ends of all. The scene has the times of
+    measurements, the sectors scanned, and the truth at the end of each scan.
     """
     if any(sensor.platform is not None for sensor in sensors):
         raise InvalidInputError("sensors: turning antennas on platforms are not simulated")

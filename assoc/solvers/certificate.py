@@ -27,10 +27,7 @@ def certify(
 ) -> Solution:
     """Turn a choice of columns into a solution of the problem with a valid bound.
 
-    Raises
-    ------
-    InfeasibleError
-        The choice uses a measurement twice, or leaves one out that must be used.
+    InfeasibleError if the choice uses a measurement twice, or leaves one out that must be used.
     """
     packing = prepared.packing
     columns = np.asarray(outcome.columns, dtype=np.int64)

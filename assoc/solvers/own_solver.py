@@ -25,13 +25,7 @@ def guarded(name: str, solve: Callable[..., object]) -> SolveFunction:
 
 
 def _believed(outcome: object, packing: Packing, expected: str) -> Outcome:
-    """Return the parts of an outcome that can be checked: columns, iterations, and multipliers.
-
-    Raises
-    ------
-    InvalidInputError
-        The answer is not an `Outcome`, or a part of it has a wrong type, shape or range.
-    """
+    """Return the parts of an outcome that can be checked: columns, iterations, and multipliers."""
     if not isinstance(outcome, Outcome):
         raise InvalidInputError(f"{expected} it to return an Outcome, got {type(outcome).__name__}")
     columns = _array(outcome.columns)

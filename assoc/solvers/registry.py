@@ -105,13 +105,7 @@ def solver(name: str) -> SolveFunction:
 
 
 def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
-    """Check and complete a solver's parameters.
-
-    Raises
-    ------
-    InvalidInputError
-        Unknown solver or parameter (similar names are listed), or a value out of range.
-    """
+    """Check and complete a solver's parameters; of an unknown name the message lists similar ones."""
     kind = parameters(name)
     known = [f.name for f in fields(kind)] if values else []  # type: ignore[arg-type]
     for key in values:

@@ -18,12 +18,8 @@ def start_columns(
 ) -> NDArray[np.integer] | None:
     """Return the columns of a packing that a start solution chooses, as far as the packing has them.
 
-    Without dummies, rows that stay uncovered are covered by ejections; None where that fails.
-
-    Raises
-    ------
-    InvalidInputError
-        The start has other sensors, tuples that are not whole numbers, or uses a measurement twice.
+    Without dummies, rows that stay uncovered are covered by ejections; None where that fails. A start with other
+    sensors, tuples that are not whole numbers, or a measurement in two is refused.
     """
     if not isinstance(start, Solution):
         raise InvalidInputError(f"start: expected a Solution, got {type(start).__name__}")

@@ -14,16 +14,9 @@ MOST_RUNS = 2000
 
 
 class Batches:
-    """An iterator of batches; it learns from results how long runs take.
+    """An iterator of batches of about so many seconds; it learns from results how long runs take.
 
     The grouping does not affect results.
-
-    Parameters
-    ----------
-    settings : sequence of Setting
-    runs : iterator of (setting, source, repeat, scan)
-    seconds : float
-        Target time of a batch.
     """
 
     def __init__(self, settings: Sequence[Setting], runs: Iterator[RunNumbers], seconds: float) -> None:

@@ -20,28 +20,13 @@ def mean_interval(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> tuple[float, float]:
-    """Interval of the mean over problems and repeats, both resampled with replacement.
+    """Interval of the mean over problems and repeats, (P, R) with NaN where a run is missing, both resampled.
 
-    Parameters
-    ----------
-    values : array, shape (problems, repeats)
-        NaN where a run is missing.
-    weights : array, shape (problems, repeats), optional
-        Weights of the mean ``sum(weights * values) / sum(weights)``; 1 by default.
-    level : float, default 0.95
-    resamples : int, default 2000
-    seed : int, default 0
-        Fixed, so that the interval is reproducible.
+    The mean is ``sum(weights * values) / sum(weights)``; the seed is fixed, so that the interval is reproducible. NaN
+    without values, and both ends equal to a single value.
 
-    Returns
-    -------
-    (float, float)
-        The ends; NaN without values, and both equal to a single value.
-
-    References
-    ----------
-    A. B. Owen, The pigeonhole bootstrap, Annals of Applied Statistics 1 (2007): resampling rows and columns
-        is conservative where runs of one problem, or of one repeat, are alike.
+    A. B. Owen, The pigeonhole bootstrap, Annals of Applied Statistics 1 (2007): resampling rows and columns is
+    conservative where runs of one problem, or of one repeat, are alike.
     """
     share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
     if not share.any():
@@ -58,18 +43,9 @@ def mean_interval(
 
 
 def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Floats:
-    """Means of several settings over the same resampled problems and repeats, for comparison in pairs.
+    """Means (resamples, S) of S settings over the same resampled problems and repeats, for comparison in pairs.
 
-    Parameters
-    ----------
-    tables : array, shape (settings, problems, repeats)
-        Without NaN.
-    resamples : int, default 2000
-    seed : int, default 0
-
-    Returns
-    -------
-    array, shape (resamples, settings)
+    ``tables`` is (S, problems, repeats), without NaN.
     """
     _, rows, columns = tables.shape
     of_rows, of_columns = _draws(rows, columns, resamples, seed)

@@ -11,13 +11,7 @@ _ROOMS = ("costs", "sensors", "packing", "solvers", "ranking")
 
 @cache
 def code_digest() -> str:
-    """Sixteen hexadecimal digits of the digest of the solvers' and costs' source files.
-
-    Returns
-    -------
-    str
-        Empty if the package has no source files (for example in an archive).
-    """
+    """Sixteen hexadecimal digits of the digest of the solvers' and costs' source files; empty if there are none."""
     package = Path(__file__).resolve().parent.parent
     files = sorted(path for room in _ROOMS for path in (package / room).rglob("*.py"))
     digest = hashlib.sha256()

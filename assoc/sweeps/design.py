@@ -112,11 +112,6 @@ def read_words(words: Sequence[str], solvers: Sequence[str], label: str = "--gri
     """Read ``name=values`` or ``solver.name=values`` for each of the solvers.
 
     A name without a solver applies to every solver with this parameter.
-
-    Raises
-    ------
-    InvalidInputError
-        A word of another form, a parameter that no solver has or that is given twice, or a parameter without values.
     """
     found: dict[str, dict[str, Space]] = {solver: {} for solver in solvers}
     for word in words:

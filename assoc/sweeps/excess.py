@@ -25,16 +25,8 @@ def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
 def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Average the excess of runs over time, each run with its best solution so far.
 
-    Parameters
-    ----------
-    traces : DataFrame
-        From `with_excess`, not empty.
-    column : {"iteration", "seconds"}
-
-    Returns
-    -------
-    at, excess : arrays (n,)
-        Iterations, or milliseconds; mean cost above the best known.
+    ``traces`` are from `with_excess`, not empty; ``column`` is "iteration" or "seconds". Returns iterations, or
+    milliseconds, (n,), and the mean cost above the best known, (n,).
     """
     factor = 1e3 if column == "seconds" else 1.0
     at = np.maximum(factor * traces[column].to_numpy(dtype=float), 1e-3)

@@ -19,23 +19,12 @@ from assoc.scene.scene import Scene
 
 @dataclass(frozen=True)
 class StudySource:
-    """A scene or a problem with a name.
-
-    Parameters
-    ----------
-    content : Scene or AssignmentProblem
-    name : str
-        For display, for example the file's name.
-
-    Attributes
-    ----------
-    fingerprint : str
-        Sixteen hexadecimal digits of the digest of all arrays.
-    """
+    """A scene or a problem with a name for display, for example the file's."""
 
     content: Source
     name: str
     fingerprint: str = field(default="")
+    """Sixteen hexadecimal digits of the digest of all arrays."""
 
     def __post_init__(self) -> None:
         # file names may hold bytes that are not valid text, which table columns refuse
@@ -62,24 +51,12 @@ def fingerprint(content: Source) -> str:
 
 
 def load_sources(files: Sequence[str]) -> tuple[StudySource, ...]:
-    """Load scenes and problems from files.
-
-    Raises
-    ------
-    InvalidInputError
-        A file is neither, or the same content is given twice.
-    """
+    """Load scenes and problems from files; the same content twice is refused."""
     return named_sources([load_source(file) for file in files], files)
 
 
 def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
-    """Sources with the names of their files: the last part of the path where that is unique.
-
-    Raises
-    ------
-    InvalidInputError
-        The same content is given twice.
-    """
+    """Sources named by their files, by the last part of the path where that is unique; equal ones are refused."""
     short = [os.path.basename(file) for file in files]
     names = files if len(set(short)) < len(short) else short
     sources = tuple(StudySource(content, name) for content, name in zip(contents, names, strict=True))
@@ -92,13 +69,7 @@ def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[Stu
 
 
 def study_sources(given: Any) -> tuple[StudySource, ...]:
-    """Scenes and problems, one or several, with or without names, as sources; those without a name are numbered.
-
-    Raises
-    ------
-    InvalidInputError
-        There are no sources, or one is neither a scene nor a problem.
-    """
+    """Scenes and problems, one or several, with or without names, as sources; those without a name are numbered."""
     every = (given,) if isinstance(given, (StudySource, Scene, AssignmentProblem)) else tuple(given)
     if not every:
         raise InvalidInputError("the study has no scenes and no problems")

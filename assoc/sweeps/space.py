@@ -25,21 +25,14 @@ class Values:
 
 @dataclass(frozen=True)
 class Range:
-    """Numbers from ``low`` to ``high``, both included.
-
-    Attributes
-    ----------
-    low, high : float
-    logarithmic : bool
-        Whether equal ratios are equally likely, rather than equal differences.
-    whole : bool
-        Whether only whole numbers are drawn.
-    """
+    """Numbers from ``low`` to ``high``, both included."""
 
     low: float
     high: float
     logarithmic: bool = False
+    """Whether equal ratios are equally likely, rather than equal differences."""
     whole: bool = False
+    """Whether only whole numbers are drawn."""
 
     def draw(self, rng: np.random.Generator) -> Any:
         """Draw a number."""
@@ -57,13 +50,7 @@ Space = Values | Range
 
 
 def read_text(parameter: Parameter, text: str, label: str) -> Space:
-    """Read ``1,2,3`` or ``0.1:0.9`` or ``1:1000:log``.
-
-    Raises
-    ------
-    InvalidInputError
-        There are no values, or one has the wrong type.
-    """
+    """Read ``1,2,3`` or ``0.1:0.9`` or ``1:1000:log``."""
     parts = text.split(":")
     if parameter.kind in (int, float) and len(parts) in (2, 3):
         if len(parts) == 3 and parts[2] != "log":

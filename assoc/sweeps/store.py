@@ -56,28 +56,18 @@ RunKey = tuple[str, str, int, int]
 
 @dataclass(frozen=True)
 class Manifest:
-    """Properties that all runs of a study share; a folder takes the runs of one study only.
-
-    Attributes
-    ----------
-    package : str
-        Version of assoc.
-    seed : int
-    sources : mapping
-        Fingerprint to name.
-    time_limit : float or None
-    gating : mapping
-        Options of ``assoc.build_problem``.
-    code : str
-        Digest of the solvers' and costs' source files; empty if unknown.
-    """
+    """Properties that all runs of a study share; a folder takes the runs of one study only."""
 
     package: str
+    """Version of assoc."""
     seed: int
     sources: Mapping[str, str]
+    """Fingerprint to name."""
     time_limit: float | None
     gating: Mapping[str, Any]
+    """Options of ``assoc.build_problem``."""
     code: str = ""
+    """Digest of the solvers' and costs' source files; empty if unknown."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the file."""
@@ -115,19 +105,9 @@ class Manifest:
 
 
 class Store:
-    """An open study folder; only one process at a time may write to it.
+    """An open study folder, made if missing; only one process at a time may write to it.
 
-    Parameters
-    ----------
-    folder : path-like
-        Created if missing.
-    manifest : Manifest
-        Must equal that of a study already in the folder.
-
-    Raises
-    ------
-    InvalidInputError
-        The folder holds another study or something else, is used by another process, or is not writable.
+    Refused is a folder that holds another study (by its manifest) or something else, or that is used or not writable.
     """
 
     def __init__(self, folder: str | os.PathLike[str], manifest: Manifest) -> None:
@@ -173,24 +153,10 @@ class Store:
         return log
 
     def append(self, settings: Sequence[Setting], batch: Mapping[str, list[Any]]) -> int:
-        """Write a batch, with its new settings, and wait until it is on the disk.
+        """Write a batch (`COLUMNS`) with its new settings, wait until it is on the disk; return the number of new runs.
 
-        Parameters
-        ----------
-        settings : sequence of Setting
-            All settings of the batch.
-        batch : mapping
-            The lists of `COLUMNS`; runs that are already saved are left out.
-
-        Returns
-        -------
-        int
-            Number of new runs.
-
-        Raises
-        ------
-        InvalidInputError
-            The file cannot be written (the disk is full, for example). What was saved before stays.
+        Runs that are already saved are left out. If the file cannot be written (the disk is full), what was saved
+        stays.
         """
         keys = list(run_keys(batch))
         fresh = [i for i, key in enumerate(keys) if key not in self.done]
@@ -242,13 +208,7 @@ def run_keys(batch: Mapping[str, list[Any]]) -> Iterator[RunKey]:
 
 
 def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
-    """Read the manifest of a study.
-
-    Raises
-    ------
-    InvalidInputError
-        The folder holds no study, or one of a later version, or a damaged one.
-    """
+    """Read the manifest of a study; one that is missing, damaged, or of a later version is refused."""
     path = Path(folder) / MANIFEST
     if not Path(folder).is_dir():
         raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")

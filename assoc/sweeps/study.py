@@ -29,24 +29,15 @@ Progress = Callable[["Counts"], object]
 
 @dataclass
 class Counts:
-    """Progress of a study.
-
-    Attributes
-    ----------
-    total : int
-        Runs of the design.
-    before : int
-        Runs that were saved before.
-    new : int
-        Runs done since the start.
-    solving : float
-        Total seconds of the new runs in the solvers.
-    """
+    """Progress of a study, in runs of the design."""
 
     total: int
     before: int
+    """Runs that were saved before."""
     new: int = 0
+    """Runs done since the start."""
     solving: float = 0.0
+    """Total seconds of the new runs in the solvers."""
 
     @property
     def done(self) -> int:

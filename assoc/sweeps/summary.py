@@ -110,12 +110,7 @@ def numbers(column: pd.Series[Any]) -> Floats:
 def summary_rows(summary: pd.DataFrame, *, brief: bool = False) -> tuple[list[str], list[list[str]]]:
     """Headers and cells of a summary for display; the columns before "runs" identify the setting.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        Result of `summarize`.
-    brief : bool, default False
-        Leave out the intervals of measures that are equal in all runs.
+    ``brief`` leaves out the intervals of measures that are equal in all runs.
     """
     parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
     measures = [name for name in MEASURES if summary[name].notna().any()]

@@ -43,22 +43,7 @@ _BUDGETS = ("iterations", "patience", "nodes", "workers")
 
 @dataclass(frozen=True)
 class Report:
-    """The result of a search.
-
-    Attributes
-    ----------
-    solver, target : str
-    trials : int
-    tuned, default : Setting
-    training : tuple of float
-        Target of default and tuned setting on the training runs.
-    table : DataFrame
-        Default and tuned setting on the held-out runs: one row each with means and intervals.
-    difference : tuple of float
-        Tuned less default in the target, held out: mean, low and high end of the 95 % interval over pairs.
-    held_out : str
-        Description of the held-out runs.
-    """
+    """The result of a search."""
 
     solver: str
     target: str
@@ -66,9 +51,13 @@ class Report:
     tuned: Setting
     default: Setting
     training: tuple[float, float]
+    """Target of default and tuned setting on the training runs."""
     table: pd.DataFrame
+    """Default and tuned setting on the held-out runs: one row each with means and intervals."""
     difference: tuple[float, float, float]
+    """Tuned less default in the target, held out: mean, ends of the 95 % interval over pairs."""
     held_out: str
+    """Description of the held-out runs."""
 
 
 @door
@@ -251,16 +240,8 @@ def _point(default: Setting, space: Mapping[str, Space]) -> dict[str, Any]:
 class _Runs:
     """The runs of studies, done where the folder lacks them: cost, bound and time of each.
 
-    Parameters
-    ----------
-    store : Store
-        Open.
-    size : int
-        Runs of all studies together, about.
-    progress : callable or None
-        Called with the `Counts` of all studies so far.
-    where : mapping
-        Where runs are done (`Study.run`).
+    All studies together have about `size` runs; `progress` gets their `Counts` so far, `where` says where runs are
+    done.
     """
 
     def __init__(

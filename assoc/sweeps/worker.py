@@ -32,15 +32,7 @@ Tuples = set[tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Batch:
-    """Some runs.
-
-    Attributes
-    ----------
-    settings : tuple of Setting
-        The settings of the runs.
-    runs : list of (setting, source, repeat, scan)
-        Setting and source as numbers, indices into the batch's settings and the job's sources.
-    """
+    """Some runs: setting and source as indices into the batch's settings and the job's sources, repeat, scan."""
 
     settings: tuple[Setting, ...]
     runs: list[tuple[int, int, int, int]]
@@ -57,29 +49,17 @@ class Result:
 
 @dataclass(frozen=True)
 class Job:
-    """Data that all runs share; a worker gets it once.
-
-    Parameters
-    ----------
-    sources : tuple of StudySource
-    seed : int
-        Seed of the study.
-    time_limit : float or None
-        Seconds for each run.
-    gating : mapping
-        Options of ``assoc.build_problem``.
-    package : str
-        Version of assoc; the worker's must be the same.
-    code : str
-        Digest of the solvers' code; the worker's must be the same.
-    """
+    """Data that all runs share; a worker gets it once."""
 
     sources: tuple[StudySource, ...]
     seed: int
     time_limit: float | None
     gating: Mapping[str, Any]
+    """Options of ``assoc.build_problem``."""
     package: str
+    """Version of assoc; the worker's must be the same."""
     code: str
+    """Digest of the solvers' code; the worker's must be the same."""
     _problems: OrderedDict[tuple[int, int], tuple[AssignmentProblem, Tuples | None]] = field(
         default_factory=OrderedDict, compare=False
     )
@@ -160,13 +140,7 @@ class Job:
 
 
 def run_batch(job: Job, batch: Batch) -> Result:
-    """Do the runs of a batch one after the other.
-
-    Raises
-    ------
-    InvalidInputError
-        The worker has another version of assoc, or a solver refuses a setting for these costs.
-    """
+    """Do the runs of a batch one after the other; refused by a worker with another version of assoc."""
     import time
 
     started = time.perf_counter()

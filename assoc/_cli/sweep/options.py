@@ -69,13 +69,7 @@ def parser() -> Parser:
 
 
 def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
-    """Read the command line and the file of ``--config``; returns the options, and the design as tables of the file.
-
-    Raises
-    ------
-    InvalidInputError
-        Input that does not follow ``--help``.
-    """
+    """Read the command line and the file of ``--config``; returns the options, and the design as tables of the file."""
     from assoc.solvers import registry
 
     made = parser()

@@ -22,30 +22,20 @@ from assoc.filters.state import Gaussian, gaussian
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Adaptive(Batch):
-    """Gaussians and the state of the adaptation.
-
-    Attributes
-    ----------
-    mean, covariance : (B, n), (B, n, n)
-    without_noise : (B, n, n)
-        Covariance of the last prediction before process noise was added; after a correction the covariance itself.
-    process_noise : (B or 1, n, n)
-        Process noise of the last prediction, unscaled; 0 after a correction.
-    innovations : (B, W, d)
-        The last normalised innovations, newest last; d is 0 before the first measurement.
-    turns : (B, W)
-        The last corrections of the state's last component, each in units of its standard deviation.
-    process_scale : (B, n)
-        What the process noise of each component is multiplied with, q.
-    """
+    """Gaussians and the state of the adaptation: (B, n), (B, n, n)."""
 
     mean: Array
     covariance: Array
     without_noise: Array
+    """Covariance of the last prediction before noise was added; after a correction the covariance itself."""
     process_noise: Array
+    """Process noise of the last prediction, unscaled; 0 after a correction, (B or 1, n, n)."""
     innovations: Array
+    """The last normalised innovations, newest last, (B, W, d); d is 0 before the first measurement."""
     turns: Array
+    """The last corrections of the state's last component, each in units of its standard deviation, (B, W)."""
     process_scale: Array
+    """What the process noise of each component is multiplied with, q, (B, n)."""
 
     @property
     def gaussian(self) -> Gaussian:

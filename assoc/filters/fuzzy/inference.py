@@ -174,12 +174,8 @@ class FuzzyRules:
     def __call__(self, inputs: Array) -> Array:
         """Infer the output for each input, (B,).
 
-        Inputs beyond the outermost sets are clipped to their ends.
-
-        Raises
-        ------
-        InvalidInputError
-            An input is not finite, or no rule covers it.
+        Inputs beyond the outermost sets are clipped to their ends; refused is one that is not finite, or that no rule
+        covers.
         """
         x = inputs
         if type(x) is not np.ndarray or x.dtype != np.float64 or x.ndim != 1 or not x.flags.c_contiguous:

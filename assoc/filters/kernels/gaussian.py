@@ -41,22 +41,10 @@ X, K, G, M, L, W = range(6)
 def unpack(packed: Array, d: int) -> tuple[int, int, Array, Array, Array, Array]:
     """Take a measurement model of d quantities apart, which `assoc.filters.measurement.pack` has put in one piece.
 
-    numba takes 0.1 microsecond for each array that Python passes, and 0.8 for a record.
-
-    Returns
-    -------
-    code : int
-        That of a sensor (`assoc.sensors.codes`), LINEAR or GIVEN.
-    kind : int
-        PLAIN, MODIFIED or SIMPLIFIED.
-    position : (3,)
-        The sensor's.
-    columns : (c,)
-        Components of the state that are read; for sensors x, y (and z), with a range rate their velocities after them.
-    matrix : (d, c)
-        Of a linear model. GIVEN: Jacobian (d, n), or measurements of points (m, d).
-    noise : (d, d)
-        Covariance.
+    numba takes 0.1 microsecond for each array that Python passes, and 0.8 for a record. Returns the code (that of a
+    sensor, LINEAR or GIVEN) and kind (PLAIN, MODIFIED or SIMPLIFIED); the sensor's position (3,); the columns (c,) of
+    the state that are read: for sensors x, y (and z), with a range rate their velocities after them; the matrix (d, c)
+    of a linear model (GIVEN: Jacobian (d, n), or measurements of points (m, d)); and the noise covariance (d, d).
     """
     c, end = int(packed[2]), len(packed) - d * d
     matrix = packed[6 + c : end]
@@ -117,17 +105,11 @@ def predict_one(m: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: 
 
 @njit
 def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: Array, new_P: Array) -> None:
-    """Predict a batch into new_mean and new_P.
+    """Predict a batch, (B, n), (B, n, n), into new_mean and new_P.
 
-    Results are written into arrays of the caller's: returning them costs 1 microsecond each.
-
-    Parameters
-    ----------
-    mean, P : (B, n), (B, n, n)
-    F, Q : (B or 1, n, n)
-        Transition (or Jacobian) and process noise.
-    moved : (B, n) or (0, n)
-        Predicted means of a nonlinear model; empty: F times the mean.
+    Results are written into arrays of the caller's: returning them costs 1 microsecond each. F and Q, (B or 1, n, n),
+    are transition (or Jacobian) and process noise; `moved` (B, n) are the means of a nonlinear model; empty: F times
+    the mean.
     """
     n = mean.shape[1]
     none, W = np.empty(0), np.empty((n, n))
@@ -288,19 +270,9 @@ def linearise_at(code: int, position: Array, columns: Array, matrix: Array, m: A
 def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_P: Array, rest: Array) -> int:
     """Correct a batch with one measurement for each, into the last three arrays.
 
-    Parameters
-    ----------
-    mean, P : (B, n), (B, n, n)
-    z : (B, d)
-        Measurements; residuals where the model is GIVEN.
-    models : (B or 1, ...)
-        Packed measurement models; see `unpack`.
-    new_mean, new_P, rest
-        Corrected Gaussians; innovations, their covariances, NIS and log-likelihoods, see `parts_of`.
-
-    Returns
-    -------
-    GOOD, or the status plus STATUSES times the number of the target.
+    z (B, d) are measurements, residuals where the model is GIVEN; models (B or 1, ...) are packed, see `unpack`; rest
+    gets innovations, their covariances, NIS and log-likelihoods, see `parts_of`. Returns GOOD, or the status plus
+    STATUSES times the number of the target.
     """
     B, d = z.shape
     wide = max(mean.shape[1], d)

@@ -139,15 +139,10 @@ def unscented(
     The sigma points give a regression z = H x + noise of covariance R + extra; corrected with these, Joseph's form
     keeps the covariance positive definite, and it is the unscented correction exactly.
 
-    Parameters
-    ----------
-    z : (B, d) or (0, d)
-        Measurements; of a user's model (GIVEN) the residuals of the first point. Empty: the expected measurements and
-        their covariances are written in place of the innovations.
-    models : (B or 1, ...)
-        Packed measurement models; a user's has the measurements of the points (2n+1, d) relative to the first.
-    weights : (3, 2n+1)
-        Steps of the points in columns of the factor, weights of means, weights of covariances.
+    z (B, d): measurements; of a user's model (GIVEN) the residuals of the first point. Without rows the expected
+    measurements and their covariances are written in place of the innovations. models (B or 1, ...): packed; a user's
+    has the measurements of the points (2n+1, d) relative to the first. weights (3, 2n+1): steps of the points in
+    columns of the factor, weights of means, weights of covariances.
     """
     B, n = mean.shape
     d, m = z.shape[1], 2 * n + 1
@@ -244,17 +239,8 @@ def move_ensemble(members: Array, F: Array, shocks: Array, moved: Array, factors
 def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out: Array, rest: Array) -> int:
     """Correction of ensembles with perturbed measurements, into the last two arrays; `rest` as in `unscented`.
 
-    Equations 12 and 13 of the UAV paper, for any measurement model: the gain is that of sample covariances.
-
-    Parameters
-    ----------
-    members : (B, N, n)
-    z : (B, d) or (0, d)
-        As in `unscented`.
-    models : (B or 1, ...)
-        Packed measurement models; a user's has the measurements of the members (N, d) relative to the first.
-    shocks : (B, N, d)
-        Standard normal.
+    Equations 12 and 13 of the UAV paper, for any measurement model: the gain is that of sample covariances. members (B,
+    N, n); z and models as in `unscented`, with N members for points; shocks (B, N, d): standard normal.
     """
     B, N, n = members.shape
     d = z.shape[1]

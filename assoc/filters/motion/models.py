@@ -305,16 +305,7 @@ class Padded(LinearMotion):
 
 
 class ForwardDifference(Motion):
-    """A motion model that moves by one forward difference a step: x' = x + dt f(x) + w, w ~ N(0, covariance).
-
-    Parameters
-    ----------
-    covariance : array_like (n, n)
-        Process noise of one step.
-    dim : int
-    position : tuple of int
-        As in `Motion`.
-    """
+    """A motion model that moves by one forward difference a step: x' = x + dt f(x) + w, w ~ N(0, covariance)."""
 
     def __init__(self, covariance: Array, dim: int, position: tuple[int, ...]) -> None:
         self.dim, self.position = dim, position

@@ -17,22 +17,14 @@ from assoc.sensors import Sensor
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Sensors that measure the same state space, and the position's indices in it.
-
-    Attributes
-    ----------
-    adapted : tuple of AdaptedSensor
-    sensors : tuple of Sensor
-        As a scene takes them: in the plane if none of them measures heights.
-    ndim_state : int
-    mapping : tuple of int
-        Indices of x, y or x, y, z in the state.
-    """
+    """Sensors that measure the same state space, and the position's indices in it."""
 
     adapted: tuple[AdaptedSensor, ...]
     sensors: tuple[Sensor, ...]
+    """As a scene takes them: in the plane if none of them measures heights."""
     ndim_state: int
     mapping: tuple[int, ...]
+    """Indices of x, y or x, y, z in the state."""
 
     @property
     def planar(self) -> bool:
@@ -40,13 +32,7 @@ class Frame:
         return len(self.mapping) == 2
 
     def split(self, detections: Sequence[Any]) -> list[list[Any]]:
-        """Group detections by sensor, keeping their order.
-
-        Raises
-        ------
-        InvalidInputError
-            A detection is of none of the sensors.
-        """
+        """Group detections by sensor, keeping their order; one of none of the sensors is refused."""
         parts: list[list[Any]] = [[] for _ in self.adapted]
         for detection in detections:
             home = next((s for s, sensor in enumerate(self.adapted) if sensor.measured(detection)), None)
@@ -70,10 +56,8 @@ class Frame:
 def make_frame(adapted: Sequence[AdaptedSensor]) -> Frame:
     """Check that sensors are compatible, and join them.
 
-    Raises
-    ------
-    InvalidInputError
-        No sensor, two equal ones without names, different state spaces, or ground ranges together with heights.
+    Refused are no sensor, two equal ones without names, different state spaces, and ground ranges together with
+    heights.
     """
     if not adapted:
         raise InvalidInputError("sensors: expected at least one")

@@ -21,16 +21,7 @@ from assoc.tracking.fusion import SystemTracks, open_states
 
 
 class StateSpace:
-    """Where a state of Stone Soup holds position and velocity.
-
-    Parameters
-    ----------
-    ndim_state : int
-    mapping : sequence of int
-        Indices of x, y or x, y, z.
-    velocity_mapping : sequence of int, optional
-        Indices of their velocities; by default each follows its position.
-    """
+    """Where a state of Stone Soup holds x, y (and z), and their velocities; by default each follows its position."""
 
     def __init__(self, ndim_state: int, mapping: Sequence[int], velocity_mapping: Sequence[int] | None = None) -> None:
         position = list(mapping)
@@ -72,17 +63,9 @@ class GrowingTracks:
     def step(
         self, time: datetime, states: SystemTracks, found: Mapping[int, Iterable[Any]], living: Collection[int]
     ) -> None:
-        """Add states at this time.
+        """Add the states, at this time, of the tracks that are present from now on.
 
-        Parameters
-        ----------
-        time : datetime
-        states : SystemTracks
-            Of the tracks that are present from now on.
-        found : mapping of int to detections
-            What each track was updated with, by its id.
-        living : collection of int
-            Ids that may still come back.
+        `found` is what each track was updated with, by its id; the tracks of `living` ids may still come back.
         """
         self._known = {i: track for i, track in self._known.items() if i in living}
         self.present = set()

@@ -41,22 +41,14 @@ _VISITS = 10_000_000
 
 
 class SmoothPoint(NamedTuple):
-    """The state of the smoothed ascent; changed in place.
-
-    Attributes
-    ----------
-    duals : float array, shape (R,)
-        Multipliers.
-    reduced, primal : float arrays, shape (N,)
-        Reduced costs and smoothed primal values of the columns.
-    slack_primal : float array, shape (R,)
-        Smoothed primal values of the rows' slack.
-    """
+    """The state of the smoothed ascent, changed in place: multipliers (R,), and of the columns reduced costs (N,)."""
 
     duals: Floats
     reduced: Floats
     primal: Floats
+    """Smoothed primal values of the columns, (N,)."""
     slack_primal: Floats
+    """Those of the rows' slack, (R,)."""
 
 
 class _Near(NamedTuple):
@@ -68,23 +60,10 @@ class _Near(NamedTuple):
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
-    """Return feasible multipliers whose bound is nearly the LP bound.
+    """Return feasible multipliers u, (R,), whose bound, ``certified_bound(packing, u)``, is nearly the LP bound.
 
-    Parameters
-    ----------
-    packing : Packing
-        The problem.
-    levels : int
-        Temperatures, each half the one before.
-    passes : int
-        Most passes over the rows at one temperature.
-    run : Run, optional
-        Its time limit holds; the multipliers are feasible even if time runs out.
-
-    Returns
-    -------
-    float array, shape (R,)
-        Multipliers u; ``certified_bound(packing, u)`` is the bound.
+    There are ``levels`` temperatures, each half the one before, with ``passes`` over the rows at the most. The time
+    limit is that of ``run``; the multipliers are feasible even if time runs out.
     """
     arrays = packing.arrays
     duals = np.zeros(packing.num_rows)

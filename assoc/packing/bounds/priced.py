@@ -24,22 +24,15 @@ class Prices(NamedTuple):
 
 @dataclass(slots=True)
 class Priced:
-    """A packing and feasible multipliers of its rows.
-
-    Attributes
-    ----------
-    packing : Packing
-        One component or several.
-    duals, reduced : float arrays, shapes (R,) and (N,)
-        Feasible multipliers and their reduced costs.
-    bound : float
-        Lower bound on the packing's solutions.
-    """
+    """A packing, one component or several, and feasible multipliers of its rows."""
 
     packing: Packing
     duals: Floats
+    """Feasible multipliers, (R,)."""
     reduced: Floats
+    """Their reduced costs, (N,)."""
     bound: float
+    """Lower bound on the packing's solutions."""
 
     @classmethod
     def of(cls, packing: Packing, duals: Floats) -> Priced:

@@ -23,19 +23,7 @@ _AT_ONCE = 20_000
 
 
 class Branching:
-    """Branch and bound on one component, some nodes at a time.
-
-    Parameters
-    ----------
-    component : Component
-    run : Run
-    to_the_end : bool
-        As in `BranchAndBound`.
-
-    Attributes
-    ----------
-    search : BranchAndBound
-    """
+    """Branch and bound (``search``) on one component, some nodes at a time; ``to_the_end`` as in `BranchAndBound`."""
 
     def __init__(self, component: Component, run: Run, *, to_the_end: bool = True) -> None:
         self._component = component
@@ -78,22 +66,7 @@ def close(component: Component, run: Run) -> None:
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:
-    """Return a valid bound, tight enough to prove this choice of columns if it is optimal.
-
-    Parameters
-    ----------
-    packing : Packing
-        The problem.
-    columns : int array
-        A complete choice of columns.
-    run : Run
-        Clock.
-
-    Returns
-    -------
-    float, float array
-        The bound, and the multipliers of its dual part.
-    """
+    """Return a valid bound, tight enough to prove a complete choice of columns if that is optimal; its multipliers."""
     duals = dual_bound(packing, run=run)
     components = split_components(packing, duals, np.arange(packing.num_columns))
     give_covers(components, packing, Cover.of(packing, columns).owner)

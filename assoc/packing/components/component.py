@@ -28,43 +28,26 @@ _AT_ONCE = 10
 
 @dataclass(slots=True)
 class Component(Priced):
-    """An independent component of the problem with its multipliers and the best cover known.
-
-    Attributes
-    ----------
-    packing : Packing
-        One component.
-    duals, reduced : float arrays, shapes (R,) and (N,)
-        Feasible multipliers and reduced costs.
-    bound : float
-        Valid lower bound of the component.
-    origin : int array, shape (N,)
-        Indices of the columns in the solver's packing.
-    best : int32 array, shape (R,), or None
-        Owner of each row in the best complete cover known.
-    weight : float
-        Its weight; ``inf`` when none is known.
-    run : Run or None
-        The run whose time limit holds.
-    refinement : str
-        What improves covers (`SearchParameters`).
-    proven : float
-        A lower bound by branch and bound, above that of the multipliers.
-    worker : int
-        Number of the worker that searches it (team.py).
-    iterations, stalled : int
-        Iterations of a metaheuristic, and those since the best cover improved.
-    """
+    """An independent component of the problem with its multipliers and the best cover known."""
 
     origin: NDArray[np.int64]
+    """Indices of the columns in the solver's packing, (N,)."""
     best: Owner | None = None
+    """Owner of each row in the best complete cover known, (R,)."""
     weight: float = np.inf
+    """Its weight; ``inf`` when none is known."""
     run: Run | None = None
+    """The run whose time limit holds."""
     refinement: str = "full"
+    """What improves covers (`SearchParameters`)."""
     proven: float = -np.inf
+    """A lower bound by branch and bound, above that of the multipliers."""
     worker: int = 0
+    """Number of the worker that searches it (team.py)."""
     iterations: int = 0
+    """Iterations of a metaheuristic."""
     stalled: int = 0
+    """Iterations since the best cover improved."""
     _cluster_search: ClusterSearch | None = None
     _arrays: PackingArrays | None = None
     _diver: Diver | None = None

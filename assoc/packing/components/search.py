@@ -31,22 +31,9 @@ def search_components(
     run: Run,
     parameters: SearchParameters,
 ) -> Outcome:
-    """Run a metaheuristic on every component of the packing.
+    """Run a metaheuristic, whose searcher of a component ``make`` returns, on every component of the packing.
 
-    Parameters
-    ----------
-    make : callable
-        Makes the searcher of a component.
-    packing : Packing
-        The whole problem.
-    run : Run
-        Clock, random generator, trace.
-    parameters : SearchParameters
-
-    Raises
-    ------
-    InfeasibleError
-        A component has no complete cover, or none was found.
+    InfeasibleError where a component has no complete cover, or none was found.
     """
     # the bound gets only a share of the time: without a solution at the time limit there would be nothing to return
     share = run.part(run.rng, run.time_limit and 0.3 * run.time_limit)

@@ -16,10 +16,7 @@ from assoc.packing.packing import Packing
 def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Component]:
     """Return the components of a packing, without covers.
 
-    Raises
-    ------
-    InfeasibleError
-        A row that must be covered has no column.
+    InfeasibleError where a row that must be covered has no column.
     """
     bounds = component_bounds(packing, duals)
     if np.isposinf(bounds).any():

@@ -35,21 +35,7 @@ Make = Callable[[Component, np.random.Generator], Searcher]
 
 
 class Team:
-    """One searcher, or several, on one component.
-
-    Parameters
-    ----------
-    make : callable
-        Makes a searcher.
-    component : Component
-        Gets the best cover of all members.
-    run : Run
-    clusters : int
-        As in `SearchParameters`.
-    workers : int
-    pool : ThreadPoolExecutor, optional
-        Threads for all workers; not needed for a single one.
-    """
+    """One searcher, or several (``workers``) on the threads of ``pool``; the component gets their best cover."""
 
     def __init__(
         self,

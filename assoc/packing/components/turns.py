@@ -43,30 +43,17 @@ class Turns:
 
     Weights and bounds are summed exactly: over thousands of components the error of a plain sum can exceed the bounds'
     margins for rounding.
-
-    Attributes
-    ----------
-    run : Run
-    iterations : int
-        Total over all searches.
-    columns, weights, bounds : lists
-        Results of the components that are done.
     """
 
     run: Run
     iterations: int = 0
+    """Total over all searches."""
     columns: list[NDArray[np.integer]] = field(default_factory=list)
     weights: list[float] = field(default_factory=list)
     bounds: list[float] = field(default_factory=list)
 
     def take(self, tasks: Iterable[Task]) -> None:
-        """Give each task its turn, again and again, until all searches are over.
-
-        Raises
-        ------
-        InfeasibleError
-            A component has no complete cover, or none was found.
-        """
+        """Give each task its turn, again and again, until all searches are over; errors as `search_components`."""
         waiting = deque(tasks)
         while waiting:
             task = waiting.popleft()

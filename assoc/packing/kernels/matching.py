@@ -34,22 +34,16 @@ _MANY = 20_000
 
 
 class Matching(NamedTuple):
-    """A two-dimensional assignment and the multipliers that prove it.
-
-    Attributes
-    ----------
-    row_edge : int64 array, shape (n,)
-        The chosen edge of each row (an index into ``indices``), or -1.
-    row_duals, column_duals : float arrays, shapes (n,) and (m,)
-        u and v of the module's dual problem.
-    cost : float
-        Total cost, including that of unmatched rows and columns.
-    """
+    """A two-dimensional assignment and the multipliers that prove it."""
 
     row_edge: NDArray[np.int64]
+    """The chosen edge of each row (an index into ``indices``), or -1, (n,)."""
     row_duals: Floats
+    """u of the module's dual problem, (n,)."""
     column_duals: Floats
+    """v of it, (m,)."""
     cost: float
+    """Total cost, including that of unmatched rows and columns."""
 
 
 class _Costs(NamedTuple):
@@ -78,23 +72,11 @@ class _State(NamedTuple):
 def match(
     indptr: ArrayLike, indices: ArrayLike, costs: ArrayLike, row_slack: ArrayLike, column_slack: ArrayLike
 ) -> Matching:
-    """Solve a sparse two-dimensional assignment.
+    """Solve a sparse two-dimensional assignment; InfeasibleError if a row or column that must be matched cannot be.
 
-    Parameters
-    ----------
-    indptr : array_like of int, shape (n + 1,)
-        Row i has edges ``indptr[i]:indptr[i+1]``.
-    indices : array_like of int, shape (E,)
-        Column of each edge; parallel edges are allowed.
-    costs : array_like of float, shape (E,)
-        Cost of each edge, of any sign; ``inf`` forbids it.
-    row_slack, column_slack : array_like of float, shapes (n,) and (m,)
-        Cost of leaving a row or column unmatched; ``inf`` where it must be matched.
-
-    Raises
-    ------
-    InfeasibleError
-        Some row or column that must be matched cannot be.
+    Row i has edges ``indptr[i]:indptr[i+1]``, with columns ``indices`` (E,) and costs (E,) of any sign; parallel edges
+    are allowed, and ``inf`` forbids one. ``row_slack`` (n,) and ``column_slack`` (m,) are the costs of leaving one
+    unmatched; ``inf`` where it must be matched.
     """
     edge_costs = np.ascontiguousarray(costs, dtype=np.float64)
     rows = np.ascontiguousarray(row_slack, dtype=np.float64)

@@ -53,23 +53,11 @@ class _Effort(NamedTuple):
 
 
 class ClusterSearch:
-    """The cluster search of one component.
+    """The cluster search of one component, whose present multipliers are kept.
 
-    Parameters
-    ----------
-    priced : Priced
-        One component; its present multipliers are kept.
-
-    Attributes
-    ----------
-    prices : Prices
-        Reduced costs (>= 0) and the feasible multipliers they come from.
-    by_row : int32 array
-        Columns of each row (``packing.row_ptr``) in order of reduced cost.
-    step : float
-        Least difference between two costs: 1 where all weights are whole numbers.
-    size : int
-        Rows of the next clusters.
+    ``prices`` are reduced costs (>= 0) and the feasible multipliers they come from, ``by_row`` the columns of each row
+    (``packing.row_ptr``) in order of reduced cost, ``step`` the least difference between two costs: 1 where all weights
+    are whole numbers; ``size`` is the number of rows of the next clusters.
     """
 
     def __init__(self, priced: Priced) -> None:
@@ -110,28 +98,11 @@ class ClusterSearch:
         deadline: float = np.inf,
         nodes: int = _NODES,
     ) -> tuple[float, float]:
-        """Try some clusters.
+        """Try some clusters; return the change of weight (<= 0), and the share of clusters not searched to the end.
 
-        Parameters
-        ----------
-        packing : PackingArrays
-            The component.
-        owner : int32 array, shape (R,)
-            The cover (chosen column of each row, or -1), every row without slack covered; changed in
-            place, never to a worse one.
-        rng : Generator
-            Draws the clusters.
-        tries : int
-            Clusters to try.
-        deadline : float
-            No cluster is begun after this (clock.py).
-        nodes : int
-            Nodes of the depth-first search for one cluster.
-
-        Returns
-        -------
-        float, float
-            The change of weight (<= 0), and the share of clusters not searched to the end.
+        ``owner`` (R,) is the cover (chosen column of each row, or -1), every row without slack covered; changed in
+        place, never to a worse one. ``nodes`` limits the depth-first search for one cluster; none is begun after the
+        deadline (clock.py).
         """
         effort = _Effort(tries, min(self.size, owner.size), self.step, nodes, _SIDEWAYS)
         change, cut = _search_clusters(packing, self.by_row, self.prices, owner, rng, effort, deadline)

@@ -29,21 +29,10 @@ _MOST_SPLITS_FOR = 6
 
 
 def improve_dimensionwise(packing: Packing, owner: NDArray[np.int32], deadline: float = np.inf) -> float:
-    """Re-match halves until no split improves.
+    """Re-match halves until no split improves; return the change of weight (<= 0).
 
-    Parameters
-    ----------
-    packing : Packing
-        The problem, whole or one component.
-    owner : int32 array, shape (R,)
-        The chosen column of each row, or -1; every row without slack covered. Changed in place.
-    deadline : float
-        No split is begun after this (clock.py).
-
-    Returns
-    -------
-    float
-        The change of weight (<= 0).
+    ``owner`` (R,) is the chosen column of each row, or -1, every row without slack covered; changed in place. No split
+    is begun after the deadline (clock.py).
     """
     return float(_improve(packing.arrays, owner, splits(packing.cols.shape[1]), deadline))
 

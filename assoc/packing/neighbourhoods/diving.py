@@ -57,18 +57,9 @@ _WHOLE = 1e-6
 class Diver:
     """The solved linear program of one component, from which dives start.
 
-    Parameters
-    ----------
-    priced : Priced
-        One component, with multipliers near the optimal ones.
-    known : int array
-        Columns of the best known cover; empty if none is known.
-    deadline : float
-        Time limit (clock.py).
-    core : int
-        Columns of the program for each row: those of least reduced cost.
-    rounds : int
-        How often they are chosen again where cuts change the reduced costs.
+    The component's multipliers should be near the optimal ones; ``known`` are the columns of the best known cover, if
+    there is one. The program has the ``core`` columns of least reduced cost for each row, chosen again at most
+    ``rounds`` times where cuts change the reduced costs.
     """
 
     def __init__(
@@ -131,19 +122,10 @@ class Diver:
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
     ) -> NDArray[np.int32]:
-        """Return a cover, perhaps of only a part of the rows.
+        """Return a cover that weighs less than ``cutoff``, perhaps of only a part of the rows.
 
-        Parameters
-        ----------
-        trail : float array, shape (N,)
-            tau_j^alpha of each column of the component.
-        strictness : float
-            beta: the larger, the more weight the program's values have.
-        rng : Generator
-        cutoff : float
-            Only covers of less weight are searched for.
-        deadline : float
-            Time limit (clock.py).
+        ``trail`` (N,) is tau_j^alpha of each column of the component, ``strictness`` beta: the larger, the more weight
+        the program's values have.
         """
         self._program.back()
         at = _Descent(self._core, self._program, self._relaxed, cutoff)
@@ -171,17 +153,7 @@ def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator
 
 
 class _Descent:
-    """A dive in progress: the program and the fixed columns.
-
-    Parameters
-    ----------
-    packing : Packing
-    program : LinearProgram
-        The packing's program, solved.
-    relaxed : Relaxation
-    cutoff : float
-        Only covers of less weight are searched for.
-    """
+    """A dive in progress: the solved program and the fixed columns; for covers that weigh less than ``cutoff``."""
 
     def __init__(self, packing: Packing, program: LinearProgram, relaxed: Relaxation, cutoff: float) -> None:
         self._packing, self._program, self._cutoff = packing, program, cutoff

@@ -26,23 +26,18 @@ from assoc.packing.packing import PackingArrays
 
 
 class Trail(NamedTuple):
-    """Pheromone and parameters of a walk's draws.
-
-    Attributes
-    ----------
-    pheromone, slack_pheromone : float arrays, shapes (N,) and (R,)
-        Of the columns, and of leaving a row uncovered.
-    alpha, beta : float
-        Exponents of the pheromone and of the visibility.
-    temperature : float
-        Scale of the relevant reduced costs.
-    """
+    """Pheromone and parameters of a walk's draws."""
 
     pheromone: Floats
+    """Of the columns, (N,)."""
     slack_pheromone: Floats
+    """Of leaving a row uncovered, (R,)."""
     alpha: float
+    """Exponent of the pheromone."""
     beta: float
+    """Exponent of the visibility."""
     temperature: float
+    """Scale of the relevant reduced costs."""
 
     @classmethod
     def without_pheromone(cls, prices: Prices, strictness: float, temperature: float) -> Trail:

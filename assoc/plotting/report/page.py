@@ -36,36 +36,19 @@ def controls(label: str, prefix: str = "") -> str:
 
 @dataclass(frozen=True)
 class Page:
-    """Content of a report.
-
-    Parameters
-    ----------
-    title, lead : str
-        Heading, and one sentence under it; plain text.
-    sections : sequence of (id, title, html)
-        In order; text in the HTML must be escaped.
-    data : mapping
-        Data for the scripts, written as JSON.
-    scripts : sequence of str
-        Names of files in ``static`` beside ``core.js``, which is always there.
-    """
+    """Content of a report: heading, and one sentence under it (`lead`), both plain text."""
 
     title: str
     lead: str
     sections: Sequence[tuple[str, str, str]]
+    """Id, title and HTML of each, in order; text in the HTML must be escaped."""
     data: Mapping[str, Any]
+    """Data for the scripts, written as JSON."""
     scripts: Sequence[str] = field(default_factory=tuple)
+    """Names of files in ``static`` beside ``core.js``, which is always there."""
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the page; it appears whole or not at all.
-
-        Raises
-        ------
-        MissingExtraError
-            plotly is not installed.
-        InvalidInputError
-            The file cannot be written.
-        """
+        """Write the page; it appears whole or not at all."""
         write_text(path, self.html())
 
     def html(self) -> str:
@@ -156,17 +139,10 @@ def cards(content: Mapping[str, tuple[str, str]]) -> str:
 def sortable_table(
     name: str, headers: Sequence[str], rows: Sequence[Sequence[tuple[str, Any]]], *, link: str | None = None
 ) -> str:
-    """Return a table that the page's script can sort.
+    """Return a table, with the id `name`, that the page's script can sort.
 
-    Parameters
-    ----------
-    name : str
-        Its id.
-    headers : sequence of str
-    rows : sequence of rows
-        Cells are (text, sort key); those with numeric keys are right-aligned.
-    link : str, optional
-        Row i then selects ``link``-i on the page; its first cell is a link.
+    Cells are (text, sort key); those with numeric keys are right-aligned. With `link`, row i selects ``link``-i on the
+    page, and its first cell is a link.
     """
     head = "".join(f'<th scope="col"><button type="button">{escape(header)}</button></th>' for header in headers)
     lines = []

@@ -22,11 +22,6 @@ def plotly_script() -> str:
 
     plotly can send charts to a cloud service, and load maps. The data of a report must stay in the file, so addresses
     are removed from the code; core.js restricts the buttons of a chart, and blocks new windows.
-
-    Raises
-    ------
-    MissingExtraError
-        The package is not installed.
     """
     check_report()
     text: str = load_extra("plotly.offline", "report").get_plotlyjs()

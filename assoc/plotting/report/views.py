@@ -179,21 +179,9 @@ def _significant(values: Array) -> list[Any]:
 
 
 def thin(views: Iterable[dict[str, Any]], wanted: Sequence[dict[str, Any]], budget: int = BUDGET) -> int:
-    """Attach views to scans within the budget; if not all fit, evenly spaced over the scans.
+    """Attach views to the `wanted` scans within a budget of bytes; return how many have one, evenly spaced if not all.
 
-    Parameters
-    ----------
-    views : iterable of dict
-        The view of each scan of `wanted`, made on demand.
-    wanted : sequence of dict
-        Scans of `scan_view`, which get their "view".
-    budget : int
-        Bytes of JSON.
-
-    Returns
-    -------
-    int
-        Number of scans with a view.
+    The view of each scan is made on demand.
     """
     sizes = []
     for view, scan in zip(views, wanted, strict=True):

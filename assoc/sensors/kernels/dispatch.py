@@ -111,17 +111,9 @@ def wrap(code: int, v: Array) -> None:
 def add_information(
     code: int, dim: int, W: Six, position: Three, measured: Three, at: Three, sums: Information
 ) -> Information:
-    """Add one measurement's chi-square, gradient and information at a position to those of others.
+    """Add one measurement's chi-square, gradient and information, at a position, to the sums of those before it.
 
-    Parameters
-    ----------
-    code, dim : int
-    W
-        Inverse of the measurement covariance, padded with zeros.
-    position, measured, at
-        The sensor's position, the measurement, and the position it is held against.
-    sums
-        Of the measurements before.
+    W is the inverse of its covariance, padded with zeros, `position` the sensor's.
     """
     if code == POSITION:
         return add_position(dim, W, measured, at, sums)
@@ -136,15 +128,10 @@ def add_information(
 def convert_one(
     code: int, dim: int, measured: Three, position: Three, R: Six, heights: Three, reach: float, least: float
 ) -> Converted:
-    """Position that a measurement points at, and its covariance, widened.
+    """Position that a measurement points at, and its covariance R, widened.
 
-    Parameters
-    ----------
-    heights
-        Lowest, middle and highest that are sought where the measurement leaves the height open; xz, yz and zz are
-        0, 0 and 1 then.
-    reach, least
-        The covariance's ellipsoid of chi-square value `least` holds all positions within `reach`.
+    The covariance's ellipsoid of chi-square value `least` holds all positions within `reach`. `heights` are the lowest,
+    middle and highest that are sought where the measurement leaves the height open; xz, yz and zz are 0, 0 and 1 then.
     """
     if code == POSITION:
         return convert_position(dim, measured, R, heights[1])

@@ -46,32 +46,13 @@ def around(
 ) -> Path:
     """Return a short path between two poses that turns no tighter than `radius` and clears all obstacles.
 
-    Parameters
-    ----------
-    start, goal : Pose
-    radius : float
-        Turning radius, m.
-    obstacles : sequence of (x, y, radius)
-        Circles, metres; they may overlap.
-    margin : float
-        Distance to keep from the obstacles, m.
-    points : int
-        Touching points tried on each obstacle and sense before they are moved.
+    Obstacles are circles (x, y, radius), metres, which may overlap; `margin`, m, is kept from them, and `points`
+    touching points are tried on each and sense before they are moved. The path is the shortest within the graph of
+    touching points, drawn tight; a better one through another gap can exist only where `points` are too few to find
+    that gap.
 
-    Returns
-    -------
-    Path
-        The shortest within the graph of touching points, drawn tight; a better one through another gap can exist
-        only where `points` are too few to find that gap.
-
-    Raises
-    ------
-    InvalidInputError
-        Start or goal within an obstacle, or an argument out of range.
-    InfeasibleError
-        No path was found.
-    LimitExceededError
-        More touching points than the search is made for.
+    InvalidInputError where start or goal lie within an obstacle, InfeasibleError where no path was found,
+    LimitExceededError for more touching points than the search is made for.
     """
     radius = positive_radius(radius)
     circles = finite_array(obstacles if len(obstacles) else np.zeros((0, 3)), "obstacles").copy()

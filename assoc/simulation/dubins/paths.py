@@ -60,14 +60,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Path:
-    """A path of pieces that join without kinks.
-
-    Parameters
-    ----------
-    segments : sequence of Segment
-    word : str
-        L, S and R in the order of the pieces.
-    """
+    """A path of pieces that join without kinks; `word` has L, S and R in the order of the pieces."""
 
     segments: tuple[Segment, ...]
     word: str
@@ -86,15 +79,7 @@ class Path:
         return self.segments[-1].at(s)
 
     def sample(self, speed: float, interval: float) -> tuple[Array, Array]:
-        """Sample at constant speed: times (K,) in s, and x, y, heading (K, 3); the end is the last sample.
-
-        Parameters
-        ----------
-        speed : float
-            m/s.
-        interval : float
-            Seconds from sample to sample; the last one may be shorter.
-        """
+        """Sample at constant speed (m/s): times (K,) in s, and x, y, heading (K, 3); the end is the last sample."""
         for name, value in (("speed", speed), ("interval", interval)):
             if not (math.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} must be a number above 0, got {value!r}")
@@ -124,19 +109,8 @@ def positive_radius(radius: float) -> float:
 
 
 def path(start: Pose, goal: Pose, radius: float, word: str) -> Path | None:
-    """Return the path of one word, or None where the word has none.
+    """Return the path of one of the `WORDS`, or None where the word has none; the turning radius is in m.
 
-    Parameters
-    ----------
-    start, goal : Pose
-        Headings count modulo a full turn.
-    radius : float
-        Turning radius, m.
-    word : str
-        One of `assoc.simulation.dubins.kernels.WORDS`.
-
-    References
-    ----------
     A. M. Shkel and V. Lumelsky, Classification of the Dubins set, 2001.
     """
     if word not in WORDS:

@@ -99,21 +99,13 @@ class RotatingRadarParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPlots:
-    """A recording and its truth.
-
-    Attributes
-    ----------
-    recording : Recording
-        With sources.
-    truth : Trajectories
-        Where each aircraft in reach was whenever the antenna pointed at it, detected or not.
-    velocities : array (n, 3)
-        Of the rows of the truth, m/s.
-    """
+    """A recording, with sources, and its truth."""
 
     recording: Recording
     truth: Trajectories
+    """Where each aircraft in reach was whenever the antenna pointed at it, detected or not."""
     velocities: Array
+    """Of the rows of the truth, (n, 3), m/s."""
 
 
 def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name: str) -> SimulatedPlots:

@@ -50,17 +50,9 @@ def tuples_of(
     columns: NDArray[np.int64],
     rows: NDArray[np.int64],
 ) -> NDArray[np.int32]:
-    """Return the tuples of nodes.
+    """Return the tuples of nodes: of columns, and of rows that stay uncovered (false alarms).
 
-    Parameters
-    ----------
-    tuples : int32 array, shape (M, S)
-        Tuples of the problem from which the packing was made.
-    sizes : int array, shape (S,)
-        Number of measurements of each sensor.
-    packing : Packing
-    columns, rows : int arrays
-        Columns, and rows that stay uncovered (false alarms).
+    ``tuples`` (M, S) and ``sizes`` (S,) are those of the problem from which the packing was made.
     """
     starts = np.cumsum(sizes) - sizes
     through = packing.row_origin[rows]

@@ -35,12 +35,7 @@ if TYPE_CHECKING:
 def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     """Run the paper's ant colony on the whole problem; one iteration is one cycle of all ants.
 
-    Raises
-    ------
-    InvalidInputError
-        ``visibility="reciprocal"`` with costs that are not positive.
-    InfeasibleError
-        No ant completed a tour (possible only without dummies).
+    InfeasibleError if no ant completed a tour (possible only without dummies).
     """
     alone = false_alarms(packing)
     nodes, costs = nodes_of(packing, alone)
@@ -107,13 +102,7 @@ def nodes_of(packing: Packing, alone: NDArray[np.int64]) -> tuple[NDArray[np.int
 
 
 def transformed(costs: Floats, kind: str, scale: float) -> Floats:
-    """Return the costs as positive numbers in the same order, for eq. 7.
-
-    Raises
-    ------
-    InvalidInputError
-        ``kind="reciprocal"`` and a cost is not positive.
-    """
+    """Return the costs as positive numbers in the same order, for eq. 7; "reciprocal" takes positive costs alone."""
     if kind == "exponential":
         # beyond e^600 differences of visibility no longer matter, but its powers would overflow
         return np.exp(np.minimum((costs - costs.min()) / scale, 150.0))

@@ -12,13 +12,10 @@ from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needl
 
 
 def relax(arranged: Arranged, duals: Floats) -> tuple[Floats, Floats] | None:
-    """Solve the relaxation for the multipliers of sensors 3..S in ``duals``, shape (R,).
+    """Solve the relaxation for the multipliers of sensors 3..S in ``duals`` (R,); None without a 2-D assignment.
 
-    Returns
-    -------
-    (float array, float array) or None
-        Feasible multipliers of all rows, whose sum is the value of the relaxation, and the subgradient
-        (0 for the rows of the first two sensors). None where there is no 2-D assignment.
+    Returns feasible multipliers of all rows, whose sum is the value of the relaxation, and the subgradient (0 for the
+    rows of the first two sensors).
     """
     result = duals.copy()
     subgradient = np.zeros(duals.size)

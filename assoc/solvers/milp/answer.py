@@ -11,27 +11,18 @@ from assoc.packing.packing import Packing
 
 
 class Answer(NamedTuple):
-    """A backend's answer.
-
-    Attributes
-    ----------
-    columns : int array or None
-        The chosen columns, where there is a solution.
-    bound : float
-        No solution has less weight; -inf where the backend has no bound.
-    proven : bool
-        Whether the columns are optimal.
-    infeasible : bool
-        Whether there is no solution.
-    nodes : int
-        Nodes of the search (branches of CP-SAT).
-    """
+    """A backend's answer."""
 
     columns: NDArray[np.int64] | None
+    """The chosen columns, where there is a solution."""
     bound: float
+    """No solution has less weight; -inf where the backend has no bound."""
     proven: bool
+    """Whether the columns are optimal."""
     infeasible: bool
+    """Whether there is no solution."""
     nodes: int
+    """Nodes of the search (branches of CP-SAT)."""
 
 
 def solution_or_none(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np.int64] | None:
