@@ -31,29 +31,15 @@ def spread(
 ) -> Generator[Any]:
     """Yield ``task(item)`` for each item; the results are the same wherever they are made.
 
-    Parameters
-    ----------
-    task : callable
-        Sent once to each process, so it may hold data that all items share.
-    items : iterable
-        Small. If the results need no order, it is read only as far as the processes need.
-    jobs : int
-        Number of processes of this machine; 1 works in this process.
-    scheduler : str, optional
-        Address of a dask scheduler, whose workers then do the work. Items of a lost worker are repeated by another.
-    ordered : bool
-        Whether results come in the order of the items, or as they arrive.
-    together : int
-        Number of items that are sent at once: more of them where a task takes less than some milliseconds.
+    The task is sent once to each process, so it may hold data that all items share; items are small. The work is done
+    by ``jobs`` processes of this machine (1: this process), or by the workers of a dask ``scheduler``, where items of a
+    lost worker are repeated by another. Without ``ordered``, results come as they arrive, and items are read only as
+    far as the processes need. ``together`` items are sent at once: more of them where a task takes less than some
+    milliseconds.
 
-    Raises
-    ------
-    LimitExceededError
-        A process died or could not start, or memory does not suffice for ``jobs`` processes.
-    InvalidInputError
-        The task cannot be sent, its result cannot be sent back, or the scheduler does not answer.
-    LostError
-        The scheduler is lost, or workers were lost in several attempts at an item.
+    LimitExceededError: a process died or could not start, or memory does not suffice for so many. InvalidInputError:
+    the task or its result cannot be sent, or the scheduler does not answer. LostError: the scheduler is lost, or
+    workers were in several attempts at an item.
     """
     alone = scheduler is None and jobs <= 1
     if together > 1 and not alone:

@@ -13,20 +13,9 @@ from assoc.errors import MissingExtraError
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return the functions ``__getattr__`` and ``__dir__`` of a package.
+    """Return ``__getattr__`` and ``__dir__`` of a package, given the module that defines each public name.
 
-    Parameters
-    ----------
-    package : str
-        Its ``__name__``.
-    homes : mapping
-        The module that defines each public name: within the package, or elsewhere if it begins with ``assoc.``.
-        A name without a module is a subpackage.
-
-    Returns
-    -------
-    __getattr__, __dir__ : callables
-        To be assigned in the package.
+    Modules are within the package, or elsewhere if they begin with ``assoc.``; a name without a module is a subpackage.
     """
     content = vars(sys.modules[package])
 

@@ -25,43 +25,30 @@ from assoc.problem import AssignmentProblem
 
 @dataclass(frozen=True, slots=True)
 class AllColumns:
-    """All distinct columns of a problem over its measurements, with multipliers that price them.
-
-    Attributes
-    ----------
-    rows : int32 array, shape (N, S)
-        Measurements of each column, numbered over all sensors; -1 where the sensor missed.
-    weights : float array, shape (N,)
-        Cost of the tuple; with dummies, less the costs of its singletons.
-    origin : int32 array, shape (N,)
-        Its row of ``problem.tuples``.
-    slack : bool array, shape (R,)
-        Whether a measurement may stay uncovered (at weight 0).
-    duals : float array, shape (R,)
-        Multipliers, <= 0 where there is slack.
-    reduced, slack_reduced : float arrays, shapes (N,) and (R,)
-        Reduced costs >= 0 of the columns and of leaving a row uncovered (``inf``: not allowed).
-    bound : float
-        Sum of the multipliers.
-    error : float
-        Rounding error: a solution weighs at least the bound plus its reduced costs, less this.
-    offset : float
-        Weight plus this is the cost.
-    single : int64 array
-        The cheapest singleton tuple of each row, for problems with dummies; empty without.
-    """
+    """All distinct columns of a problem over its measurements, with multipliers that price them."""
 
     rows: NDArray[np.int32]
+    """Measurements of each column, numbered over all sensors, (N, S); -1 where the sensor missed."""
     weights: Floats
+    """Cost of the tuple, (N,); with dummies, less the costs of its singletons."""
     origin: NDArray[np.int32]
+    """Its row of ``problem.tuples``, (N,)."""
     slack: NDArray[np.bool_]
+    """Whether a measurement may stay uncovered (at weight 0), (R,)."""
     duals: Floats
+    """Multipliers, <= 0 where there is slack, (R,)."""
     reduced: Floats
+    """Reduced costs >= 0 of the columns, (N,)."""
     slack_reduced: Floats
+    """The same of leaving a row uncovered (``inf``: not allowed), (R,)."""
     bound: float
+    """Sum of the multipliers."""
     error: float
+    """Rounding error: a solution weighs at least the bound plus its reduced costs, less this."""
     offset: float
+    """Weight plus this is the cost."""
     single: NDArray[np.int64]
+    """The cheapest singleton tuple of each row, for problems with dummies; empty without."""
 
     @property
     def scale(self) -> float:

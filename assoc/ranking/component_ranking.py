@@ -67,26 +67,10 @@ _ALL = 1 << 60
 class ComponentRanking:
     """Branch and bound for the k lightest solutions of one component; can be stopped and continued.
 
-    Parameters
-    ----------
-    packing : Packing
-        One component, its columns distinct.
-    duals : float array, shape (R,)
-        Feasible multipliers to start from.
-    k : int
-        Solutions wanted.
-    limit : float
-        Only solutions that weigh less are searched for.
-    tolerance : float
-        Weights that differ by no more are ties.
-    budget : int
-        Decisions of enumeration at a node, beyond one for each row, before the node is branched.
-    deadline : callable () -> float
-        Time limit by the kernels' clock (`Run.deadline`); the current node then stays open.
-    memory_allows : callable, optional
-        Whether the search may allocate this many bytes more (`Run.memory_allows`).
-    splitting : Splitting
-        When it restarts with cuts, split on counts.
+    The component's columns are distinct; multipliers (R,) to start from are feasible. Solutions weigh less than
+    ``limit``, and weights that differ by no more than the tolerance are ties. A node is branched after ``budget``
+    decisions of enumeration beyond one for each row. At the deadline (`Run.deadline`) the current node stays open.
+    ``splitting`` says when a search that restarts with cuts is split on counts.
     """
 
     def __init__(
@@ -320,28 +304,14 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
 
 @njit
 def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, wanted: Wanted) -> Any:
-    """Enumerate the k lightest solutions of each component of a packing.
+    """Enumerate the k lightest solutions of each of C components of a packing, whose ``row_cols`` are reordered.
 
-    Parameters
-    ----------
-    packing
-        The lists in ``row_cols`` are reordered.
-    reduced, duals : float arrays
-        Reduced costs and multipliers.
-    wanted : Wanted
-        Its budget is for each component, beyond one decision for each row; its limit is the total excess of all
-        components over their bounds.
+    The budget in ``wanted`` is for each component, beyond one decision for each row; the limit is the total excess of
+    all components over their bounds.
 
-    Returns
-    -------
-    start : int64 array, shape (C + 1,)
-        Component c has the solutions ``start[c]:start[c + 1]``, lightest first.
-    weights : float array
-        Their weights.
-    pointer, columns : int64 and int32 arrays
-        Solution i has the columns ``columns[pointer[i]:pointer[i + 1]]``.
-    proven : float array, shape (C,)
-        Lower bound on a component's unlisted solutions; -inf: the budget or the time did not suffice.
+    Returns start (C + 1,), weights, pointer, columns and proven (C,): component c has the solutions ``start[c]:start[c
+    + 1]``, lightest first; solution i has the columns ``columns[pointer[i]:pointer[i + 1]]``; proven is a lower bound
+    on a component's unlisted solutions, -inf where the budget or the time did not suffice.
     """
     row_start = packing.row_start
     num_components = row_start.size - 1

@@ -46,35 +46,24 @@ class Wanted(NamedTuple):
 
 
 class PricedColumns(NamedTuple):
-    """Columns over rows with feasible multipliers, the input of the enumeration.
-
-    Attributes
-    ----------
-    cols : int32 array, shape (N, S)
-        Rows of each column.
-    names : int32 array, shape (N,)
-        Numbers of the columns in the store.
-    weights : float array
-        Weights of the columns, indexed by these numbers.
-    reduced : float array, shape (N,)
-        Reduced costs (negative ones, due to rounding, count as 0).
-    slack, duals : arrays
-        Whether a row may stay uncovered, and the multipliers; rows of cuts and counts come last, and are not used.
-    row_ptr, row_cols : int arrays
-        Columns of each row; the enumeration sorts them by reduced cost.
-    blocked : int32 array, shape (N,)
-        Buffer: how many of a column's rows are decided.
-    """
+    """Columns over rows with feasible multipliers, the input of the enumeration."""
 
     cols: NDArray[np.int32]
+    """Rows of each column, (N, S)."""
     names: NDArray[np.int32]
+    """Numbers of the columns in the store, (N,)."""
     weights: NDArray[np.float64]
+    """Weights of the columns, indexed by these numbers."""
     reduced: NDArray[np.float64]
+    """Reduced costs (negative ones, due to rounding, count as 0), (N,)."""
     slack: NDArray[np.bool_]
     duals: NDArray[np.float64]
+    """Multipliers of the rows; those of cuts and counts come last, and are not used."""
     row_ptr: NDArray[np.int64]
     row_cols: NDArray[np.int32]
+    """Columns of each row; the enumeration sorts them by reduced cost."""
     blocked: NDArray[np.int32]
+    """Buffer: how many of a column's rows are decided, (N,)."""
 
 
 class Store(NamedTuple):
@@ -160,27 +149,11 @@ def _keep(store: Store, k: int, weight: float, columns: Ints, count: int, check:
 def enumerate_solutions(
     priced: PricedColumns, top: int, end: int, base: float, wanted: Wanted, check: bool, store: Store
 ) -> Any:
-    """Search rows ``top:end`` for the wanted solutions.
+    """Search rows ``top:end``, whose columns use no other rows, for the wanted solutions, which are added to the store.
 
-    Parameters
-    ----------
-    priced : PricedColumns
-        The columns; ``row_cols`` and ``blocked`` are changed.
-    top, end : int
-        The rows to cover; their columns use no other rows.
-    base : float
-        A solution weighs at least this plus the reduced costs of its columns and uncovered rows.
-    wanted : Wanted
-        Number and limit of the solutions, budget and deadline.
-    check : bool
-        Whether the store may already have some of the solutions.
-    store : Store
-        Solutions found are added.
-
-    Returns
-    -------
-    steps, store
-        Decisions made, ``NOT_COMPLETE`` if the budget or the time did not suffice.
+    A solution weighs at least ``base`` plus the reduced costs of its columns and uncovered rows. ``check``: the store
+    may already have some of them. ``row_cols`` and ``blocked`` are changed. Returns the decisions made,
+    ``NOT_COMPLETE`` if the budget or the time did not suffice, and the store.
     """
     _, names, weights, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     k, budget, deadline = wanted.k, wanted.budget, wanted.deadline

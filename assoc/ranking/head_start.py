@@ -24,14 +24,8 @@ _NODES, _PATIENCE = 100_000_000, 10
 class HeadStart:
     """The exact solver's solution and bound of a packing, found in a share of a run's time.
 
-    Attributes
-    ----------
-    weight : float
-        Weight of the best known solution; the solution is kept as the run's fallback.
-    bound : float
-        Lower bound on all solutions' weights.
-    taken : bool
-        Whether `take` was called.
+    ``weight`` is that of the best known solution, which is kept as the run's fallback, ``bound`` a lower bound on all;
+    ``taken``: `take` was called.
     """
 
     def __init__(self, packing: Packing, run: Run) -> None:

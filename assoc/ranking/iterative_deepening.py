@@ -28,24 +28,16 @@ _TIE = 1e-12
 
 @dataclass(slots=True)
 class Found:
-    """The solutions proved to be the lightest.
-
-    Attributes
-    ----------
-    chosen : list of int32 arrays
-        Columns of each solution, lightest first.
-    rest : float
-        Lower bound on the weights of all other solutions.
-    nodes : int
-        Nodes of branch and bound.
-    known : int32 array or None
-        Columns of the lightest solution found, where none is proved to be the lightest.
-    """
+    """The solutions proved to be the lightest."""
 
     chosen: list[Columns]
+    """Columns of each solution, lightest first."""
     rest: float
+    """Lower bound on the weights of all other solutions."""
     nodes: int = 0
+    """Nodes of branch and bound."""
     known: Columns | None = None
+    """Columns of the lightest solution found, where none is proved to be the lightest."""
 
 
 @dataclass(slots=True)
@@ -58,19 +50,7 @@ class _Lists:
 
 
 class Deepening:
-    """Rounds of growing excess D until k solutions are proved to be the lightest.
-
-    Parameters
-    ----------
-    columns : AllColumns
-        The problem.
-    k : int
-        Solutions wanted.
-    run : Run
-        Clock.
-    ahead : HeadStart
-        Taken before the first branching.
-    """
+    """Rounds of growing excess D until k solutions are proved to be the lightest; ``ahead`` comes before branching."""
 
     def __init__(self, columns: AllColumns, k: int, run: Run, ahead: HeadStart) -> None:
         self._columns = columns
@@ -83,13 +63,7 @@ class Deepening:
         self._known_weight = np.inf
 
     def run(self) -> Found:
-        """Return the k lightest solutions, or as many as are proved when time is over.
-
-        Raises
-        ------
-        InfeasibleError
-            There is no solution.
-        """
+        """Return the k lightest solutions, or those proved when time is over; InfeasibleError if there is none."""
         columns = self._columns
         if self._run.should_stop():
             return Found([], columns.bound)

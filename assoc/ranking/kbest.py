@@ -107,21 +107,14 @@ def _at_rank(solution: Solution, number: int) -> Solution:
 
 @dataclass(frozen=True, slots=True)
 class Ranking:
-    """The k best solutions and a bound on all others.
-
-    Attributes
-    ----------
-    solutions : list of Solution
-        See ``kbest``.
-    rest : float
-        Lower bound on the cost of all other solutions; ``inf`` if there is no other.
-    columns : AllColumns
-        The columns and their prices.
-    """
+    """The k best solutions and a bound on all others."""
 
     solutions: list[Solution]
+    """See ``kbest``."""
     rest: float
+    """Lower bound on the cost of all other solutions; ``inf`` if there is no other."""
     columns: AllColumns
+    """The columns and their prices."""
 
 
 def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
@@ -179,13 +172,7 @@ def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:
 
 
 def checked_k(k: object) -> int:
-    """Return k as an int.
-
-    Raises
-    ------
-    InvalidInputError
-        ``k`` is not a whole number >= 1.
-    """
+    """Return k, a whole number >= 1, as an int."""
     if not isinstance(k, (int, np.integer)) or isinstance(k, bool) or k < 1:
         raise InvalidInputError(f"k: expected a whole number >= 1, got {k!r}")
     return int(k)
@@ -212,10 +199,7 @@ def _in_order(problem: AssignmentProblem, chosen: list[NDArray[np.intp]]) -> lis
 def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
     """Return the greedy solution, which a run on a large problem has already made, with the bound given.
 
-    Raises
-    ------
-    InfeasibleError
-        The greedy choice cannot be completed (possible only without dummies), and no time is left for a search.
+    InfeasibleError if the choice cannot be completed (possible only without dummies), and no time is left for a search.
     """
     prepared = prepare(problem)
     columns = run.fallback if run.fallback is not None else greedy_choice(prepared.packing, run)

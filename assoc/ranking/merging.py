@@ -15,19 +15,8 @@ from assoc.packing.kernels.heap import pop, push
 def merge(start: Ints, weights: Floats, k: int) -> Any:
     """Combine the ranked lists of independent components into the k lightest choices of one of each.
 
-    Parameters
-    ----------
-    start, weights
-        List c is ``weights[start[c]:start[c + 1]]``, ascending and not empty.
-    k : int
-        Combinations wanted.
-
-    Returns
-    -------
-    total : float array, shape (m,), m <= k
-        Their weights, ascending.
-    choice : int32 array, shape (m, C)
-        Index into each component's list.
+    List c is ``weights[start[c]:start[c + 1]]``, ascending and not empty. Returns m <= k weights, ascending, and the
+    index into each component's list, (m, C).
     """
     num_lists = start.size - 1
     total = np.zeros(1)

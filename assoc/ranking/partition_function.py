@@ -46,25 +46,18 @@ _TINY = 1e-280
 
 
 class Terms(NamedTuple):
-    """The terms of a component's product and their logarithms.
-
-    Attributes
-    ----------
-    cols, row_ptr, row_cols
-        Of the component (packing.py).
-    log_weights, weights : float arrays, shape (N,)
-        Of the columns: -a times the reduced cost.
-    log_alone, alone : float arrays, shape (R,)
-        Of leaving a row uncovered; -inf: not allowed.
-    """
+    """The terms of a component's product and their logarithms."""
 
     cols: NDArray[np.int32]
     row_ptr: NDArray[np.int64]
     row_cols: NDArray[np.int32]
+    """With ``cols`` and ``row_ptr`` as in packing.py."""
     log_weights: NDArray[np.float64]
     weights: NDArray[np.float64]
+    """Of the columns: -a times the reduced cost, (N,)."""
     log_alone: NDArray[np.float64]
     alone: NDArray[np.float64]
+    """Of leaving a row uncovered; -inf: not allowed, (R,)."""
 
 
 def log_partition(
@@ -74,20 +67,10 @@ def log_partition(
     deadline: Callable[[], float] = never,
     packing: Packing | None = None,
 ) -> float:
-    """Return an upper bound on ln Z(a).
+    """Return an upper bound on ln Z(a) at inverse temperature a >= 0; 0 counts the solutions.
 
-    Parameters
-    ----------
-    columns : AllColumns
-        The problem.
-    a : float
-        Inverse temperature >= 0; 0 counts the solutions.
-    work : int
-        Largest number of column visits for each component.
-    deadline : callable () -> float
-        Gives the time (`Run.deadline`) after which no component is sharpened: the bound is valid, but weak.
-    packing : Packing, optional
-        ``columns.keep(inf)``, if already computed.
+    ``work`` is the largest number of column visits for each component; after the deadline none is sharpened: the bound
+    is valid, but weak. ``packing`` is ``columns.keep(inf)``, if already computed.
     """
     packing = packing or columns.keep(np.inf)
     log_weights = -a * columns.reduced[packing.origin]

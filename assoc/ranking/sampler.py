@@ -65,17 +65,7 @@ class _Chain(NamedTuple):
 def estimates(columns: AllColumns, starts: list[Ints], run: Run, length: float = 1.0) -> Floats | None:
     """Frequency of each of the N columns in several chains (C, N), which begin with these solutions in turn.
 
-    None without time.
-
-    Parameters
-    ----------
-    columns : AllColumns
-    starts : list of int arrays
-        Columns of feasible solutions.
-    run : Run
-        Its time.
-    length : float, default 1
-        Multiplies the number of moves.
+    ``length`` multiplies the number of moves. None without time.
     """
     problem = _problem(columns)
     rows, num = columns.slack.size, len(columns.weights)

@@ -32,18 +32,12 @@ _LARGE, _SMALL = 1e150, 1e-250
 
 
 class Graph(NamedTuple):
-    """V vertices and K edges, each listed at each of its vertices.
-
-    Attributes
-    ----------
-    ends : int array (K, S)
-        Vertices of each edge; -1 where it has fewer than S.
-    ptr, edge : int64 arrays (V + 1,) and (number of ends,)
-        Vertex v is in the edges ``edge[ptr[v]:ptr[v + 1]]``.
-    """
+    """V vertices and K edges, each listed at each of its vertices."""
 
     ends: Ints
+    """Vertices of each edge, (K, S); -1 where it has fewer than S."""
     ptr: Ints
+    """Vertex v is in the edges ``edge[ptr[v]:ptr[v + 1]]``."""
     edge: Ints
 
 
@@ -226,15 +220,9 @@ def room(steps: Ints) -> int:
 def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone: Floats, buffer: Floats) -> None:
     """Do a planned sweep forwards and backwards: fill in the probabilities of its edges, and of unused vertices.
 
-    Parameters
-    ----------
-    steps : int64 array (N, 3)
-    weights, free : arrays (K,), (V,)
-        Reduced weights of the edges, and of leaving each vertex alone.
-    probability, alone : arrays (K,), (V,)
-        Not a number where the sum of all events is so small that digits are lost.
-    buffer : array
-        Room for ``room(steps)`` numbers. (Given, so that its size tells how much work the call is.)
+    ``steps`` is (N, 3); ``weights`` (K,) and ``free`` (V,) are reduced weights of the edges, and of leaving each vertex
+    alone; ``probability`` (K,) and ``alone`` (V,) are not a number where the sum of all events is so small that digits
+    are lost. ``buffer`` is room for ``room(steps)`` numbers, given so that its size tells how much work the call is.
     """
     size, largest = 1, 1
     for n in range(len(steps)):

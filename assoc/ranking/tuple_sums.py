@@ -27,15 +27,8 @@ WIDEST = 22
 def sums_and_bounds(columns: AllColumns, run: Run, widest: int, recursion: bool) -> tuple[Floats, Floats, Floats]:
     """Estimate and bound the probabilities of the N columns, and that of the R rows to be in none of them.
 
-    Parameters
-    ----------
-    columns : AllColumns
-    run : Run
-        Its time.
-    widest : int
-        Most measurements open at a time.
-    recursion : bool
-        Whether to use the recursion where clusters are too wide; without, bounds are 0 and 1 there.
+    ``widest`` is the most measurements open at a time; where clusters are wider the ``recursion`` is used, or bounds
+    are 0 and 1.
     """
     num = len(columns.weights)
     graph = _graph(columns)

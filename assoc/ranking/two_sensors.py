@@ -14,13 +14,7 @@ from assoc.ranking.murty.murty import Murty
 
 
 def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllColumns, Found]:
-    """Return the columns of a problem with two sensors and its k lightest solutions.
-
-    Raises
-    ------
-    InfeasibleError
-        There is no solution.
-    """
+    """Return the columns of a problem with two sensors and its k lightest solutions; InfeasibleError without any."""
     rows, weights, origin = distinct_columns(problem)
     slack = slack_of(problem)
     n, m = (int(size) for size in problem.sizes)

@@ -60,21 +60,10 @@ def plain_name(name: str) -> str:
 def choose(
     header: Sequence[str], columns: Mapping[str, str], units: Mapping[str, str]
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Find the column and the unit of every meaning.
+    """Find the number of the column, and the unit, of every meaning that the header of a file has.
 
-    Parameters
-    ----------
-    header : sequence of str
-        The names in the file; upper and lower case are the same.
-    columns, units : mapping of str to str
-        Column name and unit by meaning, as given by the user.
-
-    Returns
-    -------
-    columns : dict of str to int
-        Meaning to column number, for the columns that are there.
-    units : dict of str to str
-        The unit of range, bearing and altitude, and the base of codes.
+    Upper and lower case are the same; ``columns`` and ``units`` are what the user gave, by meaning. Units are those of
+    range, bearing and altitude, and the base of codes.
     """
     for meaning in columns:
         if meaning not in COLUMNS:
@@ -116,17 +105,7 @@ def choose(
 def seconds(text: str) -> tuple[float, bool]:
     """Read a time: seconds, a clock time h:mm:ss, or a date with a time (UTC by default): ISO 8601, or day.month.year.
 
-    Returns
-    -------
-    value : float
-        Seconds.
-    clock : bool
-        Whether it is a clock time, which begins anew at midnight.
-
-    Raises
-    ------
-    ValueError
-        It is none of these.
+    Returns seconds, and whether it is a clock time, which begins anew at midnight; ValueError for anything else.
     """
     match = _CLOCK.match(text)
     if match:

@@ -19,22 +19,12 @@ def placed(
 ) -> tuple[Recording, Radar2D]:
     """Put a radar that stands at its own origin, with its plots, where it stands in a scene.
 
-    Parameters
-    ----------
-    recording : Recording
-        Bearings from true north at the radar.
-    radar : Radar2D
-        Of `assoc.recordings.radar_of`.
-    place, origin : tuple of latitude, longitude, height
-        Of the radar and of the scene's frame, radians and metres.
-    height_noise : float, optional
-        Standard deviation of the heights by Mode C, metres; without it the radar measures none.
+    Bearings are from true north at the radar; ``place`` and ``origin`` (of the scene's frame) are latitude, longitude,
+    radians, and height, metres. ``height_noise`` is the standard deviation of the heights by Mode C, metres; without it
+    the radar measures none.
 
-    Returns
-    -------
-    recording, radar
-        Azimuths in the scene's plane: where the radar stands, north and up have other directions than at the origin.
-        Of plots without an altitude, that of the others (their median) is assumed.
+    Azimuths are then in the scene's plane: where the radar stands, north and up have other directions than at the
+    origin. Of plots without an altitude, that of the others (their median) is assumed.
     """
     latitude, longitude, height = (np.array([value]) for value in place)
     here = east_north_up(latitude, longitude, height, origin)[0]

@@ -94,15 +94,7 @@ def read_plots(
 class PlotReader:
     """The plots of a file in parts, in the order of time, so that memory does not grow with the file.
 
-    Parameters
-    ----------
-    path, columns, units, max_disorder, garbled_codes
-        As for `read_plots`.
-
-    Attributes
-    ----------
-    notes : dict of str to int
-        As those of a `Recording`; complete after the last part.
+    Arguments are as for `read_plots`, ``notes`` as those of a `Recording`; they are complete after the last part.
     """
 
     def __init__(

@@ -22,20 +22,8 @@ _MOST_STEPS = 400_000
 class Survey:
     """Counts over the plots of a recording, in parts or at once.
 
-    Attributes
-    ----------
-    count : int
-        Number of plots.
-    first, last : float
-        Times, seconds.
-    farthest : float
-        Metres.
-    ranges, bearings : array
-        Their distinct values, metres and radians; empty if there are too many.
-    sectors : int array (72,)
-        Plots by bearing.
-    high : int
-        Plots with an altitude that is not garbled.
+    Number of plots, first and last time (s), farthest range (m); distinct ``ranges`` (m) and ``bearings`` (rad), empty
+    if there are too many; plots by bearing, ``sectors`` (72,); ``high``: plots with an altitude that is not garbled.
     """
 
     def __init__(self, parts: Iterable[Recording] = ()) -> None:
@@ -83,17 +71,7 @@ def _distinct(known: Array, values: Array, count: int) -> Array:
 
 
 class StoredPlots:
-    """Plots in a temporary file, which ends with the process, and their `Survey`; read again part by part.
-
-    Parameters
-    ----------
-    parts : iterable of Recording
-        In the order of time.
-
-    Attributes
-    ----------
-    survey : Survey
-    """
+    """Plots, given in parts in the order of time, in a temporary file; read again part by part; with their `Survey`."""
 
     def __init__(self, parts: Iterable[Recording]) -> None:
         self.survey = Survey()

@@ -129,16 +129,9 @@ def clustering_time_window(
 def windows_in_turn(
     parts: Iterable[Recording], survey: Survey, rotation: float, *, by: Literal["antenna", "time"] = "antenna"
 ) -> Iterator[Window]:
-    """The windows of `clustering_time_window`, one after the other, from a recording in parts.
+    """The windows of `clustering_time_window`, one after the other, from a recording in parts, in the order of time.
 
-    Parameters
-    ----------
-    parts : iterable of Recording
-        In the order of time.
-    survey : Survey
-        Of all of them.
-    rotation, by
-        As for `clustering_time_window`.
+    The survey is that of all of them.
     """
     if not is_number(rotation, 0.0) or rotation == 0:
         raise InvalidInputError(f"rotation: expected seconds > 0, got {rotation!r}")

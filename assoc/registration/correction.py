@@ -43,24 +43,11 @@ def corrected_measurements(
     late: Array | float = 0.0,
     positions: Array | None = None,
 ) -> Array:
-    """Measurements without the sensor's biases, moved to the time wanted.
+    """Measurements (n, d) without the sensor's biases, moved to the time wanted.
 
-    Parameters
-    ----------
-    sensor : Sensor
-    measured : array (n, d)
-    biases : mapping of component to value
-        Metres, radians, seconds; of a gain, metres per metre of the stated range.
-    velocities : array (n, 3), optional
-        Of the targets, m/s; NaN where unknown: the clock's bias then stays.
-    late : array (n,) or float
-        Time wanted less time of each measurement, seconds.
-    positions : array (n, 3), optional
-        Of the targets at the time wanted, metres; without them bearings are not moved.
-
-    Returns
-    -------
-    array (n, d)
+    Biases are in metres, radians, seconds; of a gain, metres per metre of the stated range. ``velocities`` (n, 3), m/s,
+    are NaN where unknown: the clock's bias then stays. ``late`` is the time wanted less that of each measurement,
+    seconds; ``positions`` (n, 3) of the targets are those at that time; without them bearings are not moved.
     """
     z = np.array(measured, dtype=np.float64)
     carried = isinstance(sensor, PositionSensor) and sensor.platform is not None

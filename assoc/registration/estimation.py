@@ -37,22 +37,14 @@ _EARLY_PLOTS = 4_000
 
 @dataclass(frozen=True)
 class Estimate:
-    """Biases after some rounds.
-
-    Attributes
-    ----------
-    biases : array (n,)
-    covariance : array (n, n)
-    information : array (n, n)
-        That of the measurements alone.
-    chosen : Chosen
-        The tuples of the last round.
-    """
+    """Biases (n,) after some rounds, and their covariance (n, n)."""
 
     biases: Array
     covariance: Array
     information: Array
+    """That of the measurements alone, (n, n)."""
     chosen: Chosen
+    """The tuples of the last round."""
 
 
 @dataclass(frozen=True)

@@ -126,21 +126,10 @@ def _weigh_bias(W: Array, H: Array, d: int, column: Array, left: Array, WB: Arra
 
 @njit
 def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, limits: Array) -> NormalEquations:
-    """Sum up the information of tuples on biases.
+    """Sum up the information of tuples on the n biases in ``terms``.
 
-    Parameters
-    ----------
-    sensors : SensorArrays
-    tuples : Tuples
-    terms : TermArrays
-        The n biases.
-    limits : array (3 S + 1,)
-        By degrees of freedom: chi-square values up to which a tuple counts fully; above, its weight is
-        limit / chi-square, so that outliers count no more than a tuple at the limit.
-
-    Returns
-    -------
-    NormalEquations
+    ``limits`` (3 S + 1,) are, by degrees of freedom, chi-square values up to which a tuple counts fully; above, its
+    weight is limit / chi-square, so that outliers count no more than a tuple at the limit.
     """
     total, count, n = len(tuples.z), len(sensors.dim), len(terms.sensor)
     information, scatter, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)

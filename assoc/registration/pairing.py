@@ -34,42 +34,27 @@ _USUAL_SPEED = 250.0
 
 @dataclass(frozen=True)
 class Epoch:
-    """Measurements that are associated together: those of one scan, or of a turn of the slowest antenna.
-
-    Attributes
-    ----------
-    time : float
-        Of the positions, seconds.
-    measurements : sequence over sensors of arrays (n, d)
-    times : sequence over sensors of arrays (n,)
-        Time stamp of each measurement.
-    velocities : sequence over sensors of arrays (n, 3), or None
-        Of their targets, NaN where unknown; None: not needed.
-    """
+    """Measurements that are associated together: those of one scan, or of a turn of the slowest antenna."""
 
     time: float
+    """Of the positions, seconds."""
     measurements: Sequence[Array]
     times: Sequence[Array]
+    """Time stamp of each measurement."""
     velocities: Sequence[Array] | None = None
+    """Of their targets, (n, 3), NaN where unknown; None: not needed."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """Tuples that were taken for targets.
-
-    Attributes
-    ----------
-    epoch : int array (T,)
-        Number of the `Epoch` of each.
-    rows : int array (T, S)
-        Number of each sensor's measurement there, from 0, or -1.
-    skipped : int
-        Epochs with too many candidate tuples.
-    """
+    """Tuples that were taken for targets."""
 
     epoch: Array
+    """Number of the `Epoch` of each, (T,)."""
     rows: Array
+    """Number of each sensor's measurement there, from 0, or -1, (T, S)."""
     skipped: int = 0
+    """Epochs with too many candidate tuples."""
 
     def __len__(self) -> int:
         return len(self.epoch)
@@ -159,16 +144,9 @@ def choose_tuples(scene: Scene, parameters: RegistrationParameters) -> Chosen:
 
 
 def tuple_arrays(scene: Scene, epochs: Sequence[Epoch], chosen: Chosen, clocks: Array) -> Tuples:
-    """Measurements, positions and velocities of chosen tuples of a corrected scene.
+    """Measurements, positions and velocities of chosen tuples of a scene that `corrected_scene` has made.
 
-    Parameters
-    ----------
-    scene : Scene
-        As `corrected_scene` makes it.
-    epochs : sequence of Epochs
-    chosen : Chosen
-    clocks : array (S,)
-        Biases of the sensors' clocks, seconds.
+    ``clocks`` (S,) are the biases of the sensors' clocks, seconds.
     """
     total, count = chosen.rows.shape
     z, seen = np.zeros((total, count, 3)), chosen.rows >= 0

@@ -59,13 +59,7 @@ def owners(sensors: Sequence[Sensor]) -> list[int]:
 
 
 def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) -> tuple[Term, ...]:
-    """List the biases of sensors that parameters name.
-
-    Raises
-    ------
-    InvalidInputError
-        A reference is no sensor, or nothing is left to estimate.
-    """
+    """List the biases of sensors that parameters name; refused if a reference is no sensor, or nothing is left."""
     known = [{sensor.name, str(s + 1)} - {""} for s, sensor in enumerate(sensors)]
     for name in parameters.reference:
         if not any(name in names for names in known):

@@ -25,19 +25,9 @@ _ACCELERATION = 20.0
 
 
 def target_velocities(sensor: Sensor, times: Sequence[Array], measurements: Sequence[Array]) -> list[Array]:
-    """Velocity of the target of each measurement of a sensor.
+    """Velocity of the target of each measurement of a sensor, (n, 3) for each epoch, m/s.
 
-    Parameters
-    ----------
-    sensor : Sensor
-    times : sequence over epochs of arrays (n,)
-        Seconds.
-    measurements : sequence over epochs of arrays (n, d)
-
-    Returns
-    -------
-    list over epochs of arrays (n, 3)
-        m/s, NaN where unknown, as from a platform; the vertical speed is 0 for sensors that leave the height open.
+    NaN where unknown, as from a platform; the vertical speed is 0 for sensors that leave the height open.
     """
     unknown = [np.full((len(z), 3), np.nan) for z in measurements]
     if isinstance(sensor, BearingSensor) or sensor.platform is not None or len(measurements) < 2:

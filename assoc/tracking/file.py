@@ -63,10 +63,7 @@ def file_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Arr
 def restore(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> TrackerState:
     """Read a state saved by a tracker with these settings; `state`, any of its states, gives the arrays' types.
 
-    Raises
-    ------
-    InvalidInputError
-        The file is not a saved tracker, or damaged, of another version, or of a tracker with other settings.
+    Refused is a file that is not a saved tracker, or damaged, of another version, or of other settings.
     """
     own = file_arrays(settings, state)
     spec = {name: Field(_KINDS[value.dtype.kind], value.ndim) for name, value in own.items()}

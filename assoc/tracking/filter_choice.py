@@ -30,20 +30,12 @@ _TURN_NOISE = 0.03
 
 
 def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3, *, unscented: bool = False) -> Filter[Any]:
-    """Interacting multiple models: nearly constant velocity, and manoeuvres.
+    """Interacting multiple models: nearly constant velocity, and manoeuvres with process noise, m/s^1.5.
 
     The quiet model has a tenth of the process noise. Each model changes to the other within four seconds with
-    probability 0.1, and lasts for 36 seconds on average.
-
-    Parameters
-    ----------
-    noise : float
-        Process noise of the manoeuvring model, m/s^1.5.
-    dimensions : int
-        2 or 3.
-    unscented : bool
-        Unscented filters instead of extended ones, for `open_heights`: linearised at a height that is kilometres off,
-        slant ranges seem to determine it better than they do.
+    probability 0.1, and lasts for 36 seconds on average. Unscented filters instead of extended ones are for
+    `open_heights`: linearised at a height that is kilometres off, slant ranges seem to determine it better than they
+    do.
     """
     kind: Any = filters.UnscentedKalmanFilter if unscented else filters.ExtendedKalmanFilter
     modes: list[Any] = [
@@ -149,28 +141,12 @@ def make_filter(
     pace: float = 1.0,
     region: Array | None = None,
 ) -> Filter[Any]:
-    """Make a filter with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
+    """Make one of the `FILTERS` with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
 
-    Parameters
-    ----------
-    name : str
-        One of `FILTERS`.
-    sensors : sequence of Sensor
-        They decide, with the region, whether states are `planar`.
-    process_noise : float, optional
-        Root of the acceleration's spectral density, m/s^1.5; for imm-cv that of its manoeuvring model, for imm and
-        fuzzy the acceleration, m/s^2. Default: `manoeuvre_noise` of the pace for imm-cv, 30 for all others.
-    seed : int
-        Seed of the ensemble filter's noise.
-    pace : float
-        Seconds from scan to scan.
-    region : array (3, 2), optional
-        Bounds of x, y, z of the targets, metres.
-
-    Raises
-    ------
-    InvalidInputError
-        There is no such filter, or it does not suit the sensors.
+    The sensors decide, with the region (3, 2), whether states are `planar`. `process_noise` is the root of the
+    acceleration's spectral density, m/s^1.5; for imm-cv that of its manoeuvring model, for imm and fuzzy the
+    acceleration, m/s^2. Default: `manoeuvre_noise` of the pace (seconds from scan to scan) for imm-cv, 30 for all
+    others. The seed is that of the ensemble filter's noise. A filter that does not suit the sensors is refused.
     """
     if name not in FILTERS:
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")

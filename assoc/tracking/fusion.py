@@ -375,15 +375,8 @@ class _Grown(NamedTuple):
 def intersected(mean: Array, covariance: Array, used: Array) -> tuple[Array, Array]:
     """Covariance intersection of states with unknown dependence, by the weights of least determinant.
 
-    Parameters
-    ----------
-    mean, covariance : arrays (G, S, n), (G, S, n, n)
-    used : bool array (G, S)
-        Which states there are; at least one of each group.
-
-    Returns
-    -------
-    mean (G, n), covariance (G, n, n)
+    G groups of S means (n,) and covariances, of which those in `used` (G, S) are there, at least one of each; one state
+    of each.
     """
     inverse = np.linalg.inv(covariance)
     weights = used / np.maximum(used.sum(axis=1, keepdims=True), 1)

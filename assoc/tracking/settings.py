@@ -30,29 +30,13 @@ _CLIMB = 0.1
 
 @dataclass(frozen=True, eq=False)
 class TrackerSettings:
-    """Settings of a tracker; see `assoc.tracking.Tracker` for those that users give.
-
-    Attributes
-    ----------
-    name : str
-        Name of the tracker.
-    method : Method
-        How scans are associated, with its own settings; see `assoc.tracking.associate.method`.
-    place : Scene
-        Sensors and region.
-    registration : OnlineRegistration or None
-        Its state before the first scan.
-    adapt : bool
-        Whether to estimate what is declared of the sensors, and the manoeuvres.
-    by_range : array (S, B) or None
-        Detection probabilities by bands of range, relative to the sensors'; see `assoc.costs.tracks.scores.ScoreTerms`.
-    nursery : TrackerSettings or None
-        Of the nursery, if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
-    """
+    """Settings of a tracker; see `assoc.tracking.Tracker` for those that users give."""
 
     name: str
     method: Any
+    """How scans are associated, with its own settings; see `assoc.tracking.associate.method`."""
     place: Scene
+    """Sensors and region."""
     filter: Filter[Any]
     solver: str
     solver_parameters: dict[str, Any]
@@ -63,10 +47,14 @@ class TrackerSettings:
     gate_probability: float
     max_tuples: int
     registration: OnlineRegistration | None
+    """Its state before the first scan."""
     identity: IdentityParameters | None
     adapt: bool = False
+    """Whether to estimate what is declared of the sensors, and the manoeuvres."""
     by_range: Any = None
+    """(S, B): see `assoc.costs.tracks.scores.ScoreTerms`."""
     nursery: TrackerSettings | None = None
+    """If all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):

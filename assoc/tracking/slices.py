@@ -82,17 +82,7 @@ class SliceTracks(NamedTuple):
 
 
 class TrackSlice:
-    """Tracks slices, in any process.
-
-    Parameters
-    ----------
-    tracker : Tracker
-        Before its first step.
-    confirmed : bool
-        Whether only confirmed tracks are listed.
-    origin : tuple of latitude, longitude, height, optional
-        As of `TrackTable`.
-    """
+    """Tracks slices, in any process, by a tracker before its first step; `origin` is that of `TrackTable`."""
 
     def __init__(self, tracker: Tracker, confirmed: bool, origin: Origin | None = None) -> None:
         self._tracker, self._confirmed, self._first = tracker, confirmed, tracker.state

@@ -62,17 +62,9 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
 
 
 def advance(settings: TrackerSettings, state: TrackerState, scan: Scan) -> tuple[TrackerState, Step]:
-    """Process a checked scan.
+    """Process a checked scan: the tracker's state after it, and its result.
 
-    Returns
-    -------
-    state, step
-        The tracker's state after it, and its result.
-
-    Raises
-    ------
-    InvalidInputError
-        Times and measurements lead to numbers out of range.
+    InvalidInputError where times and measurements lead to numbers out of range.
     """
     settings = settings.at(scan.time)
     progress = Progress(settings, _warned(settings, state, scan), scan, Work(settings, state))

@@ -39,13 +39,7 @@ TARGETS = {
 
 
 def target_kind(name: str, scene: Scene | None, make: Callable[..., Any]) -> TargetKind:
-    """The kind of this name; "auto" is the one with which the trackers of `make` track a scene's first scans best.
-
-    Raises
-    ------
-    InvalidInputError
-        There is no such kind, or no scene for "auto".
-    """
+    """The kind of this name; "auto" is the one with which the trackers of `make` track a scene's first scans best."""
     if name != "auto":
         if name not in TARGETS:
             raise InvalidInputError(f"targets: unknown name {name!r}; known: {', '.join(TARGETS)}, auto")

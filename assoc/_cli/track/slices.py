@@ -36,24 +36,15 @@ _WHOLE = ("track_id", "hits", "parent", "hits_1", "hits_2", "sizes", "early", "t
 
 @dataclass
 class Slices:
-    """Slices of a recording, done or not.
-
-    Attributes
-    ----------
-    folder : str
-        Where those that are done are.
-    spans : dict of int to (float, float)
-        First and last time of each, seconds.
-    failed : dict of int to str
-        Why some could not be tracked.
-    lost : str
-        Why others were not.
-    """
+    """Slices of a recording, done (in `folder`) or not."""
 
     folder: str
     spans: dict[int, tuple[float, float]] = field(default_factory=dict)
+    """First and last time of each, seconds."""
     failed: dict[int, str] = field(default_factory=dict)
+    """Why some could not be tracked."""
     lost: str = ""
+    """Why others were not."""
 
     def run(
         self, work: TrackSlice, windows: Iterable[Window], seconds: float, early: float, places: Mapping[str, Any]

@@ -23,25 +23,8 @@ _TURN = 2.0 * math.pi
 def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
     """Pairs of tracks and measurements that may pass a chi-square gate: all that pass, and some more.
 
-    Parameters
-    ----------
-    expected : Expected
-        Expected measurements of each track, (B, d), and their covariances (B, d, d).
-    measurements : array (M, d)
-    angular : tuple of bool
-        Which components are angles.
-    gate : float
-        Squared Mahalanobis distance.
-
-    Returns
-    -------
-    track, measurement : int arrays (K,)
-        Ordered by track, then measurement.
-
-    Raises
-    ------
-    LimitExceededError
-        More than `MOST_PAIRS` pairs.
+    ``expected`` are (B, d) and (B, d, d), measurements (M, d), the gate a squared Mahalanobis distance. Returns tracks
+    and measurements, int (K,), ordered by both. LimitExceededError for more than `MOST_PAIRS`.
     """
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
@@ -144,19 +127,8 @@ def near_both(
 ) -> tuple[Array, Array]:
     """Pairs of partial tuples and measurements that may pass a chi-square gate; at most one more than ``most``.
 
-    Parameters
-    ----------
-    expected : Expected
-        As of `near_pairs`, of each partial tuple.
-    track : int array (B,)
-        The track of each partial tuple.
-    near : Near
-        Only measurements near the track are looked at.
-
-    Returns
-    -------
-    tuple, measurement : int arrays (K,)
-        Ordered by tuple, then measurement.
+    ``expected`` is as for `near_pairs`, of each of B partial tuples, whose tracks are ``track`` (B,); only measurements
+    that are ``near`` the track are tried. Returns tuples and measurements, int (K,), ordered by both.
     """
     arrays = track, near.first, near.found, np.require(measurements, requirements=("C", "W")), _turning(angular)
     return _near_both((expected.mean, _reach(expected.covariance, gate)), *arrays, most)

@@ -90,30 +90,11 @@ class TimedTuples(NamedTuple):
 class TimedScan:
     """T tracks and the measurements since, each with its own time.
 
-    Parameters
-    ----------
-    filter : Filter
-    states
-        T states.
-    before : float or array (T,)
-        Their times, none after the measurements', seconds.
-    measurements, times : sequences over sensors of arrays (n_s, d_s), (n_s,)
-    sensors : sequence of Sensor
-    positions : Positions
-    start : callable (positions, covariances, lag) -> states
-        Begins tracks at a time `lag` (n,) seconds before that of the positions.
-    sectors : array (S, 2) or None
-        See `assoc.Scene`.
-    gate_probability : float
-    end : float
-        Time of the scan, seconds; no measurement is after it.
-    evidence : callable (track, sensor, measurement) -> (log ratio, possible), optional
-        Further evidence on pairs of a track and a measurement (K,): a log likelihood ratio, and whether they may belong
-        together.
-    paths : sequence over sensors of Platform or None, optional
-        Of sensors that moved since the last scan; they are given as they stand at its end.
-    clutter : sequence over sensors of arrays (n_s,), optional
-        See `assoc.scene.Scan`.
+    `before`, a number or (T,), are the times of the states, none after the measurements', and `end` is that of the
+    scan, seconds. `start` (positions, covariances, lag) begins tracks at a time `lag` (n,) seconds before that of the
+    positions. `evidence` (track, sensor, measurement) adds to pairs of a track and a measurement (K,) a log likelihood
+    ratio, and whether they may belong together. `paths` are those of sensors that moved since the last scan; they are
+    given as they stand at its end. `sectors` and `clutter`: see `assoc.Scene`, `assoc.scene.Scan`.
     """
 
     def __init__(
@@ -155,13 +136,9 @@ class TimedScan:
         ).reshape(rows.shape)
 
     def follow(self, track: Array, rows: Array) -> Followed:
-        """Filter tuples in the order of their measurements' times.
+        """Filter tuples of measurements (M, S) in the order of their times.
 
-        Parameters
-        ----------
-        track : int array (M,)
-            Row of the track, -1 for a new target, which has a measurement that may begin a track.
-        rows : int array (M, S)
+        `track` (M,) is the row of the track, -1 for a new target, which has a measurement that may begin a track.
         """
         stamps = self.stamps(rows)
         turn = np.argsort(stamps, axis=1, kind="stable")
@@ -260,14 +237,8 @@ class TimedScan:
     def grown(self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array) -> Grown:
         """Partial tuples with one more measurement, of sensor s, that passes all gates.
 
-        Parameters
-        ----------
-        s : int
-        done : sequence of int
-            Sensors whose measurements may have begun new targets.
-        anchor, track, rows : arrays (M,), (M,), (M, S)
-            Of the partial tuples: the track, or the measurement (as anchor) that began a new target; row of the track
-            or -1; measurements.
+        Measurements of the sensors in `done` may have begun new targets. Of the partial tuples: `anchor` (M,), the
+        track, or the measurement that began a new target; `track` (M,), the row of the track or -1; `rows` (M, S).
         """
         near_anchor, near_found = self.near(s)
         for r in done:
@@ -370,20 +341,7 @@ def _put(states: Any, rows: Array, new: Any) -> Any:
 def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TimedTuples:
     """Candidate tuples of tracks, or of new targets, and one measurement or none of each sensor.
 
-    Parameters
-    ----------
-    scan : TimedScan
-    terms : ScoreTerms
-        Of its sensors.
-    looked : bool array (A, S)
-        `TimedScan.looked`; a sensor that did not cover a target has not missed it.
-    max_tuples : int
-        The most tuples that may be made.
-
-    Raises
-    ------
-    LimitExceededError
-        There are more tuples than `max_tuples`.
+    LimitExceededError for more than `max_tuples`.
     """
     count, width = len(scan.states), len(scan.sensors)
     track, anchor = np.arange(count), np.arange(count)

@@ -57,27 +57,13 @@ def score_terms(sensors: Sequence[Sensor], by_range: Array | None = None) -> Sco
 
 
 def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
-    """Logarithm of the birth density integrated over the positions of a new target.
+    """Logarithm of the birth density integrated over the positions of new targets, (K,): at most ln(birth rate).
 
-    The cost of a tuple is taken at the most likely position. A target is born anywhere in the region with density
-    birth rate / volume; integrated over the position (Laplace's approximation, exact for linear sensors) the
-    likelihood is the one at the best position times this. Along each axis, given the axes before it, the integral is
-    at most the region's width: heights that nothing measures may vary more than the region is high. Directions in
-    which the region has no width are left out.
-
-    Parameters
-    ----------
-    covariances : array (K, 3, 3)
-        Of the fused positions, m^2.
-    region : array (3, 2)
-        Lower and upper bounds of x, y, z, m.
-    birth_rate : float
-        Mean number of new targets in a scan, all over the region.
-
-    Returns
-    -------
-    array (K,)
-        To be added to the score, at most ln(birth rate).
+    The cost of a tuple is taken at the most likely position. A target is born anywhere in the region (3, 2) with
+    density birth rate (in a scan) / volume; integrated over the position, of covariance (K, 3, 3) (Laplace's
+    approximation, exact for linear sensors), the likelihood is the one at the best position times this. Along each
+    axis, given the axes before it, the integral is at most the region's width: heights that nothing measures may vary
+    more than the region is high. Directions in which the region has no width are left out.
     """
     covariances, region = (np.require(one, requirements=("C", "W")) for one in (covariances, region))
     return np.asarray(_log_birth(covariances, region, math.log(birth_rate)))
@@ -110,23 +96,14 @@ def _log_birth(covariances: Array, region: Array, log_rate: float) -> Array:
 
 
 def doubted_gain(score: Array, gain: Array) -> Array:
-    """Gain of a scan in a hypothesis' log probability if a track may be false: ln(1 - p + p exp(gain)).
+    """Gain of a scan in a hypothesis' log probability if a track may be false: ln(1 - p + p exp(gain)), (T,).
 
-    The score is the log odds that the track is a target, with probability p. If it is false, its measurements are
-    false alarms, its misses are expected, and the scan adds nothing. So a tentative track takes measurements that no
-    other track needs, but does not outbid a certain one.
+    The score before the scan is the log odds that the track is a target, with probability p. If it is false, its
+    measurements are false alarms, its misses are expected, and the scan adds nothing. So a tentative track takes
+    measurements that no other track needs, but does not outbid a certain one.
 
-    Parameters
-    ----------
-    score : array (T,)
-        Before the scan.
-    gain : array (T,)
-        What the scan adds to the score.
-
-    References
-    ----------
-    D. Musicki, R. Evans, Joint integrated probabilistic data association: JIPDA, IEEE Trans. Aerospace and
-    Electronic Systems 40, 2004.
+    D. Musicki, R. Evans, Joint integrated probabilistic data association: JIPDA, IEEE Trans. Aerospace and Electronic
+    Systems 40, 2004.
     """
     odds = -score
     return np.asarray(np.logaddexp(odds, gain) - np.logaddexp(odds, 0.0))
@@ -135,15 +112,7 @@ def doubted_gain(score: Array, gain: Array) -> Array:
 def sequential_threshold(false_probability: float, missed_probability: float = 0.0) -> float:
     """Score at which a track is confirmed: ln((1 - beta) / alpha), the upper limit of Wald's sequential test.
 
-    Parameters
-    ----------
-    false_probability : float
-        alpha, the share of false tracks that may be confirmed.
-    missed_probability : float
-        beta, the share of true tracks that may be given up.
-
-    References
-    ----------
-    A. Wald, Sequential Analysis, 1947, section 3.2.
+    alpha is the share of false tracks that may be confirmed, beta that of true tracks that may be given up. A. Wald,
+    Sequential Analysis, 1947, section 3.2.
     """
     return math.log((1.0 - missed_probability) / false_probability)

@@ -103,33 +103,11 @@ def grow_track_tuples(
     gate_probability: float,
     max_tuples: int = MAX_TUPLES,
 ) -> TrackTuples:
-    """Candidate tuples of predicted tracks and one measurement or none of each sensor.
+    """Candidate tuples, ordered by track, of T predicted tracks and one measurement or none of each sensor.
 
-    Parameters
-    ----------
-    filter : Filter
-    states
-        The T predicted states.
-    measurements : sequence over sensors of arrays (n_s, d_s)
-    sensors : sequence of Sensor
-    terms : ScoreTerms
-        Of these sensors.
-    misses : array (T, S)
-        Score of a miss of each track by each sensor: ln(1 - P_d), less where it cannot see the track.
-    gate_probability : float
-        Share of true measurements that a gate lets through.
-    max_tuples : int
-        The most tuples that may be made.
-
-    Returns
-    -------
-    TrackTuples
-        Ordered by track. A tuple that costs as much as its track all missed is left out: false alarms cost 0.
-
-    Raises
-    ------
-    LimitExceededError
-        There are more tuples than `max_tuples`.
+    `misses` (T, S) is the score of a miss of each track by each sensor: ln(1 - P_d), less where it cannot see the
+    track. A tuple that costs as much as its track all missed is left out: false alarms cost 0. LimitExceededError for
+    more than `max_tuples`.
     """
     count = len(states)
     growth = _Growth(

@@ -38,55 +38,34 @@ _WHOLE = 1e-6
 
 
 class Splitting(NamedTuple):
-    """When a search splits its root.
-
-    Attributes
-    ----------
-    after : int
-        Nodes after which a split is tried, and again whenever they have doubled; most searches end before that.
-    raised : float
-        The share of the distance to the goal by which a split must raise the bound.
-    pays : float
-        The share of its tree at which a leaf is split.
-    """
+    """When a search splits its root."""
 
     after: int = 40
+    """Nodes after which a split is tried, again whenever they have doubled; most searches end before that."""
     raised: float = 0.02
+    """The share of the distance to the goal by which a split must raise the bound."""
     pays: float = 0.9
+    """The share of its tree at which a leaf is split."""
 
 
 USUAL = Splitting()
 
 
 class Leaf(NamedTuple):
-    """A part of the solutions.
-
-    Attributes
-    ----------
-    root : Root
-        Its linear program, and the start of its search.
-    bound : float
-        Lower bound on the solutions of this part.
-    """
+    """A part of the solutions: its linear program with the start of its search, and a lower bound on its solutions."""
 
     root: Root
     bound: float
 
 
 class _Counts(NamedTuple):
-    """Counts and the range of each.
-
-    Attributes
-    ----------
-    times : int32 array, shape (C, N)
-        Contribution of each column to each count.
-    least, most : int64 arrays, shape (C,)
-        The ranges, both ends included.
-    """
+    """Counts and the range of each."""
 
     times: NDArray[np.int32]
+    """Contribution of each column to each count, (C, N)."""
     least: NDArray[np.int64]
     most: NDArray[np.int64]
+    """Both ends of the ranges are included, (C,)."""
 
     def within(self, k: int, least: int, most: int) -> _Counts:
         """The same counts with another range of count k."""
@@ -114,28 +93,11 @@ class _Part(NamedTuple):
 def split_on_counts(
     packing: Packing, root: Root, cutoff: float, goal: float, deadline: float, pays: float = USUAL.pays
 ) -> list[Leaf]:
-    """Split the solutions below the cutoff into parts, each with its own program.
+    """Split the solutions of a component that weigh less than the cutoff into parts, each with its own program.
 
-    Parameters
-    ----------
-    packing : Packing
-        One component.
-    root : Root
-        The root of all solutions.
-    cutoff : float
-        Only solutions of less weight are searched for.
-    goal : float
-        The bound to prove first; a split pays if it makes that easier.
-    deadline : float
-        Time limit (clock.py).
-    pays : float
-        See `Splitting`.
-
-    Returns
-    -------
-    list of Leaf
-        The leaves whose bound is below the cutoff; their programs differ only in the right-hand sides. If no split
-        pays, one leaf of all solutions, with the program unchanged.
+    ``goal`` is the bound to prove first; a split pays (`Splitting`) if it makes that easier. Returns the leaves whose
+    bound is below the cutoff; their programs differ only in the right-hand sides. If no split pays, one leaf of all
+    solutions, with the program unchanged.
     """
     everything = _counts_of(packing)
     counted = _Counted(root, everything, cutoff, deadline)
@@ -158,16 +120,9 @@ def split_on_counts(
 
 
 def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None) -> tuple[OpenNodes, Work]:
-    """The open nodes of a leaf, at first only its root, and the buffers of its search.
+    """The open nodes of a leaf, at first its root, and the buffers of its search: those of the last where they fit.
 
-    Parameters
-    ----------
-    packing : Packing
-    leaf : Leaf
-    given_up : float
-        Lower bound on the nodes given up so far.
-    work : Work or None
-        The buffers of the search before, reused where they fit.
+    ``given_up`` is a lower bound on the nodes given up so far.
     """
     root, program = leaf.root, leaf.root.program
     nodes = OpenNodes(root)

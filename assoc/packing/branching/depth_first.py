@@ -22,24 +22,16 @@ from assoc.packing.simplex.program import Allowed
 
 
 class Limits(NamedTuple):
-    """Which solutions to search for, and when to stop.
-
-    Attributes
-    ----------
-    tolerance : float
-        Least improvement on the incumbent.
-    aim : float
-        Weight below which solutions must be.
-    nodes : int
-        Most nodes.
-    deadline : float
-        Time limit by the kernels' clock (clock.py).
-    """
+    """Which solutions to search for, and when to stop."""
 
     tolerance: float
+    """Least improvement on the incumbent."""
     aim: float
+    """Weight below which solutions must be."""
     nodes: int
+    """Most nodes."""
     deadline: float
+    """Time limit by the kernels' clock (clock.py)."""
 
 
 @inner_njit

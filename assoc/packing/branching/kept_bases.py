@@ -23,24 +23,16 @@ _BASES, _ELEMENTS = 8, 4_000_000
 
 
 class KeptBases(NamedTuple):
-    """Up to ``K`` bases of ``m`` rows; a new one replaces the oldest.
-
-    Attributes
-    ----------
-    variable : int32 array, shape (K, m)
-        As in `Basis`; -1 in unused entries.
-    inverse : float array, shape (K, m, m)
-    norms : float array, shape (K, m)
-    age : int64 array, shape (K,)
-    latest : int64 array, shape (1,)
-        Index of the latest one.
-    """
+    """Up to ``K`` bases of ``m`` rows; a new one replaces the oldest."""
 
     variable: NDArray[np.int32]
+    """As in `Basis`; -1 in unused entries, (K, m)."""
     inverse: Floats
+    """(K, m, m); norms (K, m), ages (K,)."""
     norms: Floats
     age: NDArray[np.int64]
     latest: NDArray[np.int64]
+    """Index of the latest one, (1,)."""
 
 
 def kept_memory(rows: float) -> float:

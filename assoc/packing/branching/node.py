@@ -31,44 +31,30 @@ from assoc.packing.simplex.program import (
 
 
 class Work(NamedTuple):
-    """Data and buffers of the search of one packing.
-
-    Attributes
-    ----------
-    cols : int32 array, shape (N, S)
-        Rows of the packing's columns.
-    weights : float array, shape (N,)
-        Weights of the columns; those of the program may be smaller.
-    program : Program
-    basis : Basis
-        Basis of the current node.
-    node : Allowed
-        What the current node allows; ``active`` is a buffer.
-    trials : Trials
-    kept : KeptBases
-        Bases of the latest branchings.
-    duals : float array, shape (rows of the program,)
-        Multipliers of the node's bound, feasible.
-    key : float array, shape (N,)
-        Buffer for the sort keys of columns.
-    found, trial : int32 arrays, shape (R,)
-        Columns of the best solution found, and a buffer for another one.
-    limit : float
-        More than any solution weighs.
-    """
+    """Data and buffers of the search of one packing."""
 
     cols: NDArray[np.int32]
+    """Rows of the packing's columns, (N, S)."""
     weights: Floats
+    """Weights of the columns, (N,); those of the program may be smaller."""
     program: Program
     basis: Basis
+    """Basis of the current node."""
     node: Allowed
+    """What the current node allows; ``active`` is a buffer."""
     trials: Trials
     kept: KeptBases
+    """Bases of the latest branchings."""
     duals: Floats
+    """Multipliers of the node's bound, feasible, (rows of the program,)."""
     key: Floats
+    """Buffer for the sort keys of columns, (N,)."""
     found: NDArray[np.int32]
+    """Columns of the best solution found, (R,)."""
     trial: NDArray[np.int32]
+    """Buffer for another one."""
     limit: float
+    """More than any solution weighs."""
 
 
 def work_memory(rows: float, columns: int, sensors: int) -> float:

@@ -36,19 +36,11 @@ class Stack(NamedTuple):
 
 
 class OpenNodes:
-    """A stack of nodes in arrays that grow; at first only the root.
+    """A stack of ``count`` nodes in arrays that grow; at first only the root.
 
-    Attributes
-    ----------
-    arrays : Stack
-        ``arena``: columns of all open nodes; ``first``, ``size``: node t has the columns
-        ``arena[first[t]:first[t] + size[t]]``; ``slack``, shape (depth, rows of the program): which may stay uncovered;
-        ``bound``: lower bound of the node; ``variable``, ``duals``, shape (depth, rows of the program): its basis and
-        multipliers.
-    count : int
-        Number of open nodes.
-    given_up : float
-        Lower bound of the nodes given up for want of memory; ``inf`` if none was.
+    Node t has the columns ``arena[first[t]:first[t] + size[t]]``; ``slack``, ``variable`` and ``duals``, of shape
+    (depth, rows of the program), are the rows that may stay uncovered, its basis and its multipliers. ``given_up`` is a
+    lower bound of the nodes given up for want of memory; ``inf`` if none was.
     """
 
     def __init__(self, root: Root) -> None:

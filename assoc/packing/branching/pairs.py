@@ -43,33 +43,24 @@ NEITHER, TOGETHER, APART = -1, -2, -3
 
 
 class Trials(NamedTuple):
-    """Buffers for trials of pairs, and the gains so far.
-
-    Attributes
-    ----------
-    mass : float array, shape (R, R)
-        Buffer: sum of the LP values of the columns with both rows; 0 between calls.
-    gain, tried : float32 array, shape (2, R, R), and uint8 array of the same shape
-        Mean gain of the bound for each unit of LP value that a side forbids, and the number of trials; side 0: apart,
-        1: together.
-    pairs, values : int64 array, shape (K, 2), float array, shape (K,)
-        The fractional pairs, the most fractional first, and their mass.
-    trial : Trial
-        The trial of a side.
-    side : Allowed
-        What that side allows; ``active`` is a buffer.
-    duals : float array, shape (rows of the program,)
-        Multipliers of that side.
-    """
+    """Buffers for trials of pairs, and the gains so far."""
 
     mass: NDArray[np.float64]
+    """Buffer: sum of the LP values of the columns with both rows, (R, R); 0 between calls."""
     gain: NDArray[np.float32]
+    """Mean gain of the bound for each unit of LP value that a side (0: apart, 1: together) forbids, (2, R, R)."""
     tried: NDArray[np.uint8]
+    """Number of trials, (2, R, R)."""
     pairs: NDArray[np.int64]
+    """The fractional pairs, the most fractional first, (K, 2)."""
     values: Floats
+    """Their mass, (K,)."""
     trial: Trial
+    """The trial of a side."""
     side: Allowed
+    """What that side allows; ``active`` is a buffer."""
     duals: Floats
+    """Multipliers of that side, (rows of the program,)."""
 
 
 def new_trials(program: Program, num_rows: int) -> Trials:
@@ -182,13 +173,9 @@ def _try(
 def decide(
     program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
-    """Choose one of the fractional pairs.
+    """Choose one of the fractional pairs, by its index.
 
-    Returns
-    -------
-    int, int
-        The index of the pair, and `NEITHER` (branch), or `TOGETHER` or `APART`: the only side that can have a better
-        solution.
+    With it comes `NEITHER` (branch), or `TOGETHER` or `APART`: the only side that can have a better solution.
     """
     bound = bound_of(program, basis)
     gap = effort.cutoff - bound

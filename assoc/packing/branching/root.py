@@ -25,25 +25,17 @@ _LOWERED = 5e-4
 
 
 class Root(NamedTuple):
-    """A linear program and the start of its search.
-
-    Attributes
-    ----------
-    program : Program
-        Rows of measurements, then cuts.
-    slack : bool array, shape (rows of the program,)
-        Whether a row may stay uncovered; true for all cuts.
-    variable : int32 array, duals : float array, shape (rows of the program,)
-        A basis and its multipliers.
-    sets : bool array, shape (cuts, R)
-        The odd sets of rows that define the cuts.
-    """
+    """A linear program and the start of its search."""
 
     program: Program
+    """Rows of measurements, then cuts."""
     slack: NDArray[np.bool_]
+    """Whether a row of the program may stay uncovered; true for all cuts."""
     variable: NDArray[np.int32]
+    """A basis, and its multipliers (``duals``)."""
     duals: Floats
     sets: NDArray[np.bool_]
+    """The odd sets of rows that define the cuts, (cuts, R)."""
 
 
 def plain_root(packing: Packing, duals: Floats) -> Root:
@@ -69,18 +61,9 @@ def _lowered(packing: Packing) -> Floats:
 
 
 def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: float) -> Root:
-    """The root with cuts, added while they raise its bound; cuts that are not tight are removed.
+    """The root of a component with cuts, added while they raise its bound; cuts that are not tight are removed.
 
-    Parameters
-    ----------
-    packing : Packing
-        One component.
-    duals : float array, shape (R,)
-        Multipliers to start from.
-    cutoff : float
-        Only solutions of less weight are searched for.
-    deadline : float
-        Time limit (clock.py).
+    Multipliers (R,) to start from; only solutions that weigh less than the cutoff are searched for.
     """
     rows = packing.num_rows
     root = plain_root(packing, duals)

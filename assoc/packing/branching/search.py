@@ -38,28 +38,12 @@ _FARTHER = 3.0
 
 
 class BranchAndBound:
-    """A depth-first search that can be stopped and continued.
+    """A depth-first search, of one component or several as one, that can be stopped and continued.
 
-    Parameters
-    ----------
-    packing : Packing
-        One component or several; the search treats them as one.
-    duals : float array, shape (R,)
-        Multipliers to start from.
-    incumbent : float
-        Only solutions of less weight are searched for; ``inf`` if none is known.
-    tolerance : float
-        Least improvement that counts.
-    deadline : callable () -> float
-        Time limit by the kernels' clock (`Run.deadline`); the current node then stays open.
-    memory_allows : callable, optional
-        Whether the search may allocate this many bytes more (`Run.memory_allows`).
-    to_the_end : bool
-        Whether to search to the end: with cuts at the root, and in passes.
-    floor : float
-        A known lower bound; a search to the end starts with an aim above it.
-    splitting : Splitting
-        When a search to the end splits its root on counts.
+    Only solutions that weigh less than the incumbent (``inf``: none is known) by the tolerance are searched for, from
+    multipliers (R,). At the deadline (`Run.deadline`) the current node stays open. A search ``to_the_end`` has cuts at
+    the root, goes in passes, the first with an aim above ``floor``, a known lower bound, and splits its root on counts
+    (``splitting``).
     """
 
     def __init__(

@@ -22,21 +22,14 @@ from assoc.packing.simplex.remainder import Remainder, remainder_of
 
 
 class Part(NamedTuple):
-    """The part of the solutions to search, for which the program was just solved.
-
-    Attributes
-    ----------
-    columns : bool array, shape (N,)
-        Columns that may be used.
-    slack : bool array, shape (R,)
-        Rows that may stay uncovered.
-    fixed : int array
-        Columns that must be used; ``columns`` has no other column that shares a row with them.
-    """
+    """The part of the solutions to search, for which the program was just solved."""
 
     columns: NDArray[np.bool_]
+    """Columns that may be used, (N,)."""
     slack: NDArray[np.bool_]
+    """Rows that may stay uncovered, (R,)."""
     fixed: NDArray[np.int64]
+    """Columns that must be used; ``columns`` has no other column that shares a row with them."""
 
 
 def short_memory(packing: Packing, rows: float) -> float:
@@ -47,22 +40,9 @@ def short_memory(packing: Packing, rows: float) -> float:
 def search_shortly(
     packing: Packing, linear: LinearProgram, part: Part, cutoff: float, limits: Limits
 ) -> tuple[NDArray[np.int64], bool]:
-    """Search the part for which a program was just solved.
+    """Search the part for which a program, perhaps with cuts, was just solved, for solutions lighter than the cutoff.
 
-    Parameters
-    ----------
-    packing : Packing
-    linear : LinearProgram
-        The packing's program, perhaps with cuts.
-    part : Part
-    cutoff : float
-        Only solutions of less weight are searched for.
-    limits : Limits
-
-    Returns
-    -------
-    int array, bool
-        Columns of the best solution found (empty: none was found), and whether the search was exhaustive.
+    Returns the columns of the best solution found (empty: none was found), and whether the search was exhaustive.
     """
     wait_for_kernels()
     nothing = np.zeros(0, dtype=np.int64)

@@ -30,48 +30,33 @@ _LONG = 1e10
 
 
 class Basis(NamedTuple):
-    """A basis and the values derived from it; changed in place. Each of its ``m`` positions has one variable.
-
-    Attributes
-    ----------
-    variable : int32 array, shape (m,)
-        Variable at each position: column j as j, the slack of row r as n + r, the anchor of row r as n + m + r.
-    free : bool array, shape (m,)
-        Whether the variable at each position may be above 0 (dual.py: `note_free`).
-    place, slack_place : int32 arrays, shapes (n,) and (m,)
-        Position of each column and each slack; -1 if not in the basis.
-    inverse : float array, shape (m, m)
-        The inverse, transposed: row r has the coordinates of the r-th unit vector, by position.
-    norms : float array, shape (m,)
-        Squared length of each row of the inverse (a column of this array): weights of the steepest edge.
-    values : float array, shape (m,)
-        Values of the variables in the basis.
-    duals : float array, shape (m,)
-        Multipliers.
-    anchors : float array, shape (m,)
-        Costs of the anchors.
-    row, column, sums : float arrays, shape (m,)
-        Buffers for a row and a column of the tableau, and for sums over all positions.
-    pricing : Pricing
-        The allowed columns, and their reduced costs.
-    age : int64 array, shape (1,)
-        Pivots since the last refactorisation.
-    """
+    """A basis and the values derived from it; changed in place. Each of its ``m`` positions has one variable."""
 
     variable: NDArray[np.int32]
+    """Variable at each position: column j as j, the slack of row r as n + r, its anchor as n + m + r, (m,)."""
     free: NDArray[np.bool_]
+    """Whether the variable at each position may be above 0 (dual.py: `note_free`), (m,)."""
     place: NDArray[np.int32]
+    """Position of each column, (n,); -1 if not in the basis."""
     slack_place: NDArray[np.int32]
+    """The same of each slack, (m,)."""
     inverse: NDArray[np.float64]
+    """The inverse, transposed: row r has the coordinates of the r-th unit vector, by position, (m, m)."""
     norms: Floats
+    """Squared length of each row of the inverse (a column of this array): weights of the steepest edge, (m,)."""
     values: Floats
+    """Values of the variables in the basis, (m,)."""
     duals: Floats
     anchors: Floats
+    """Costs of the anchors, (m,)."""
     row: Floats
+    """Buffers, (m,), for a row and a column of the tableau, and for sums over all positions."""
     column: Floats
     sums: Floats
     pricing: Pricing
+    """The allowed columns, and their reduced costs."""
     age: NDArray[np.int64]
+    """Pivots since the last refactorisation, (1,)."""
 
 
 def new_basis(program: Program) -> Basis:

@@ -42,21 +42,9 @@ _COMMON = 0.7
 
 @njit
 def odd_sets(cols: Ints, basis: Basis, num_rows: int) -> Any:
-    """Odd sets of rows whose cuts the program's solution violates, the most violated first.
+    """Odd sets of rows whose cuts the program's solution violates, the most violated first, (K, num_rows).
 
-    Parameters
-    ----------
-    cols : int32 array, shape (N, S)
-        Rows of the columns.
-    basis : Basis
-        An optimal basis.
-    num_rows : int
-        Rows of measurements; cuts follow them.
-
-    Returns
-    -------
-    bool array, shape (K, num_rows)
-        The sets.
+    The basis is optimal; ``num_rows`` are the rows of measurements, which cuts follow.
     """
     num, num_sensors = cols.shape
     members = np.empty(basis.variable.size, np.int32)

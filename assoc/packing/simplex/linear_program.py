@@ -41,46 +41,26 @@ _LACK = 1e-11
 
 @dataclass(frozen=True, slots=True)
 class Relaxation:
-    """The state of a linear program when solving ended.
-
-    Attributes
-    ----------
-    status : int
-        ``OPTIMAL``; ``CUT``: the bound has reached the cutoff; ``INFEASIBLE``; ``STOPPED`` before the end.
-    bound : float
-        Lower bound on the allowed solutions, whatever the status; ``inf`` if there is none.
-    duals, reduced : float arrays, shapes (R,) and (N,)
-        Multipliers that give the bound (<= 0 on rows that may stay uncovered; those of further rows come last), and
-        the reduced costs that they give: at least 0 on the columns that are allowed, but for rounding.
-    primal : float array, shape (N,)
-        LP value of each column; optimal where the status is ``OPTIMAL``.
-    exchanges : int
-        Steps of the simplex method.
-    """
+    """The state of a linear program when solving ended."""
 
     status: int
+    """``OPTIMAL``; ``CUT``: the bound has reached the cutoff; ``INFEASIBLE``; ``STOPPED`` before the end."""
     bound: float
+    """Lower bound on the allowed solutions, whatever the status; ``inf`` if there is none."""
     duals: Floats
+    """Multipliers that give the bound, (R,), <= 0 on rows that may stay uncovered; further rows come last."""
     reduced: Floats
+    """Their reduced costs, (N,): at least 0 on the columns that are allowed, but for rounding."""
     primal: Floats
+    """LP value of each column, (N,); optimal where the status is ``OPTIMAL``."""
     exchanges: int
+    """Steps of the simplex method."""
 
 
 class LinearProgram:
     """The linear program of a packing with a basis that is kept from one call to the next.
 
-    Parameters
-    ----------
-    packing : Packing
-        One component, or several as one program. Memory grows with the square of its rows.
-
-    Attributes
-    ----------
-    program : Program
-    slack : bool array, shape (rows of the program,)
-        Whether a row may stay uncovered.
-    basis : Basis
-        The basis at the end of the last call.
+    Several components are one program. Memory grows with the square of the rows.
     """
 
     def __init__(self, packing: Packing) -> None:
@@ -93,17 +73,7 @@ class LinearProgram:
 
     @classmethod
     def extended(cls, packing: Packing, program: Program, slack: NDArray[np.bool_], basis: Basis) -> LinearProgram:
-        """The program of a packing with further rows and columns after those of the packing, warm-started from a basis.
-
-        Parameters
-        ----------
-        packing : Packing
-        program : Program
-        slack : bool array, shape (rows of the program,)
-            Whether a row may stay uncovered.
-        basis : Basis
-            Taken over, and changed in place.
-        """
+        """The program of a packing with more rows and columns after its own, from a basis that is changed in place."""
         self = cls.__new__(cls)
         self._packing, self.program, self.slack, self.basis = packing, program, slack, basis
         self._marked, self._begun = None, True
@@ -126,23 +96,11 @@ class LinearProgram:
         exchanges: int | None = None,
         deadline: float = np.inf,
     ) -> Relaxation:
-        """Solve the program for the allowed columns and slack.
+        """Solve the program for the allowed columns (N,) and slack (R,), by default all and those of the packing.
 
-        Parameters
-        ----------
-        columns : bool array, shape (N,), optional
-            Columns that may be used; by default all.
-        slack : bool array, shape (R,), optional
-            Rows that may stay uncovered; by default those of the packing. The only allowed column of a row that must be
-            covered is fixed.
-        duals : float array, shape (R,), optional
-            Multipliers to start from; they need not be feasible. By default the basis of the last call is the start.
-        cutoff : float
-            Stop when the bound has reached it.
-        exchanges : int, optional
-            Most pivots; by default unlimited.
-        deadline : float
-            Time limit (clock.py).
+        The only allowed column of a row that must be covered is fixed. Multipliers (R,) to start from need not be
+        feasible; by default the basis of the last call is the start. It ends when the bound has reached the cutoff,
+        after so many exchanges (pivots), or at the deadline (clock.py).
         """
         packing, program, basis = self._packing, self.program, self.basis
         mask = np.ones(program.weights.size, dtype=np.bool_)

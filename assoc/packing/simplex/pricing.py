@@ -18,42 +18,29 @@ from assoc.packing.simplex.program import Allowed, Program
 
 
 class Pricing(NamedTuple):
-    """Buffers for ``n`` columns, of which ``listed[0]`` are listed, followed by the ``m`` slacks.
-
-    Attributes
-    ----------
-    column : int32 array, shape (n,)
-        The column at each position.
-    position : int32 array, shape (n,)
-        The position of each listed column; undefined for others.
-    codes : uint32 array, shape (max(width, 3), n)
-        Rows of the columns, by position, padded with the number of rows m.
-    extra_position, extra_row : uint32 arrays
-        The ``listed[1]`` further rows of columns, those of cuts.
-    reduced : float array, shape (n + m,)
-        Reduced costs by position; ``inf`` for columns that must not enter.
-    entries, ratios : float arrays, shape (n + m,)
-        A row of the tableau, by position, and the step of the multipliers at which each reduced cost is 0; then the
-        entries that may be pivots. Scores of the basis positions, when the leaving variable is chosen.
-    bits : int64 array, shape (n + m,)
-        The memory of ``ratios``, read as whole numbers (kernels/extremes.py).
-    terms : float array, shape (m + 1,)
-        Buffer for the terms of sums, by row; the last is 0.
-    listed : int64 array, shape (2,)
-        Numbers of columns and of further rows listed.
-    """
+    """Buffers for ``n`` columns, of which ``listed[0]`` are listed, followed by the ``m`` slacks."""
 
     column: NDArray[np.int32]
+    """The column at each position, (n,)."""
     position: NDArray[np.int32]
+    """The position of each listed column, (n,); undefined for others."""
     codes: NDArray[np.uint32]
+    """Rows of the columns, by position, padded with the number of rows m, (max(width, 3), n)."""
     extra_position: NDArray[np.uint32]
+    """The ``listed[1]`` further rows of columns, those of cuts."""
     extra_row: NDArray[np.uint32]
     reduced: Floats
+    """Reduced costs by position, (n + m,); ``inf`` for columns that must not enter."""
     entries: Floats
+    """A row of the tableau, by position, (n + m,)."""
     ratios: Floats
+    """Steps of the multipliers to reduced costs 0, then possible pivots; else scores of basis positions."""
     bits: NDArray[np.int64]
+    """The memory of ``ratios``, read as whole numbers (kernels/extremes.py)."""
     terms: Floats
+    """Buffer for the terms of sums, by row, (m + 1,); the last is 0."""
     listed: NDArray[np.int64]
+    """Numbers of columns and of further rows listed, (2,)."""
 
 
 def new_pricing(program: Program) -> Pricing:

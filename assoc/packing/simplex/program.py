@@ -20,45 +20,28 @@ from assoc.packing.packing import PackingArrays
 
 
 class Program(NamedTuple):
-    """A linear program; n columns, m rows.
-
-    Attributes
-    ----------
-    weights : float array, shape (n,)
-        Cost of each column.
-    start : int64 array, shape (n + 1,)
-        Column j has the rows ``rows[start[j]:start[j + 1]]``.
-    rows : int32 array
-        Rows of the columns, concatenated.
-    sides : float array, shape (m,)
-        Right-hand sides b, whole numbers.
-    width : int
-        Most rows of measurements that a column has; they come first, then those of cuts.
-    """
+    """A linear program; n columns, m rows."""
 
     weights: Floats
+    """Cost of each column, (n,)."""
     start: NDArray[np.int64]
+    """Column j has the rows ``rows[start[j]:start[j + 1]]``."""
     rows: NDArray[np.int32]
     sides: Floats
+    """Right-hand sides b, whole numbers, (m,)."""
     width: int
+    """Most rows of measurements that a column has; they come first, then those of cuts."""
 
 
 class Allowed(NamedTuple):
-    """The columns and slacks that a solution may use.
-
-    Attributes
-    ----------
-    active : int32 array
-        Columns that may be used, ascending.
-    columns : bool array, shape (n,)
-        Mask of the same columns.
-    slack : bool array, shape (m,)
-        Rows that may stay uncovered.
-    """
+    """The columns and slacks that a solution may use."""
 
     active: NDArray[np.int32]
+    """Columns that may be used, ascending."""
     columns: NDArray[np.bool_]
+    """Mask of the same columns, (n,)."""
     slack: NDArray[np.bool_]
+    """Rows that may stay uncovered, (m,)."""
 
 
 def program_of(packing: PackingArrays) -> Program:

@@ -20,43 +20,27 @@ from assoc.packing.simplex.program import Program
 
 
 class Remainder(NamedTuple):
-    """The remainder of a program; n columns, m rows.
-
-    Attributes
-    ----------
-    program : Program
-    slack : bool array, shape (m,)
-        Whether a row may stay uncovered.
-    columns, rows : int64 arrays, shapes (n,) and (m,)
-        Their indices in the whole program, ascending.
-    variable : int32 array, duals : float array, shape (m,)
-        A basis and its multipliers. Where a variable is repeated the basis has an anchor.
-    """
+    """The remainder of a program; n columns, m rows."""
 
     program: Program
     slack: NDArray[np.bool_]
+    """Whether a row may stay uncovered, (m,)."""
     columns: NDArray[np.int64]
+    """Indices in the whole program, ascending, (n,)."""
     rows: NDArray[np.int64]
+    """The same of the rows, (m,)."""
     variable: NDArray[np.int32]
+    """A basis, (m,), and its multipliers. Where a variable is repeated the basis has an anchor."""
     duals: Floats
 
 
 def remainder_of(
     program: Program, basis: Basis, fixed: NDArray[np.int64], columns: NDArray[np.int64], slack: NDArray[np.bool_]
 ) -> Remainder | None:
-    """Return the remainder; None if the fixed columns do not fit together.
+    """Return the remainder of a program with a basis; None if the fixed columns do not fit together.
 
-    Parameters
-    ----------
-    program : Program
-    basis : Basis
-        A basis of this program.
-    fixed : int array
-        Columns that must be used.
-    columns : int array
-        Other columns that may be used, ascending; none shares a measurement with a fixed one.
-    slack : bool array, shape (rows of the program,)
-        Rows that may stay uncovered.
+    Other ``columns`` that may be used are ascending, and share no measurement with a fixed one; ``slack``: rows that
+    may stay uncovered.
     """
     sides = program.sides - np.bincount(_entries(program, fixed)[0], minlength=program.sides.size)
     if sides.min(initial=0.0) < 0.0:

@@ -42,32 +42,21 @@ _LEAST = 1e-4
 
 
 class Trial(NamedTuple):
-    """A basis up to ``K`` pivots from another one.
-
-    Attributes
-    ----------
-    basis : Basis
-        The basis, with an empty inverse.
-    reduced : float array, shape (n,)
-        Reduced costs at the other basis, by position.
-    rows : float array, shape (m, m)
-        The other basis's inverse by rows; that basis stores it by columns.
-    etas : float array, shape (K, m)
-        Effect of each pivot on the coordinates of a vector: minus the entering column over the pivot element, and 1
-        over the pivot element at the pivot's position.
-    pivots : int32 array, shape (K,)
-        The position of each pivot.
-    factors, shares : float array, shape (m,), int32 array, shape (K + 1,)
-        Buffers: the rows of the other basis's inverse that combine to one of this basis, and their factors (else 0).
-    """
+    """A basis, without inverse, up to ``K`` pivots from another one."""
 
     basis: Basis
     reduced: Floats
+    """Reduced costs at the other basis, by position, (n,)."""
     rows: NDArray[np.float64]
+    """The other basis's inverse by rows, (m, m); that basis stores it by columns."""
     etas: NDArray[np.float64]
+    """Of each pivot minus the entering column over the pivot element, and at its position 1 over it, (K, m)."""
     pivots: NDArray[np.int32]
+    """The position of each pivot, (K,)."""
     factors: Floats
+    """Buffer: factors (else 0) of the other inverse's rows that combine to one of this basis, (m,)."""
     shares: NDArray[np.int32]
+    """Buffer: which rows these are, (K + 1,)."""
 
 
 def new_trial(program: Program, exchanges: int) -> Trial:

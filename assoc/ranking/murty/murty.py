@@ -45,18 +45,10 @@ from assoc.ranking.murty.children import clear, make_node, may_stay_alone, open_
 
 
 class Murty:
-    """A ranking that can be stopped and continued.
+    """A ranking of k solutions that can be stopped and continued.
 
-    Parameters
-    ----------
-    rows, columns : int32 arrays, shape (E,)
-        Row and column of each edge; at most one edge between two.
-    costs : float array, shape (E,)
-        Cost of each edge.
-    row_alone, column_alone : bool arrays, shapes (R,) and (C,)
-        Whether a row or column may stay unmatched (at no cost).
-    k : int
-        Solutions wanted.
+    Rows, columns and costs are those of each edge, (E,), at most one between two; ``row_alone`` (R,) and
+    ``column_alone`` (C,) say which may stay unmatched (at no cost).
     """
 
     def __init__(

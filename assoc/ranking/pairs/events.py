@@ -46,16 +46,9 @@ def pair_probabilities(
 ) -> PairIntervals:
     """Sum over all joint events: sets of pairs that use each member of either list at most once.
 
-    Parameters
-    ----------
-    first, second : int arrays (K,)
-        The two members of each pair, counted from 0; pairs must be distinct.
-    log_weight : array (K,)
-        Logarithm of the factor that a pair contributes to an event's weight; finite.
-    sizes : (int, int)
-        Lengths of the lists.
-    states : int
-        Largest size of the table of partial events; where a cluster would need more, pairs are left out.
+    ``first`` and ``second`` (K,) are the members of each pair, counted from 0; pairs are distinct, and ``sizes`` the
+    lengths of the lists. ``log_weight`` (K,), finite, is the logarithm of the factor that a pair contributes to an
+    event's weight. ``states`` limits the table of partial events; where a cluster would need more, pairs are left out.
     """
     if not len(first):
         return PairIntervals(*np.zeros((3, 0)))

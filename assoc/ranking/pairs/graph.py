@@ -11,27 +11,18 @@ from assoc.ranking.sweep import Graph
 
 
 class PairGraph(NamedTuple):
-    """V vertices, those of the first list first, and K edges, each listed twice: once for each end.
-
-    Attributes
-    ----------
-    ends : int64 array (K, 2)
-        Vertices of each edge.
-    ptr : int64 array (V + 1,)
-        Vertex v has the edge ends ``ptr[v]:ptr[v + 1]``.
-    edge : int64 array (2 K,)
-        Edge of each edge end.
-    mate : int64 array (2 K,)
-        Index of the edge's other end.
-    graph : Graph
-        The first three, as sweeps take them.
-    """
+    """V vertices, those of the first list first, and K edges, each listed twice: once for each end."""
 
     ends: Ints
+    """Vertices of each edge, (K, 2)."""
     ptr: Ints
+    """Vertex v has the edge ends ``ptr[v]:ptr[v + 1]``."""
     edge: Ints
+    """Edge of each edge end, (2 K,)."""
     mate: Ints
+    """Index of the edge's other end, (2 K,)."""
     graph: Graph
+    """The first three, as sweeps take them."""
 
 
 def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph:

@@ -153,12 +153,8 @@ def _any_of(graph: PairGraph, vertices: Ints, wanted: NDArray[np.bool_]) -> bool
 def log_dropped(graph: PairGraph, log_weight: Floats, kept: Array, beliefs: Floats) -> tuple[Floats, Floats]:
     """Summarise the edges that are not kept, at both of their ends.
 
-    Returns
-    -------
-    log_free : array (V,)
-        ln(1 + sum of weight times belief), of each vertex over its edges that are not kept.
-    log_part : array (2 K,)
-        The terms of these sums, -inf for edges that are kept.
+    Returns ln(1 + sum of weight times belief) of each vertex over its edges that are not kept, (V,), and the terms of
+    these sums, (2 K,), -inf for edges that are kept.
     """
     part = np.where(kept[graph.edge], -np.inf, log_weight[graph.edge] + beliefs[graph.mate])
     free = np.zeros(graph.ptr.size - 1)

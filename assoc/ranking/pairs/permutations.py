@@ -30,14 +30,8 @@ def without_permutations(
 ) -> Floats:
     """Probability of each pair when each set of detected tracks and used measurements has only its best permutation.
 
-    Parameters
-    ----------
-    first, second, log_weight, sizes
-        As for `pair_probabilities`.
-    probability : array (K,)
-        Of each pair among all joint events.
-    states : int
-        Largest number of sets in a cluster. Where there would be more, the least likely pairs are left as they are.
+    Pairs are as for `pair_probabilities`, ``probability`` (K,) theirs among all joint events. Where a cluster would
+    have more than ``states`` sets, the least likely pairs are left as they are.
     """
     share = np.array(probability, dtype=np.float64)
     # without a measurement in the gates of two tracks nothing can be permuted

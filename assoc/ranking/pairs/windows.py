@@ -65,21 +65,10 @@ def window_bounds(
     run: Run,
     widths: tuple[int, ...] = WIDTHS,
 ) -> tuple[Floats, Floats, Floats]:
-    """Estimate and bound the probabilities of K pairs, and that of each of the V = n1 + n2 members to be in none.
+    """Estimate and bounds, (K + V,), of the probabilities of K pairs, and of each of V = n1 + n2 members to be in none.
 
-    Parameters
-    ----------
-    first, second, log_weight, sizes
-        As for `assoc.ranking.pairs.events.pair_probabilities`.
-    run : Run
-        Its time; what there is no time for has wider bounds.
-    widths : tuple of int
-        Most open vertices of a sweep over a cluster, and over windows, one round each.
-
-    Returns
-    -------
-    estimate, lower, upper : arrays (K + V,)
-        Of the pairs, and of the members of the first list and of the second.
+    Pairs are as for `assoc.ranking.pairs.events.pair_probabilities`; ``widths`` are the most open vertices of a sweep
+    over a cluster, and over windows, one round each. What there is no time for has wider bounds.
     """
     num, vertices = len(first), sum(sizes)
     estimate, bounds = np.zeros(num + vertices), np.repeat([[0.0], [1.0]], num + vertices, axis=1)

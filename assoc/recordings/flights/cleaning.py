@@ -28,14 +28,9 @@ _NEIGHBOURS, _FEWEST, _ROUNDS = 4, 3, 6
 
 
 def clean(reports: Reports) -> tuple[Reports, dict[str, int]]:
-    """Leave out repeated and impossible positions, and correct altitudes.
+    """Leave out repeated and impossible positions, and correct altitudes; also says what was cleaned, and how often.
 
-    Returns
-    -------
-    reports : Reports
-        At the times of their positions, where known.
-    notes : dict of str to int
-        What was cleaned, and how often.
+    Reports are then at the times of their positions, where known.
     """
     known = ~np.isnan(reports.updated) & (reports.updated <= reports.time)
     fresh = replace(reports, time=np.where(known, reports.updated, reports.time)).rows(~_repeats(reports))

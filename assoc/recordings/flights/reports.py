@@ -52,28 +52,19 @@ _LIMITS = {"latitude": 90.0, "longitude": 360.0, "altitude": 1e6, "time": 1e12}
 
 @dataclass(frozen=True, eq=False)
 class Reports:
-    """Reports of targets, sorted by target and time, n of them.
-
-    Attributes
-    ----------
-    time : array (n,)
-        Seconds.
-    target : int array (n,)
-    latitude, longitude, height : arrays (n,)
-        Radians, metres.
-    velocity : array (n, 3)
-        East, north, up at the target's position, m/s; NaN where unknown.
-    updated : array (n,)
-        When each position was received, seconds; NaN where unknown.
-    """
+    """Reports of targets, sorted by target and time, n of them."""
 
     time: Array
+    """Seconds."""
     target: Array
     latitude: Array
+    """Radians, as the longitude; the height is in metres."""
     longitude: Array
     height: Array
     velocity: Array
+    """East, north, up at the target's position, (n, 3), m/s; NaN where unknown."""
     updated: Array
+    """When each position was received, seconds; NaN where unknown."""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -92,38 +83,15 @@ class Reports:
 def read_flight_reports(
     path: str, named: Mapping[str, str | None], altitude_unit: str = "m", speed_unit: str = "m/s"
 ) -> tuple[Reports, dict[int, str], dict[str, int]]:
-    """Read a file; rows without time, identity or position are left out and counted.
+    """Read a CSV or .parquet file; rows without time, identity or position are left out and counted.
 
-    Parameters
-    ----------
-    path : str
-        A CSV file, or a Parquet file whose name ends in .parquet.
-    named : mapping of str to str or None
-        Columns by meaning (`COLUMNS`), where they are not the usual ones.
-    altitude_unit : str
-        One of `ALTITUDE_UNITS`.
-    speed_unit : str
-        One of `SPEED_UNITS`: "m/s", or "kt" for speeds in knots and climbs in feet per minute.
+    ``named`` are columns by meaning (`COLUMNS`), where they are not the usual ones. Units are of `ALTITUDE_UNITS` and
+    `SPEED_UNITS`: "m/s", or "kt" for speeds in knots and climbs in feet per minute. Returns the reports, the names of
+    targets by number, and which rows were left out, and how many.
 
-    Returns
-    -------
-    reports : Reports
-    names : dict of int to str
-        Names of the targets by number.
-    notes : dict of str to int
-        Which rows were left out, and how many.
-
-    Raises
-    ------
-    InvalidInputError
-        The file or a column is missing, or a value is not a number; the message begins with the file.
-    MissingExtraError
-        A Parquet file, and pyarrow is not installed.
-
-    Warns
-    -----
-    AssocWarning
-        Altitudes too high for aircraft, as when feet are read as metres.
+    InvalidInputError, beginning with the file: it or a column is missing, or a value is not a number.
+    MissingExtraError: pyarrow is not installed. Warns of altitudes too high for aircraft, as when feet are read as
+    metres.
     """
     import pandas as pd
 
@@ -249,13 +217,7 @@ def _read_parquet(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFr
 
 
 def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]) -> dict[str, str]:
-    """Return the column of each meaning; a name may be missing.
-
-    Raises
-    ------
-    InvalidInputError
-        A column is missing, or has two meanings.
-    """
+    """Return the column of each meaning; a name may be missing, any other is refused, as one with two meanings."""
     chosen: dict[str, str] = {}
     for meaning, usual in COLUMNS.items():
         wanted = named.get(meaning)

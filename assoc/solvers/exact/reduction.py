@@ -50,51 +50,36 @@ _SMALL = 8000
 
 
 class _State(NamedTuple):
-    """The open part: its packing, and the origin of its columns and rows.
-
-    Attributes
-    ----------
-    packing : PackingArrays
-    origin, rows : int32 arrays, shapes (N,) and (R,)
-        Indices of columns and rows in the whole packing.
-    smooth, hard : float arrays, shape (R,)
-        Multipliers of the smoothed ascent, and the feasible ones of the best bounds.
-    owner : int32 array, shape (R,)
-        The best cover of each component that has one.
-    weight, bound, temperature : float arrays, shape (C,)
-        For each component: weight of its best cover (``inf``: none), best bound, temperature.
-    """
+    """The open part: its packing, and the origin of its columns and rows."""
 
     packing: PackingArrays
     origin: NDArray[np.int32]
+    """Indices of columns in the whole packing, (N,)."""
     rows: NDArray[np.int32]
+    """The same of rows, (R,)."""
     smooth: Floats
+    """Multipliers of the smoothed ascent, (R,)."""
     hard: Floats
+    """The feasible ones of the best bounds, (R,)."""
     owner: NDArray[np.int32]
+    """The best cover of each component that has one, (R,)."""
     weight: Floats
+    """Weight of each component's best cover (``inf``: none), (C,)."""
     bound: Floats
     temperature: Floats
 
 
 class _Closed(NamedTuple):
-    """The closed part, filled step by step.
-
-    Attributes
-    ----------
-    counts : int64 array, shape (3,)
-        Temperatures done, closed columns, closed components.
-    columns : int64 array
-        Optimal columns, as indices in the whole packing.
-    values : float array, shape (R, 2)
-        Bound and weight of each closed component.
-    proof : float array, shape (R,)
-        Multipliers of all rows of the whole packing.
-    """
+    """The closed part, filled step by step."""
 
     counts: NDArray[np.int64]
+    """Temperatures done, closed columns, closed components."""
     columns: NDArray[np.int64]
+    """Optimal columns, as indices in the whole packing."""
     values: Floats
+    """Bound and weight of each closed component, (R, 2)."""
     proof: Floats
+    """Multipliers of all rows of the whole packing, (R,)."""
 
 
 class _Incumbent(NamedTuple):
@@ -109,12 +94,8 @@ class _Incumbent(NamedTuple):
 class Reduction:
     """The state of the reduction.
 
-    Attributes
-    ----------
-    closed_columns : list of int arrays
-        Optimal columns of the closed components, as columns of the packing given at the start.
-    closed_bound, closed_weight : float
-        Sum of their bounds and of their weights.
+    ``closed_columns`` are the optimal columns of the closed components, of the packing given at the start,
+    ``closed_bound`` and ``closed_weight`` the sums of their bounds and weights.
     """
 
     def __init__(self, packing: Packing, run: Run) -> None:

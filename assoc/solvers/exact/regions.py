@@ -38,21 +38,14 @@ Solve = Callable[[Packing], Outcome]
 
 
 class _Searched(NamedTuple):
-    """What regions have shown.
-
-    Attributes
-    ----------
-    bound : float
-        A lower bound on solutions lighter than the best cover.
-    extra : float array, shape (N,)
-        What a solution with this column weighs more than the bound, at least.
-    reaching : int array
-        Columns of the answers that have rows outside of all regions; empty if regions could not be closed.
-    """
+    """What regions have shown."""
 
     bound: float
+    """A lower bound on solutions lighter than the best cover."""
     extra: Floats
+    """What a solution with this column weighs more than the bound, at least, (N,)."""
     reaching: NDArray[np.int32]
+    """Columns of the answers that have rows outside of all regions; empty if regions could not be closed."""
 
 
 def close_by_regions(component: Component, solve: Solve) -> None:

@@ -80,17 +80,7 @@ class Estimates(NamedTuple):
         )  # fmt: skip
 
     def found(self, sensors: Sequence[Sensor]) -> tuple[Array, Array]:
-        """Estimates in the order of `used`, and standard deviations of their logarithms (P_d: of ln(P / (1 - P))).
-
-        Parameters
-        ----------
-        sensors : sequence of S Sensors
-            As declared.
-
-        Returns
-        -------
-        estimates, deviations : arrays (S, 3)
-        """
+        """Estimates as in `used`, and standard deviations of their logarithms (P_d: of ln(P / (1 - P))), (S, 3)."""
         P, rate = declared_values(sensors).T[1:]
         dwells, alarms = self.dwells.sum(axis=1) + _DWELLS, self.alarms + _SCANS * rate
         seen = (self.hits.sum(axis=1) + _DWELLS * P) / dwells
@@ -103,13 +93,8 @@ class Estimates(NamedTuple):
     def by_range(self, seen: Array) -> tuple[Array, Array]:
         """Detection probabilities by bands of range, and standard deviations of their log odds, (S, B) each.
 
-        The log odds of a band are about those of its neighbours, and, more loosely, about those of the sensor; they
-        are the likeliest ones by Newton's method, from those in use.
-
-        Parameters
-        ----------
-        seen : array (S,)
-            The sensors' estimates at all ranges.
+        The log odds of a band are about those of its neighbours, and, more loosely, about those of the sensor, `seen`
+        (S,) at all ranges; they are the likeliest ones by Newton's method, from those in use.
         """
         middle, odds = _odds(seen[:, None]), _odds(self.bands)
         for _ in range(_NEWTON):
@@ -136,16 +121,10 @@ class Estimates(NamedTuple):
         return self._replace(weights=weights, factors=np.clip(factors, 1.0 / _LARGEST, _LARGEST))
 
     def counted(self, ids: Array, dwells: Array, hits: Array, bands: Array) -> Estimates:
-        """Count a scan's detections and misses of T confirmed tracks; others are forgotten.
+        """Count a scan's detections and misses of T confirmed tracks, by ascending ids; others are forgotten.
 
-        Parameters
-        ----------
-        ids : int64 array (T,)
-            Ascending.
-        dwells, hits : bool arrays (T, S)
-            Which sensors could see each track, and detected it.
-        bands : int array (T, S)
-            The track's band of range from each sensor.
+        `dwells` and `hits` (T, S) say which sensors could see each track, and detected it; `bands` (T, S) is the
+        track's band of range from each.
         """
         row = np.searchsorted(self.ids, ids)
         known = np.append(self.ids, -1)[row] == ids

@@ -51,14 +51,7 @@ def variances(
 ) -> tuple[Array, Array]:
     """Normal matrix and right side of the factors of variances, (S + 1, S + 1) and (S + 1,), relative to those in use.
 
-    Parameters
-    ----------
-    sensors : sequence of S Sensors
-        As declared.
-    seen : sequence over sensors of Seen
-    predicted : Predicted
-    noise : array (S,)
-        Factors of the noise's variances in use.
+    The sensors are as declared; `noise` (S,) are the factors of the noise's variances in use.
     """
     T, _, n = predicted.offsets.shape
     S = len(sensors)

@@ -16,22 +16,11 @@ from assoc.tracking.track_batch import STARTED, TrackBatch
 
 
 def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array, missed: Array) -> Association:
-    """Apply the chosen tuples of a scan of one instant.
+    """Apply the chosen tuples of a scan of one instant to T tracks that are predicted to it.
 
-    Parameters
-    ----------
-    progress : Progress
-        Its T tracks are predicted to the scan.
-    states
-        The tracks' updated states, in their order.
-    gain : array (T,)
-        Gains of their scores.
-    rows : int array (T, S)
-        Their measurements, 1-based, 0 missed.
-    born : int array (K, S)
-        Tuples that belong to no track.
-    missed : array (T, S)
-        Scores of a miss of the tracks; see `assoc.tracking.stages.looks.misses`.
+    `states` are the updated ones, `gain` (T,) the gains of their scores, `rows` (T, S) their measurements, 1-based, 0
+    missed, and `missed` (T, S) scores of a miss; see `assoc.tracking.stages.looks.misses`. Tuples in `born` (K, S)
+    belong to no track.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
     return _joined(progress, tracks, rows, _begin(progress, born), missed)

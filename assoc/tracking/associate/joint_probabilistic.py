@@ -209,14 +209,7 @@ class JointProbabilistic(Method):
     ) -> tuple[PairProbabilities, _Update]:
         """Sum the joint events of T tracks and `count` measurements of one sensor.
 
-        Parameters
-        ----------
-        track_id, existence : arrays (T,)
-            Ids, and log odds of existence.
-        missed : array (T,)
-            Log-probability that an existing target is missed.
-        pairs : ScoredPairs
-        count : int
+        Of the tracks, (T,): ids, log odds of existence, and the log-probability that an existing target is missed.
         """
         track, measurement, gain = pairs
         exists = 1.0 / (1.0 + np.exp(-np.clip(existence, -_SURE, _SURE)))

@@ -158,18 +158,10 @@ class TrackTrees(DeferringMethod):
 
     @staticmethod
     def hand_over(state: TrackerState, age: int) -> tuple[TrackerState, TrackBatch]:
-        """Hand over the confirmed tracks of the best hypothesis; branches that contradict them are removed, too.
+        """Hand over the confirmed tracks of the best hypothesis, so many scans after they began.
 
-        Parameters
-        ----------
-        state : TrackerState
-        age : int
-            Scans after its beginning at which a track is handed over.
-
-        Returns
-        -------
-        state, tracks
-            The state without these tracks; and the tracks, at the time of the last scan.
+        Branches that contradict them are removed, too. Returns the state without these tracks; and the tracks, at the
+        time of the last scan.
         """
         tracks, own = state.tracks, state.own
         grown = own.chosen & tracks.confirmed & (own.born <= state.scan - age)

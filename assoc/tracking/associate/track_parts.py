@@ -71,17 +71,9 @@ class TrackParts(NamedTuple):
         return TrackParts(row, row, row, np.zeros((count, sensors), dtype=np.int32), np.ones(count), np.zeros(count))
 
     def grown(self, timed: TimedScan, s: int, done: Sequence[int], terms: ScoreTerms, past: Array) -> GrownParts:
-        """Extend all parts by all measurements of sensor s in their gates.
+        """Extend all parts by all measurements of sensor s in their gates; sensors in `done` were processed before.
 
-        Parameters
-        ----------
-        timed : TimedScan
-        s : int
-        done : sequence of int
-            Sensors processed before.
-        terms : ScoreTerms
-        past : array (A, S)
-            Score of a miss of each anchor by the sensors processed before and this one, 0 by others.
+        `past` (A, S): score of a miss of each anchor by the sensors processed before and this one, 0 by others.
         """
         found = timed.grown(s, done, self.anchor, self.track, self.rows)
         score = -score_costs(timed, found.followed, found.rows, terms, past[self.anchor[found.parent]])
@@ -96,13 +88,8 @@ class TrackParts(NamedTuple):
     def after(self, grown: GrownParts, of_pair: Array, of_miss: Array, missed: Array) -> TrackParts:
         """Weigh the parts with and without a measurement of this sensor.
 
-        Parameters
-        ----------
-        grown : GrownParts
-        of_pair, of_miss : arrays (K,), (T,)
-            Probabilities of each pair, and of no measurement, given that the target exists.
-        missed : array (T,)
-            Score of a miss.
+        `of_pair` (K,) and `of_miss` (T,) are probabilities of each pair, and of no measurement, given that the target
+        exists; `missed` (T,) the score of a miss.
         """
         parent = grown.parent
         within = self.share[parent] * np.exp(grown.gain - grown.pairs.gain[grown.pair])
@@ -127,14 +114,10 @@ class TrackParts(NamedTuple):
         return TrackParts(*(np.concatenate(both) for both in zip(self, added, strict=True)))
 
     def merged(self, timed: TimedScan, count: int) -> tuple[Any, Array, Array]:
-        """Merge the parts of each of `count` tracks.
+        """Merge the parts of each of `count` tracks to their states at the scan's end.
 
-        Returns
-        -------
-        states
-            At the scan's end.
-        last, first : arrays (count,)
-            Times (s) of the last and first measurement of each track's likeliest part with any; NaN if none has any.
+        Also the times (s) of the last and first measurement of each track's likeliest part with any; NaN if none has
+        any.
         """
         followed = timed.follow(self.track, self.rows)
         states = merged(timed.at_end(followed, self.track), self.owner, self.share, count)

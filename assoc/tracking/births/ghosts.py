@@ -30,16 +30,10 @@ class Unseen(NamedTuple):
         return Unseen(np.zeros(0, dtype=np.int64), np.zeros((0, sensors)))
 
     def after(self, ids: Array, detected: Array, looked: Array) -> Unseen:
-        """The state after a scan.
+        """The state after a scan, of the living tracks' ids (T,); others are forgotten.
 
-        Parameters
-        ----------
-        ids : int64 array (T,)
-            The living tracks; others are forgotten.
-        detected : array (T, S)
-            Probability with which each sensor has detected each track.
-        looked : bool array (T, S)
-            Whether the sensor could see the track.
+        `detected` (T, S) is the probability with which each sensor has detected each track, `looked` (T, S) whether it
+        could see it.
         """
         order = np.argsort(ids)
         known = np.append(self.misses, np.zeros((1, self.misses.shape[1])), axis=0)

@@ -42,18 +42,9 @@ class Crossings(NamedTuple):
 
 
 class NewTracks:
-    """New tracks for a tracker's sensors and filter.
+    """New tracks for a tracker's sensors and region (`place`) and filter.
 
-    Parameters
-    ----------
-    place : Scene
-        Sensors and region.
-    filter : Filter
-    initiation : Initiation
-    terms : ScoreTerms
-        Scores of detections and misses of each sensor.
-    limits : mapping
-        gate_probability and max_tuples of `assoc.build_problem`.
+    `terms` score detections and misses; `limits` are gate_probability and max_tuples of `assoc.build_problem`.
     """
 
     def __init__(
@@ -154,18 +145,9 @@ class NewTracks:
         return Places(positions, covariances, fit, births)
 
     def crossings(self, scan: Scan, free: Sequence[Array]) -> Crossings | None:
-        """Tuples of two free measurements or more that may start tracks.
+        """Tuples of two free measurements or more that may start tracks; None where there are none.
 
-        Parameters
-        ----------
-        scan : Scan
-        free : sequence over sensors of bool arrays (n_s,)
-            Measurements that may be used.
-
-        Returns
-        -------
-        Crossings or None
-            None where there are no such tuples.
+        `free`, of each sensor (n_s,), are the measurements that may be used.
         """
         numbers = [np.flatnonzero(mask) for mask in free]
         if sum(len(rows) > 0 for rows in numbers) < 2:

@@ -41,18 +41,10 @@ class KeptIdentities:
         self._settled = [0, 0]
 
     def take(self, tracks: Array, confirmed: Array, times: Array, identities: Array) -> None:
-        """Record plots, in time order.
+        """Record n plots, in time order.
 
-        Parameters
-        ----------
-        tracks : int array (n,)
-            The track that took each plot, 0 if none did.
-        confirmed : bool array (n,)
-            Whether that track was confirmed then.
-        times : array (n,)
-            Seconds.
-        identities : int array (n, 2)
-            Mode 3/A codes and addresses, 0 where a plot has none.
+        The track that took each, 0 if none did, and whether it was confirmed then; times, seconds; Mode 3/A codes and
+        addresses (n, 2), 0 where a plot has none.
         """
         if not self._tracks and not identities.any():
             return

@@ -41,12 +41,9 @@ class OwnPath(NamedTuple):
     """One that the platform cannot have reached, if the last message was such."""
 
     def after(self, pose: Pose) -> OwnPath:
-        """The path with one more position.
+        """The path with one more position, which is refused if it does not follow on the others; `args[0]` says why.
 
-        Raises
-        ------
-        InvalidInputError
-            It does not follow on the others; `args[0]` says why. A jump is believed when the next position confirms it.
+        A jump is believed when the next position confirms it.
         """
         if not self.poses or pose.time < self.poses[-1].time - OLD:
             return OwnPath((pose,))
@@ -120,13 +117,7 @@ class OwnPositions:
         self._told: set[int] = set()
 
     def take(self, platform: Platform, time: float, position: Sequence[float], heading: float | None) -> None:
-        """Take a position in.
-
-        Raises
-        ------
-        InvalidInputError
-            It cannot be used: one line that says why.
-        """
+        """Take a position in; InvalidInputError, in one line, says why one cannot be used."""
         if not abs(time) <= LARGEST:
             raise InvalidInputError(f"has the time {time:g}, expected seconds")
         place, known = finite_array(position, "position", (3,)), math.nan

@@ -76,13 +76,7 @@ def save(
 
 
 def restore(path: str | os.PathLike[str], settings: LiveSettings) -> tuple[LiveState, set[int], Counter[str]]:
-    """Read what `save` wrote with the same settings: state, confirmed tracks, counts.
-
-    Raises
-    ------
-    InvalidInputError
-        The file is not such a state, or of other settings.
-    """
+    """Read what `save` wrote with the same settings: state, confirmed tracks, counts; anything else is refused."""
     inner = settings.make()
     inner.restore(path)
     found = load_npz(path, FORMAT, VERSION, _FIELDS)

@@ -26,25 +26,14 @@ VISITS = 20_000
 
 @njit
 def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int) -> Any:
-    """Find the branches of the best global hypothesis.
+    """Find the branches of the best global hypothesis among those of positive score, (B,).
 
-    Parameters
-    ----------
-    score : array (B,)
-        Only branches of positive score are taken.
-    history : int32 array (B, C)
-        Measurements of each branch by column, 1-based, 0: missed.
-    known : Priced
-        Prices and losses of the same branches.
-    visits : int
-        Limit on branches visited in each group.
+    `history` (B, C) are the measurements of each branch by column, 1-based, 0: missed; `known` are prices and losses of
+    the same branches, and `visits` limits the branches visited in each group.
 
-    Returns
-    -------
-    chosen : bool array (B,)
-        At most one branch of each tree, no measurement twice, with the largest sum of scores found.
-    doubtful : bool array (B,)
-        Branches of positive score in groups where the limit was reached before optimality was proved; mostly none.
+    Returns the chosen, (B,), at most one branch of each tree, no measurement twice, with the largest sum of scores
+    found; and branches of positive score in groups where the limit was reached before optimality was proved, (B,),
+    mostly none.
     """
     chosen, doubtful = np.zeros(score.size, np.bool_), np.zeros(score.size, np.bool_)
     good = np.flatnonzero(score > 0.0)

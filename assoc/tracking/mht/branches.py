@@ -52,35 +52,15 @@ def extend(
     tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
     solve: Callable[[Array, Array, Array], Array], visits: int = VISITS,
 ) -> tuple[Array, Tables, Array]:  # fmt: skip
-    """Grow all branches and keep those that matter to good global hypotheses.
+    """Grow all B branches and keep those that matter to good global hypotheses.
 
     The branches of the best global hypothesis are always kept. Where the search does not find it quickly, a solver
-    does: a branch that is cut around a poor hypothesis cannot come back.
+    does: a branch that is cut around a poor hypothesis cannot come back. `solve` returns it as a mask, given the
+    branches' trees, scores and histories. `miss` (B,) is what a miss adds to the score of each branch, `column` that of
+    the sensor in the history, `scan` the one in which the new trees begin; `most` and `drop` are as for `keep_best`,
+    `visits` as for `choose`.
 
-    Parameters
-    ----------
-    tables : Tables
-        Before this sensor.
-    miss : array (B,)
-        What a miss adds to the score of each branch.
-    hits, roots
-    column : int
-        Column of the sensor in the history.
-    scan : int
-        Number of the scan in which the new trees begin.
-    most, drop
-        As for `keep_best`.
-    solve
-        Returns the best global hypothesis as a mask, given the branches' trees, scores and histories.
-    visits
-        As for `choose`.
-
-    Returns
-    -------
-    kept, tables
-        Rows of the candidates that are kept, and their tables.
-    chosen
-        Which of them form the best global hypothesis found, bool.
+    Returns rows of the candidates that are kept, their tables, and which of them form the best global hypothesis found.
     """
     limits = _Limits(most, drop, visits)
     history, doubtful, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)

@@ -87,21 +87,11 @@ def next_hypotheses(
 ) -> Any:
     """Generate the next hypotheses of a cluster, in one compiled call.
 
-    Parameters
-    ----------
-    holds, weight : bool array (H, T), array (H,)
-        Hypotheses before the measurements.
-    missed : array (T,)
-        Log-probability that a miss of each track adds.
-    meanings, most, drop
-        As for `best_children`.
+    Before the measurements there are H hypotheses of T tracks, `holds` (H, T) and `weight` (H,); `missed` (T,) is the
+    log-probability that a miss of each track adds; the rest as for `best_children`.
 
-    Returns
-    -------
-    used : int64 array (U,)
-        Rows, among the missed tracks, the pairs and the new targets in this order, that some hypothesis contains.
-    holds, weight : bool array (C, U), array (C,)
-        Hypotheses, the best first, with log-probability 0.
+    Returns the rows, (U,), among the missed tracks, the pairs and the new targets in this order, that some hypothesis
+    contains; and hypotheses (C, U), the best first, with log-probability 0, and their weights (C,).
     """
     tracks, pairs = missed.size, meanings.track.size
     alone = weight.copy()
@@ -133,24 +123,10 @@ def next_hypotheses(
 
 @njit
 def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
-    """Rank the children of all parents.
+    """Rank the children of all parents: parent (C,), choice (C, n) and weight (C,), the largest first.
 
-    Parameters
-    ----------
-    parents : Parents
-    meanings : Meanings
-    most : int
-        The most children.
-    drop : float
-        Children whose log-probability is this far below the best are left out.
-
-    Returns
-    -------
-    parent : int64 array (C,)
-    choice : int32 array (C, n)
-        Pair of each measurement, or `NEW`, or `FALSE`.
-    weight : array (C,)
-        Log-probability, the largest first.
+    The choice is the pair of each measurement, or `NEW`, or `FALSE`; weights are log-probabilities. There are `most`
+    children; those `drop` below the best are left out.
     """
     holds, weight = parents
     count, room = meanings.birth.size, weight.size + 64

@@ -100,18 +100,11 @@ def grouped(label: Array, parts: int) -> list[Array]:
 
 
 def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
-    """Merge clusters: all combinations of their hypotheses.
+    """Merge clusters, at least one: all combinations of their hypotheses.
 
-    Parameters
-    ----------
-    clusters : sequence of Cluster
-        At least one.
-    potential : array
-        For each row of the batch, the most that the coming measurements can add to the log-probability. Of more than
-        `most` combinations those are kept that can still become the best: a new track is unlikely until its second
-        detection.
-    most : int
-        The most combinations.
+    `potential` is, for each row of the batch, the most that the coming measurements can add to the log-probability. Of
+    more than `most` combinations those are kept that can still become the best: a new track is unlikely until its
+    second detection.
     """
     if len(clusters) == 1:
         return clusters[0]
@@ -128,18 +121,10 @@ def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
 
 
 def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
-    """Split a cluster into independent parts.
+    """Split a cluster into independent parts: `label` (B,) of each branch; branches of different parts do not exclude.
 
-    The log-probability of a hypothesis is, up to a constant, the sum of the scores of its branches and a remainder
+    The log-probability of a hypothesis is, up to a constant, the sum of the scores (B,) of its branches and a remainder
     from deleted tracks. Combinations of the parts that had been dropped for their rank alone exist again.
-
-    Parameters
-    ----------
-    whole : Cluster
-    label : int array (B,)
-        The part of each branch; no two branches of different parts exclude each other.
-    score : array (B,)
-        Scores of the branches.
     """
     left_behind = whole.weight - whole.holds @ score
     found = []
@@ -165,11 +150,7 @@ def without(whole: Cluster, gone: Array) -> Cluster:
 def agreeing(whole: Cluster, owner: Array) -> Cluster:
     """Keep the hypotheses that agree with the best one about some measurements.
 
-    Parameters
-    ----------
-    whole : Cluster
-    owner : int array (B, M)
-        For each branch and each of M sensors, a number for track and measurement; 0: missed.
+    `owner` (B, M) is, for each branch and each of M sensors, a number for track and measurement; 0: missed.
     """
     if len(whole.weight) == 1:
         return whole

@@ -20,23 +20,9 @@ def generated(
 ) -> list[Cluster]:
     """Merge the clusters whose gates a measurement lies in together, and generate the children of their hypotheses.
 
-    Parameters
-    ----------
-    clusters : sequence of Cluster
-        About B branches.
-    offers : Offers
-        K pairs of a branch and a measurement, and N births.
-    born : int array (N,)
-        Measurement (0-based) of each birth.
-    count : int
-        Measurements of the sensor.
-    most, drop
-        The most hypotheses of a cluster, and how far below the best they may be.
-
-    Returns
-    -------
-    list of Cluster
-        About rows of the missed branches, the pairs, and the births, in this order.
+    The clusters are about B branches; `offers` are K pairs of a branch and a measurement, and N births, of the
+    measurements in `born` (N,), 0-based, of `count`. A cluster has `most` hypotheses, at most `drop` below the best.
+    The new clusters are about rows of the missed branches, the pairs, and the births, in this order.
     """
     total, pairs = len(offers.missed), len(offers.branch)
     cluster_of = np.repeat(np.arange(len(clusters)), [len(group.branches) for group in clusters])
@@ -98,23 +84,9 @@ def with_births(
 ) -> list[Cluster]:
     """Merge the clusters that contend with births for measurements, and add every set of births that is possible.
 
-    Parameters
-    ----------
-    clusters : sequence of Cluster
-        About B branches.
-    rows : int array (B, S)
-        1-based measurements of this scan that each branch has taken, 0: none.
-    births : Births
-        N births.
-    sizes : int array (S,)
-        Measurements of each sensor.
-    most, drop
-        The most hypotheses of a cluster, and how far below the best they may be.
-
-    Returns
-    -------
-    list of Cluster
-        About rows of the branches and the births, in this order.
+    `rows` (B, S) are the 1-based measurements of this scan that each branch has taken, 0: none, of `sizes` (S,). A
+    cluster has `most` hypotheses, at most `drop` below the best. The new clusters are about rows of the branches and
+    the births, in this order.
     """
     width = int(sizes.max(initial=0)) + 1
     places = width * np.arange(len(sizes))

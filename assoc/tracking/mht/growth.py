@@ -69,18 +69,8 @@ class Grown(NamedTuple):
 class Growth(ABC):
     """B branches within a scan.
 
-    Parameters
-    ----------
-    progress : Progress
-
-    Attributes
-    ----------
-    order : sequence of int
-        The sensors in the order of their processing.
-    origin : int64 array (B,)
-        Row before the scan, -1 for new targets.
-    rows : int32 array (B, S)
-        1-based measurement of each sensor in this scan, 0: none.
+    `order` is that in which sensors are processed, `origin` (B,) the row before the scan, -1 for new targets, and
+    `rows` (B, S) the 1-based measurement of each sensor in this scan, 0: none.
     """
 
     order: Sequence[int]

@@ -33,43 +33,25 @@ _HOTTEST, _COLDEST, _PASSES = 4.0, 0.05, 60
 
 
 class Priced(NamedTuple):
-    """Losses of B branches, and the prices that give them.
-
-    Attributes
-    ----------
-    number : int64 array (B,)
-        Tree of each branch, from 0.
-    first : int64 array (C + 1,)
-        Offset of each column's measurements in `measurements`.
-    trees, measurements : arrays
-        Prices, 0 or more; their sum is an upper bound on the score of the best global hypothesis.
-    loss : array (B,)
-        Lower bound on the loss of each branch, 0 or more up to rounding.
-    """
+    """Losses of B branches, and the prices that give them."""
 
     number: NDArray[np.int64]
+    """Tree of each branch, from 0, (B,)."""
     first: NDArray[np.int64]
+    """Offset of each column's measurements in `measurements`, (C + 1,)."""
     trees: Floats
     measurements: Floats
+    """Prices, as `trees`, 0 or more; the sum of both bounds the score of the best global hypothesis."""
     loss: Floats
+    """Lower bound on the loss of each branch, 0 or more up to rounding, (B,)."""
 
 
 @njit
 def priced(tree: NDArray[np.int64], score: Floats, history: NDArray[np.int32]) -> Any:
-    """Find prices, and a lower bound on the loss of each branch.
+    """Find prices, and a lower bound on the loss of each branch, as `Priced`.
 
-    Parameters
-    ----------
-    tree : int64 array (B,)
-        Tree of each branch.
-    score : array (B,)
-        Log likelihood ratios; a tree that no branch of a hypothesis uses scores 0.
-    history : int32 array (B, C)
-        Measurements of each branch by column, 1-based, 0: missed.
-
-    Returns
-    -------
-    Priced
+    Of each branch: its tree (B,); its log likelihood ratio (B,), where a tree that no branch of a hypothesis uses
+    scores 0; its measurements by column (B, C), 1-based, 0: missed.
     """
     number, trees = _numbered(tree)
     columns = history.shape[1]

@@ -16,18 +16,9 @@ from assoc.packing.kernels.sorting import order_of
 def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) -> Array:
     """Rows of the branches that matter to good global hypotheses, ordered by tree, then loss.
 
-    A tree ends if all its branches have losses above `drop`: other trees explain its measurements much better. A tree
-    whose best score is still negative is allowed that much more.
-
-    Parameters
-    ----------
-    tree, score : arrays (B,)
-    loss : array (B,)
-        Loss of each branch; see `assoc.tracking.mht.losses`.
-    most : int
-        The most branches of a tree.
-    drop : float
-        Branches with a greater loss are cut.
+    A tree keeps `most` branches, none with a loss (`assoc.tracking.mht.losses`) above `drop`. It ends if all its
+    branches have greater losses: other trees explain its measurements much better. A tree whose best score is still
+    negative is allowed that much more.
     """
     order = order_of(tree)
     kept = np.empty(order.size, np.int64)
@@ -48,29 +39,12 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
 
 
 def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, sizes: Array) -> tuple[Array, Array]:
-    """Decide which tree each measurement of the oldest scan belongs to.
+    """Decide which tree each measurement of the oldest scan, (B, S), 1-based, 0: missed, belongs to.
 
-    The trees of the best global hypothesis take theirs first. Other trees that began in that scan or before take
-    what is left, the best score first, and end if nothing fits. Trees that began later are not affected.
-
-    Parameters
-    ----------
-    tree, score : arrays (B,)
-        Of each branch; branches of one tree are contiguous.
-    chosen : bool array (B,)
-        Whether it is in the best global hypothesis.
-    old : bool array (B,)
-        Whether its tree began in the oldest scan or before.
-    oldest : int array (B, S)
-        The oldest scan's measurements (1-based, 0: missed).
-    sizes : int array (S,)
-
-    Returns
-    -------
-    kept : bool array (B,)
-        Branches that agree with the decision.
-    speakers : int array
-        For each tree in the decision, the row of the branch that it follows.
+    The trees of the best global hypothesis, `chosen` (B,), take theirs first. Other trees that began in that scan or
+    before (`old`) take what is left, the best score first, and end if nothing fits. Trees that began later are not
+    affected. Branches of one tree are contiguous. Returns the branches that agree with the decision, (B,), and for each
+    tree in it the row of the branch that it follows.
     """
     kept, speakers = _decide(tree, score, chosen, old, oldest, int(sizes.max(initial=0)))
     return np.asarray(kept), np.asarray(speakers)

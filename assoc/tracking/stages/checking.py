@@ -33,10 +33,7 @@ def checked_time(time: object, last: float | None) -> float:
 def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor]) -> list[Array]:
     """Measurements as float64 arrays (n_s, d_s), checked against what their sensors can measure.
 
-    Raises
-    ------
-    InvalidInputError
-        Names the sensor and the measurement, and says what was expected.
+    Messages name the sensor and the measurement, and say what was expected.
     """
     known = isinstance(measurements, (list, tuple)) or (isinstance(measurements, np.ndarray) and measurements.ndim > 0)
     if not known:
