@@ -11,7 +11,7 @@ import pytest
 
 from experiments.__main__ import programs
 from experiments.common.results import RESULTS, Results, number
-from experiments.pages import commands, coverage, prose
+from experiments.pages import commands, prose, verdicts
 from experiments.pages.__main__ import FOLDER, TABLES, main
 from tests.release import licences
 
@@ -175,7 +175,7 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monke
     text = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("papers-*.md"))
     rows = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in rows if row[0] not in ("element", "---")]
-    assert len(rows) > 100 and {row[3].strip() for row in rows} == {"", *coverage.CHANGES}
+    assert len(rows) > 100 and {row[3].strip() for row in rows} == {"", *verdicts.CHANGES}
     for element, _, result, _, command in rows:
         assert re.match("holds|does not hold|absent", result), element
         shown = re.findall(r"`(pytest|python -m) ([^`]+)`", command)
@@ -217,7 +217,8 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
     off = [abs(one.ours - one.paper) for one in readings]
     nearest = readings[off.index(min(off))]
     row = next(line for line in TABLES["papers-ant-colony"]().splitlines() if line.startswith("| table 1, mean cycles"))
-    assert f"{nearest.ours:.2f} against 4.03, {nearest.quantity.split(': ')[0].removeprefix('reading, ')} |" in row
+    words = nearest.quantity.split(": ")[0].removeprefix("reading, ")
+    assert f" {nearest.ours:.2f} ({verdicts.interval(nearest)}) against 4.03, {words} |" in row
 
 
 def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, monkeypatch, capsys):

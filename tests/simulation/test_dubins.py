@@ -25,6 +25,13 @@ def test_lengths_between_the_ends_of_path_1():
     assert lengths == {"RSR": 521.13, "LSR": 1129.632, "RSL": 1149.393, "LSL": 1757.394}
 
 
+@pytest.mark.parametrize("sense", [-1.0, 1.0])
+def test_with_headings_from_the_y_axis_another_word_is_shortest(sense):
+    # as the text has them, which figure 2 and its RSR contradict, whichever way they turn
+    start, goal = (Pose(one.x, one.y, math.pi / 2 + sense * one.heading) for one in (FIRST, LAST))
+    assert shortest(FIRST, LAST, 100.0).word == "RSR" and shortest(start, goal, 100.0).word == "RSL"
+
+
 def test_path_2_to_the_printed_digits():
     goal = Pose(0.0, 100 + 100 * math.tan(math.radians(15)), 0.0)
     straight = path(FIRST, goal, 100.0, "RSL").segments[1]

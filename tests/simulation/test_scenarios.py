@@ -33,6 +33,10 @@ def test_three_radar_is_the_papers_scene():
     assert all(s.detection_probability == 0.9 and s.false_alarm_rate == 1.0 for s in scene.sensors)
     first = scene.scan(0).truth_positions / 1000
     np.testing.assert_allclose(first, [[30, 20, 2], [20.45, 11.25, 2], [50, 20, 2]])
+    # ten seconds on at constant velocity; the second target ten seconds after its second turn, worked out by hand
+    np.testing.assert_allclose(scene.scan(10).truth_positions[[0, 2]] / 1000, [[25.5, 17.5, 3], [44, 17.5, 5]])
+    np.testing.assert_allclose(scene.scan(12).truth_positions[1] / 1000, [15.05, 8.25, 2.12])
+    np.testing.assert_allclose(scene.scan(33).truth_positions[1] / 1000, [4.6, 10.525, 2.33])
     paths = np.concatenate([scene.scan(k).truth_positions for k in range(100)])
     extent = np.ptp(paths, axis=0)
     np.testing.assert_allclose(scene.region[:, 0], paths.min(axis=0) - 0.1 * extent)
