@@ -8,7 +8,7 @@ import signal
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # fixtures of several folders
 pytest_plugins = ["tests.dask_cluster"]
@@ -16,8 +16,10 @@ pytest_plugins = ["tests.dask_cluster"]
 # tests are of compiled kernels, and what they start is not to compile beside them; those of interpreting switch it on
 os.environ.setdefault("ASSOC_INTERPRET", "0")
 
-# the first example pays for compilation, and machines differ: a deadline would only find that out
-settings.register_profile("assoc", deadline=None)
+# the first example pays for compilation, and machines differ: clocks would only find that out. The same examples each
+# time; `pytest --hypothesis-profile=search` tries others
+settings.register_profile("search", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("assoc", settings.get_profile("search"), derandomize=True)
 settings.load_profile("assoc")
 
 # a job in the background ignores Ctrl-C, and so would the programs that the tests start

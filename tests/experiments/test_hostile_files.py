@@ -30,7 +30,7 @@ def run(*words: object) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-I", "-S", check.__file__, *map(str, words)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES)),
     )
 

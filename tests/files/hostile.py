@@ -240,7 +240,7 @@ def run(case: Hostile, folder: Path) -> Outcome:
     words = case.words.replace("{folder}", str(folder)).replace("{}", str(path)).split()
     with open(folder / case.stdin, "rb") as stdin:
         command = [sys.executable, "-c", _LIMITED, "-c", _RUN, *words]
-        done = subprocess.run(command, stdin=stdin, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(command, stdin=stdin, capture_output=True, text=True, timeout=600)
     *said, peak = done.stderr.strip().splitlines()
     return Outcome(done.returncode, 1024 * int(peak.split()[1]), "\n".join(said))
 

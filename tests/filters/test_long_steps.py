@@ -237,7 +237,7 @@ def test_without_the_compiler_it_is_the_same():
     code = "import json; from tests.filters.test_long_steps import results; print(json.dumps(results()))"
     done = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=os.getcwd(),
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     plain, compiled = json.loads(done.stdout), results()

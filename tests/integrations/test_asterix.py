@@ -289,7 +289,7 @@ def test_a_recording_of_real_radars(tmp_path):
     """The sample of another decoder (GPL: fetched here, never shipped): 126 plots of 7 radars."""
     words = ["pip", "download", "--quiet", "--no-deps", "--no-binary", ":all:", "-d", str(tmp_path), "asterix_decoder"]
     try:
-        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, timeout=120)
+        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, timeout=600)
     except subprocess.TimeoutExpired:
         pytest.skip("the sample cannot be reached")
     archives = list(tmp_path.glob("asterix_decoder-*.tar.gz"))

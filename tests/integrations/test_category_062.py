@@ -147,7 +147,7 @@ def test_there_and_back_and_what_does_not_fit(file, tmp_path):
 def test_another_decoder_reads_the_same(file, tmp_path):
     words = ["install", "--quiet", "--no-deps", "--target", str(tmp_path / "theirs"), "asterix_decoder"]
     try:
-        done = subprocess.run([sys.executable, "-m", "pip", *words], capture_output=True, timeout=300)
+        done = subprocess.run([sys.executable, "-m", "pip", *words], capture_output=True, timeout=600)
     except subprocess.TimeoutExpired:
         pytest.skip("the decoder cannot be reached")
     if done.returncode:

@@ -14,7 +14,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[str]:
     """Run ``python -W error -m words``."""
     command = [sys.executable, "-W", "error", "-m", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=cwd)
 
 
 @pytest.fixture(scope="session")

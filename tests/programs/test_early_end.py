@@ -52,7 +52,7 @@ def interrupted(words, cwd, at, number=signal.SIGINT):
                 break
         time.sleep(0.3)
         process.send_signal(number)
-        out, errors = process.communicate(timeout=120)
+        out, errors = process.communicate(timeout=600)
     return process.returncode, out, told(errors)
 
 

@@ -25,6 +25,7 @@ from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker
 from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
+from tests.programs.listening import wait_until_it_listens
 from tests.tracking.crossing import crossing, radar
 
 
@@ -70,7 +71,7 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     text = "\n".join(
         ["sensor,time,range,azimuth,elevation", "# a comment", "", *bad, *as_lines(scene, "both"), "\x00\xff"]
     )
-    done = subprocess.run(words(scene_file), input=text, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(words(scene_file), input=text, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     check(done.stdout)
     told = done.stderr.strip().splitlines()
@@ -80,7 +81,7 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     assert re.search(r"\d+ plots in \d+ steps; a step takes .* ms, p99 .* ms; .*lines not understood", told[-1])
     # the same from the scene itself, into a file
     out = scene_file.parent / "tracks.csv"
-    again = subprocess.run(words(scene_file, "--replay", 0, "-o", out), capture_output=True, text=True, timeout=300)
+    again = subprocess.run(words(scene_file, "--replay", 0, "-o", out), capture_output=True, text=True, timeout=600)
     assert again.returncode == 0 and again.stdout == ""
     assert out.read_text() == done.stdout
 
@@ -124,7 +125,7 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
         assert program.stdout.readline().startswith("track_id,time")
         assert ",new," in program.stdout.readline()
         program.send_signal(signal.SIGINT)
-        rest, told = program.communicate(timeout=60)
+        rest, told = program.communicate(timeout=600)
     finally:
         program.kill()
     assert program.returncode == 130
@@ -174,13 +175,14 @@ def test_long_lines_are_cut_while_they_are_read():
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs signals of POSIX")
 def test_a_signal_twice_ends_with_its_own_code(scene_file):
     """At any moment, also while kernels are compiled or loaded."""
-    for wait in (2.0, 2.4, 2.8, 4.0):
+    for wait in (0.5, 0.9, 1.3, 2.5):
         program = subprocess.Popen(words(scene_file, "--udp", 0), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        wait_until_it_listens(program)
         time.sleep(wait)
         for _ in range(2):
             program.send_signal(signal.SIGTERM)
             time.sleep(0.05)
-        told = program.communicate(timeout=60)[1]
+        told = program.communicate(timeout=600)[1]
         assert program.returncode == 143 and b"Traceback" not in told and b"terminated" in told, (wait, told)
 
 
@@ -192,7 +194,7 @@ def test_an_interrupt_inside_exec_leaves_the_code():
         "found = Interruption('x'); found.code, found.word = 143, 'terminated'\n"
         "raise SystemExit(run_program(lambda: exec('raise KeyboardInterrupt'), 'x', found))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
     assert (done.returncode, done.stderr) == (143, "x: terminated\n")
 
 
@@ -329,7 +331,7 @@ def test_a_killed_run_goes_on(scene_file, tmp_path):
     """SIGKILL; the source repeats its last seconds, and the tracks are those of a run that was never killed."""
     scene = Scene.load(scene_file)
     lines = [*as_lines(scene, "csv")]
-    whole = subprocess.run(words(scene_file), input="\n".join(lines), capture_output=True, text=True, timeout=300)
+    whole = subprocess.run(words(scene_file), input="\n".join(lines), capture_output=True, text=True, timeout=600)
     more = ["-o", tmp_path / "tracks.csv", "--state", tmp_path / "live.npz"]
     # saved after each plot, so that the test need not wait
     own = [*words(scene_file, *more)]
@@ -350,7 +352,7 @@ def test_a_killed_run_goes_on(scene_file, tmp_path):
     with open(tmp_path / "tracks.csv", "a") as file:
         file.write("7,12.5,40")  # the line that it was writing
     rest = lines[half - 10 :]
-    again = subprocess.run(own, input="\n".join(rest), capture_output=True, text=True, timeout=300)
+    again = subprocess.run(own, input="\n".join(rest), capture_output=True, text=True, timeout=600)
     assert again.returncode == 0, again.stderr
     assert "goes on from" in again.stderr and " repeated" in again.stderr
     check(whole.stdout)

@@ -14,6 +14,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
+from tests.programs.listening import wait_until_it_listens
 from tests.programs.terminal import shown, shown_until
 
 
@@ -204,9 +205,10 @@ def test_interrupt_is_clean(tmp_path, solver):
     endless = ["--iterations", "1000000000", "--patience", "1000000000"] if solver == "aco" else []
     command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", solver, "--json", "o.json", *endless]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
-    time.sleep(4.0)
+    wait_until_it_listens(process)
+    time.sleep(3.0)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 130
     if err == "assoc.solve: interrupted\n":
         # nothing was finished: MIP backends are left alone, and a compiler does not listen

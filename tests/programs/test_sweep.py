@@ -144,7 +144,7 @@ def test_a_full_disk_keeps_what_was_finished(run, long_scene, tmp_path):
     words = [long_scene, *GRID, "--repeats", 2, "-o", "study"]
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
     process = start(words, tmp_path, preexec_fn=limit, env=environment)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert (process.returncode, out) == (2, "") and err.count("\n") == 1
     assert "runs.jsonl: cannot be written (File too large)" in err and "finished runs are kept" in err
     kept = len(load(tmp_path / "study"))

@@ -52,7 +52,7 @@ def branched() -> assoc.AssignmentProblem:
 def run_alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """The checker as others use it: only the file, isolated from the package."""
     command = [sys.executable, "-I", "-S", str(ALONE), *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=600)
 
 
 @pytest.mark.parametrize("dummy", [True, False])

@@ -174,7 +174,7 @@ def test_other_refusals(tmp_path):
             read_plots(path, **options)
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.one_of(st.binary(max_size=200), st.text(alphabet='0123456789:.,;"\n\r\t-eE naif', max_size=120)))
 def test_any_bytes_give_a_recording_or_one_line(tmp_path, content):
     raw = content if isinstance(content, bytes) else HEAD.encode() + content.encode()

@@ -87,7 +87,7 @@ def _study(folder: Path) -> list[Path]:
     next(iter(small_problems(1, seed=3, dummy=True))).save(folder / "p.npz")
     command = [sys.executable, "-m", "assoc.sweep", str(folder / "p.npz"), "--solver", "aco"]
     command += ["--grid", "alpha=1,2", "ants=2,3", "--repeats", "2", "-o", str(folder / "study")]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, check=True, capture_output=True, timeout=600)
     return [folder / "study"]
 
 

@@ -48,7 +48,7 @@ def data(tmp_path):
 def run(words, data, **environment):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(data.parent / "cache"), "ASSOC_INTERPRET": "1", **environment}
     return subprocess.run(
-        [sys.executable, *words], cwd=data, env=environment, capture_output=True, text=True, timeout=300
+        [sys.executable, *words], cwd=data, env=environment, capture_output=True, text=True, timeout=600
     )
 
 

@@ -42,7 +42,7 @@ def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.Complete
     # the process that compiles may still be at a kernel when this one ends
     warnings = ("-W", "error", "-W", "ignore::ResourceWarning")
     done = subprocess.run(
-        [sys.executable, *warnings, "-c", code], capture_output=True, text=True, env=environment, timeout=300
+        [sys.executable, *warnings, "-c", code], capture_output=True, text=True, env=environment, timeout=600
     )
     assert (done.returncode, told(done.stderr)) == (0, "")
     return done
@@ -80,7 +80,7 @@ def test_the_same_answers_with_and_without_compiled_kernels(solver, tmp_path):
         result = tmp_path / f"{switch}.json"
         words = ["-m", "assoc.solve", str(scene), "--solver", solver, "--json", str(result)]
         environment = {**os.environ, "ASSOC_INTERPRET": switch, **cache}
-        subprocess.run([sys.executable, *words], check=True, capture_output=True, env=environment, timeout=300)
+        subprocess.run([sys.executable, *words], check=True, capture_output=True, env=environment, timeout=600)
         content = json.loads(result.read_text())
         answers.append([{k: v for k, v in scan.items() if "time" not in k} for scan in content["scans"]])
     assert answers[0] == answers[1]

@@ -67,7 +67,7 @@ os._exit(0)
 @pytest.mark.slow
 def test_while_a_result_is_converted():
     # a signal that comes during a kernel is heard when its result is converted: a record's class is then missing
-    done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=600)
     assert (done.returncode, done.stdout.strip()) == (0, "10"), done.stderr
 
 
@@ -146,14 +146,14 @@ def test_while_a_kernel_is_loaded():
     compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}
     for word, heard in (("alone", "False"), ("interrupted", "True")):
         command = [sys.executable, "-c", LOADING, word]
-        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=600)
         assert (done.returncode, done.stdout.split(), done.stderr) == (0, [heard, "-5.0"], "")
 
 
 @pytest.mark.slow
 def test_in_the_library():
     names = ["exact", "aco", "tabu", "genetic", "milp", "kbest"]
-    done = subprocess.run([sys.executable, "-c", LIBRARY, ",".join(names)], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", LIBRARY, ",".join(names)], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     # what is not interrupted comes back at its time limit
     assert json.loads(done.stdout) == dict.fromkeys(names, True)

@@ -16,7 +16,7 @@ def test_answers_without_the_compiler():
     parts = ["solutions", "rankings", "costs", "tracks"]
     command = [sys.executable, "-W", "error", "-m", "tests.reliability.answers", "--only", ",".join(parts)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment)
     assert done.returncode == 0, done.stderr
     assert differences(done.stdout, answers(parts), 1e-9) == []
 

@@ -47,7 +47,7 @@ def solved(shipped: Path, cache: Path, what: str = "sorting", **settings: str) -
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
     command = [sys.executable, "-c", _PROGRAM, str(shipped), what]
     environment = {**kept, "NUMBA_CACHE_DIR": str(cache), "ASSOC_INTERPRET": "0", **settings}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=True)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=True)
     compiled, answer = done.stdout.split()
     return int(compiled), answer
 
