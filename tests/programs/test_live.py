@@ -25,7 +25,7 @@ from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker
 from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
-from tests.programs.listening import wait_until_it_listens
+from tests.listening import wait_until_it_listens
 from tests.tracking.crossing import crossing, radar
 
 

@@ -14,7 +14,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
-from tests.programs.listening import wait_until_it_listens
+from tests.listening import wait_until_it_listens
 from tests.programs.terminal import shown, shown_until
 
 

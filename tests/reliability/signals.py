@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 from assoc.simulation import simulate
 from assoc.sweeps import load
+from tests.listening import listens
 from tests.told import told
 
 # what other libraries print when they are interrupted while they are imported is theirs: the text says when it is done
@@ -81,7 +82,7 @@ def trial(way: str, after: float, scenes: Path, rng: random.Random) -> Trial:
             process.communicate()
             return Trial("done before" if process.returncode == 0 else "failed before", 0.0)
         used = _cpu_with(f"{name}/kernels")
-        imported = (Path(name) / IMPORTED).exists()
+        begun = (Path(name) / IMPORTED).exists() if library else listens(process.pid)
         process.send_signal(signal.SIGINT)
         sent, clock = time.monotonic(), time.time()
         try:
@@ -106,11 +107,12 @@ def trial(way: str, after: float, scenes: Path, rng: random.Random) -> Trial:
         if library:
             # Python itself says 1 where the interrupt came in code that it did not compile from a text
             good = process.returncode in (1, -signal.SIGINT, 130) and lines[-1:] == ["KeyboardInterrupt"]
-            good = good and (not imported or ("Exception ignored" not in errors and errors.count("Traceback") == 1))
+            good = good and (not begun or ("Exception ignored" not in errors and errors.count("Traceback") == 1))
         else:
             good = process.returncode == 130 and len(lines) == 1 and ": interrupted" in lines[0]
             # before the program has begun
             good |= process.returncode == -signal.SIGINT and not lines
+            good |= not begun and lines[-1:] == ["KeyboardInterrupt"]
         if not good:
             return Trial(f"exit {process.returncode}: {' | '.join(lines[-3:])[:200]}", seconds, cpu)
         return Trial(f"left: {left}" if left else "as it should", seconds, cpu)
