@@ -33,6 +33,16 @@ def _counted(held: list[bool]) -> str:
     return f"holds in {sum(held)} of {len(held)}" if any(held) else NOT
 
 
+def at_the_edge(*claims: Claim) -> str:
+    """What the claims are of whose interval goes over an end of what is accepted, the last words of their names."""
+    over = []
+    for claim in claims:
+        (low, high), (least, most) = claim.interval or (0.0, 0.0), claim.band or (None, None)
+        if any(end is not None and low < end < high for end in (least, most)):
+            over.append(claim.quantity.rpartition(" of ")[2])
+    return f"{' and '.join(over)} at the edge" if over else "none at the edge"
+
+
 def interval(claim: Claim) -> str:
     """The interval of a claim in words."""
     low, high = claim.interval or (claim.ours, claim.ours)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.__main__ import programs
+from experiments.common.claims import Claim
 from experiments.common.results import RESULTS, Results, number
 from experiments.pages import commands, prose, verdicts
 from experiments.pages.__main__ import FOLDER, TABLES, main
@@ -219,6 +220,17 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
     row = next(line for line in TABLES["papers-ant-colony"]().splitlines() if line.startswith("| table 1, mean cycles"))
     words = nearest.quantity.split(": ")[0].removeprefix("reading, ")
     assert f" {nearest.ours:.2f} ({verdicts.interval(nearest)}) against 4.03, {words} |" in row
+
+
+def test_verdicts_say_no_more_than_the_intervals():
+    def claim(ours, low, high, band):
+        return Claim(f"RMS of {ours:g}", "", None, ours, (low, high), band, source="table 1")
+
+    sure, crossing = claim(0.9, 0.85, 0.95, (None, 1.0)), claim(0.99, 0.97, 1.01, (None, 1.0))
+    assert verdicts.verdict(sure, crossing) == "holds"
+    assert verdicts.below_one([sure, crossing]) == "holds in 1 of 2" and verdicts.below_one([crossing]) == verdicts.NOT
+    assert verdicts.at_the_edge(sure, crossing) == "0.99 at the edge"
+    assert verdicts.at_the_edge(sure) == "none at the edge"
 
 
 def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, monkeypatch, capsys):
