@@ -1,4 +1,4 @@
-"""The ant colony of the paper, equations 7 to 11 to the letter.
+"""The ant colony of the paper, equations 7 to 11 on costs made positive.
 
 Nodes are the tuples, false alarms among them. In the first cycle each ant starts on a different random node
 and moves to the allowed node of largest visibility eta = 1 / c (eq. 7). In later cycles an ant starts on a

@@ -21,7 +21,7 @@ class AcoParameters(SearchParameters):
     Attributes
     ----------
     mode : str
-        "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11 to the letter).
+        "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11).
     ants : int
         Ants in a cycle; 15 in the paper.
     divers : int

@@ -3,7 +3,7 @@
     python -m experiments.papers.ant_colony [--quick] [--json FILE] [--figure FILE] [--study FOLDER] [--publish]
 
 All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
-"paper" (equations 7 to 11 exactly as published) and in mode "mmas", several seeds each.
+"paper" (equations 7 to 11, on costs made positive) and in mode "mmas", several seeds each.
 
 *Cycles to convergence* in mode "paper" are the cycles of all ants on one scan's whole problem until all have
 walked the same tour, where a tour is a set of tuples, in whatever order. The first, greedy cycle counts, and
