@@ -17,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 from assoc._cli.options import Given, Parser
 from assoc._cli.program import Program
 from assoc._cli.signals import Interruption
-from assoc._cli.track.options import LIVE, live_parser, make_tracker, read_options, with_further
+from assoc._cli.track.options import LIVE, closing, live_parser, make_tracker, read_options, with_further
 from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import announcement
 from assoc._text.plain import printable
@@ -43,7 +43,7 @@ def _live(words: list[str]) -> None:
     given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
     from assoc._cli.track.plot_lines import Lines, header_of
 
-    scene = _scene(given)
+    scene = _scene(given, settings)
     going_on = given["state"] is not None and os.path.exists(given["state"])
     _check_output(given["output"], header_of(scene.origin), going_on)
     with announcement.silenced() if given["quiet"] else nullcontext():
@@ -83,8 +83,8 @@ def _live(words: list[str]) -> None:
     end()
 
 
-def _scene(given: Given) -> Scene:
-    """The scene of the sensors; the file of several radars gives the turns of their antennas, too."""
+def _scene(given: Given, settings: dict[str, Any]) -> Scene:
+    """The scene of the sensors; radars.toml gives the turns of their antennas and closed areas, too."""
     from assoc._cli.track.radars_file import read_radars
     from assoc.scene.scene import Scene
 
@@ -94,6 +94,7 @@ def _scene(given: Given) -> Scene:
         raise InvalidInputError(f"--turns: {given['file']} says how the antennas turn")
     found = read_radars(given["file"])
     given["turns"] = found.sensor_turns
+    settings["initiation"] = closing(settings["initiation"], found.closed)
     return found.scene
 
 

@@ -96,6 +96,25 @@ def position_on_earth(value: str, label: str) -> tuple[float, float, float]:
     return math.radians(lat), math.radians(lon), height
 
 
+def area(value: str, label: str) -> tuple[tuple[float, float], ...]:
+    """Read the corners of an area, X,Y X,Y ... in metres; two are opposite corners of a box."""
+    corners = [listed(number)(part, label) for part in value.split()]
+    if len(corners) < 2 or any(len(corner) != 2 or not all(map(math.isfinite, corner)) for corner in corners):
+        expected = "2 corners of a box, or 3 or more, X,Y X,Y ... in metres"
+        raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
+    return as_polygon([(corner[0], corner[1]) for corner in corners], label)
+
+
+def as_polygon(corners: list[tuple[float, float]], label: str) -> tuple[tuple[float, float], ...]:
+    """Corners of a polygon; two are opposite corners of a box."""
+    if len(corners) == 2:
+        (x, y), (u, v) = corners
+        corners = [(x, y), (u, y), (u, v), (x, v)]
+    if any(len({corner[axis] for corner in corners}) < 2 for axis in (0, 1)):
+        raise InvalidInputError(f"{label}: the corners enclose nothing: they lie on one line")
+    return tuple(corners)
+
+
 class OneOf:
     """One of several names, which shells can complete; ``aliases`` are further names of some."""
 

@@ -221,6 +221,34 @@ def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
     assert "--turns: " in capsys.readouterr().err
 
 
+def test_no_track_starts_in_closed_areas(tmp_path, capsys):
+    """Corners are degrees; two of the three aircraft start in a box and in a triangle."""
+    file, out = described(tmp_path), tmp_path / "tracks.csv"
+    text = (tmp_path / "radars.toml").read_text()
+    # where they are in the first minutes: 46.6 8.1, 46.8 8.35, 47.0 8.6
+    areas = "[[46.5, 8.0], [46.9, 8.2]], [[46.9, 8.5], [47.4, 8.5], [47.2, 8.9], [46.9, 8.9]]"
+    (tmp_path / "radars.toml").write_text(f"closed = [{areas}]\n{text}")
+    assert track.main([file, "-o", str(out), "-q"]) == 0
+    found = pd.read_csv(out, dtype={"target": str})
+    assert {*found.target[found.time < 1626098400 + 60]} == {"2000"}
+    assert live.main([file, "--replay", "0", "-q", "-o", str(tmp_path / "live.csv")]) == 0
+    early = pd.read_csv(tmp_path / "live.csv")
+    early = early[(early.time < 1626098400 + 60) & (early.event == "update")]
+    assert len(early) and early.latitude.between(46.6, 46.9).all() and early.longitude.between(8.3, 8.5).all()
+    capsys.readouterr()
+    for wrong, line in (
+        ("7", "closed: expected a list of areas, got 7"),
+        ("[[[46.5, 8.0]]]", "closed: area 1: expected 2 corners of a box"),
+        ("[[[46.5, 8.0], [146.5, 8.2]]]", "closed: area 1: expected a latitude within +-90"),
+        ("[[[46.5, 8.0], [46.5, 8.2]]]", "closed: area 1: the corners enclose nothing"),
+        ('[[[46.5, "a"], [46.5, 8.2]]]', "closed: area 1: expected [latitude, longitude"),
+    ):
+        (tmp_path / "radars.toml").write_text(f"closed = {wrong}\n{text}")
+        assert track.main([file, "-o", str(out)]) == 2
+        said = capsys.readouterr().err
+        assert line in said and len(said.splitlines()) == 1, said
+
+
 def test_heights_of_lines_are_altitudes(tmp_path):
     file = described(tmp_path)
     (tmp_path / "radars.toml").write_text('name = "Zurich"\n' + (tmp_path / "radars.toml").read_text())

@@ -133,6 +133,32 @@ def test_what_a_scene_does_not_allow_is_refused_before_it_is_tracked(scene_file,
         assert message in told.err and told.err.count("\n") == 1 and not (tmp_path / "tracks.csv").exists()
 
 
+def test_no_track_starts_in_areas_that_the_user_draws(scene_file, tmp_path, capsys):
+    """A box with a corner below 0, and a triangle: what starts there elsewhere, starts nowhere."""
+    out, x = [str(tmp_path / name) for name in ("all.csv", "some.csv")], {}
+    areas = ["--closed", "-5,-5 25e3,60e3", "--closed", "16e3,-9e3 70e3,-9e3 70e3,45e3"]
+    for file, more in zip(out, ([], areas), strict=True):
+        assert track.main([str(scene_file), "-o", file, "-q", "--all", "--tracker", "nn", *more]) == 0
+        frame = pd.read_csv(file)
+        x[file] = frame.groupby("track_id")[["x", "y"]].first().to_numpy()
+
+    def inside(first):
+        return (first[:, 0] < 25e3) | (first[:, 1] < first[:, 0] - 25e3)
+
+    assert inside(x[out[0]]).sum() > 5 and len(x[out[1]]) and not inside(x[out[1]]).any()
+    capsys.readouterr()
+    for area, line in (
+        ("1,2", "expected 2 corners of a box, or 3 or more"),
+        ("1,2 3,x", "--closed: expected a number, got 'x'"),
+        ("1,2 3,inf", "expected 2 corners of a box"),
+        ("1,2 3,4,5", "expected 2 corners of a box"),
+        ("1,2 1,4", "--closed: the corners enclose nothing"),
+    ):
+        assert track.main([str(scene_file), "-o", out[0], "--closed", area]) == 2
+        said = capsys.readouterr().err
+        assert line in said and len(said.splitlines()) == 1
+
+
 def test_what_is_declared_is_checked(scene_file, tmp_path, capsys):
     words = [str(scene_file), "-o", str(tmp_path / "tracks.csv"), "--check"]
     assert track.main(words) == 0

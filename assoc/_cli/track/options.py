@@ -25,9 +25,10 @@ from assoc._cli.options import (
 from assoc._cli.program import command
 
 if TYPE_CHECKING:
+    from assoc._types import Array
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
-    from assoc.tracking import Tracker
+    from assoc.tracking import Initiation, Tracker
 
 TRACKERS = {
     "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
@@ -68,6 +69,8 @@ TRACKING = (
            kinds.OneOf((*TARGETS, "auto"))),
     Option("process_noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)",
            kinds.not_negative),
+    Option("closed", "AREA", "no track starts here: 'X,Y X,Y' is a box, more corners a polygon, metres; again for "
+           "each", kinds.area, rest={"action": "append"}),
     Option("no_adapt", "", "keep to the noise, detection probabilities and false alarms that are declared"),
     *(COMMON[name] for name in _OF_ALL),
     *_OF_TRACKERS,
@@ -249,12 +252,18 @@ def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any
         "solver": solver,
         "solver_parameters": values["solver"],
         "life_cycle": life_cycle,
-        "initiation": Initiation(**values["initiation"]),
+        "initiation": Initiation(**values["initiation"], closed=tuple(given["closed"] or ())),
         **given.some(_OF_ALL),
     }
     if given["identity"] == "use":
         settings["identity"] = IdentityParameters(**values["identity"])
     return given, settings
+
+
+def closing(initiation: Initiation, areas: Sequence[Array]) -> Initiation:
+    """How tracks begin, with more areas where none starts."""
+    more: Any = (*initiation.closed, *areas)
+    return replace(initiation, closed=more) if areas else initiation
 
 
 def add_further(parser: Parser, solver: str) -> dict[str, list[Option]]:

@@ -25,7 +25,7 @@ KEYS = (
     "turn",
 )  # fmt: skip
 """Keys of a table [[radar]]."""
-_TOP = ("name", "origin", "interval", "radar")
+_TOP = ("name", "origin", "interval", "closed", "radar")
 DAY = 86_400.0
 # metres, where a radar's heights by Mode C have no noise of their own: steps of 100 feet, and a pressure that drifts
 _HEIGHT_NOISE = 30.0
@@ -40,6 +40,8 @@ class Radars(NamedTuple):
     turns: list[float]
     identities: list[tuple[Array, ...]]
     """Codes and addresses of the scene's plots."""
+    closed: list[Array]
+    """Areas where no track starts: x and y of their corners."""
 
     @property
     def sensor_turns(self) -> list[float]:
@@ -78,7 +80,31 @@ def read_radars(path: str) -> Radars:
     scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
     scene = replace(scene, name=str(top.get("name", scene.name)))
     identities = identities_of_radars(recordings, radars, scene.times)
-    return Radars(scene, recordings, radars, turns, identities)
+    closed = _areas(top.get("closed", []), f"{path}: closed", origin)
+    return Radars(scene, recordings, radars, turns, identities, closed)
+
+
+def _areas(value: object, label: str, origin: tuple[float, float, float]) -> list[Array]:
+    """Corners of areas in the frame of the scene, by their latitudes and longitudes in degrees."""
+    import numpy as np
+
+    from assoc._cli.values import as_polygon
+    from assoc.scene.geodesy import east_north_up
+
+    if not isinstance(value, list):
+        raise InvalidInputError(f"{label}: expected a list of areas, got {value!r}")
+    found = []
+    for number, area in enumerate(value, 1):
+        where = f"{label}: area {number}"
+        corners = area if isinstance(area, list) else []
+        if len(corners) < 2 or any(not isinstance(one, list) or len(one) != 2 for one in corners):
+            raise InvalidInputError(
+                f"{where}: expected 2 corners of a box, or 3 or more, [latitude, longitude] in degrees, got {area!r}"
+            )
+        polygon = as_polygon([_place(corner, where)[:2] for corner in corners], where)
+        latitudes, longitudes = np.array(polygon).T
+        found.append(east_north_up(latitudes, longitudes, np.zeros(len(polygon)), origin)[:, :2])
+    return found
 
 
 def _days(recordings: list[Recording]) -> list[float]:
