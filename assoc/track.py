@@ -27,6 +27,7 @@ from assoc._cli.track.options import (
     OF_SCENES,
     RADAR,
     TRACKERS,
+    closing,
     make_tracker,
     read_options,
     track_parser,
@@ -137,6 +138,7 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     if given["registration"] == "online":
         raise InvalidInputError("--registration: online needs scans of one instant; take first")
     found = read_radars(file)
+    settings["initiation"] = closing(settings["initiation"], found.closed)
     scene, scans = _registered(found.scene, given, settings), range(found.scene.num_scans)
     known = None if given["identity"] == "ignore" else found.identities
     tracker = make_tracker(
@@ -266,6 +268,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
         missing = []
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
+        tracker.identity_watch.found.clear()
         judged = judged._replace(rates=None, kept=None)
         plots = plots and plots._replace(rates=None, kept=None)
         (table if whole else table.names).take_names(TrackTable())

@@ -26,9 +26,10 @@ from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
+from assoc.tracking.identity_watch import IdentityWatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_time
-from assoc.tracking.stages.identity_evidence import IdentityParameters
+from assoc.tracking.stages.identity_evidence import IdentityParameters, checked_identities
 from assoc.tracking.stages.life_cycle import LifeCycle
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
@@ -135,6 +136,8 @@ class Tracker:
             warn(doubt)
         self.settings = with_nursery(settings)
         self.state = first_state(self.settings)
+        self.identity_watch = IdentityWatch(place.sensors)
+        """What is odd about the identities that `step` was given; see `health`. It is not saved."""
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, targets: str | None = None, **options: Any) -> Self:
@@ -186,7 +189,8 @@ class Tracker:
     @property
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
-        return None if self.state.estimates is None else health(self.sensors, self.state.estimates)
+        found = self.state.estimates
+        return None if found is None else health(self.sensors, found, tuple(self.identity_watch.found))
 
     @property
     def solver_calls(self) -> int:
@@ -255,8 +259,8 @@ class Tracker:
             what it looked at. No sensor may have looked in a direction twice. A sector without width: it did not
             look, as one that is off or reports on its own (AIS). Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
-            Mode 3/A code and ICAO address of each measurement, 0 where it has none; ignored by trackers that were
-            made without `identity`.
+            Mode 3/A code and ICAO address (of a ship its MMSI) of each measurement, 0 where it has none. Trackers that
+            were made without `identity` only watch them (`health`).
 
         Returns
         -------
@@ -274,7 +278,10 @@ class Tracker:
             Once, if all sensors measure angles alone and these measurements can start no track.
         """
         scan = check(self.settings, self.state, time, measurements, times, sectors, identities)
+        known = None if identities is None else checked_identities(identities, [len(z) for z in scan.measurements])
         self.state, step = advance(self.settings, self.state, scan)
+        if known is not None:
+            self.identity_watch.take(step.time, step.assigned, step.confirmed, times, known, lambda: self.tracks)
         return step
 
     def flush(self) -> tuple[Decision, ...]:

@@ -271,15 +271,17 @@ def test_lines_with_identities(scene_file):
     for more, expected in [
         ({"mode3": 1234, "address": "A0B1C2"}, (1234, 0xA0B1C2)),
         ({"mode3": "0457", "address": 5}, (457, 5)),
+        ({"address": 211234567}, (0, 211234567)),
+        ({"address": "211234567"}, (0, 211234567)),
         ({"mode3": None, "address": ""}, (0, 0)),
         ({}, (0, 0)),
     ]:
         assert parse_line(json.dumps(plain | more), scene) == ("1", 2.5, plain["values"], expected)
-    for bad in ("8000", "-1", "12.5", "x", "1_0", "0,1000000", "0,zz", "0,1,2"):
+    for bad in ("8000", "-1", "12.5", "x", "1_0", "0,1000000", "0,zz", "0,1,2", "0,12345678", "0,21123456x"):
         with pytest.raises(InvalidInputError, match="mode3|address|values") as caught:
             parse_line(f"1,2.5,1000,0.5,0.1,{bad}", scene)
         assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
-    for more in ({"mode3": 1.5}, {"mode3": True}, {"address": [1]}, {"address": 2**24}):
+    for more in ({"mode3": 1.5}, {"mode3": True}, {"address": [1]}, {"address": 10**9}):
         with pytest.raises(InvalidInputError, match="expected sensor, time and values"):
             parse_line(json.dumps(plain | more), scene)
 

@@ -13,7 +13,7 @@ from assoc.sensors import PositionSensor, Radar2D
 from assoc.tracking import TRACKERS, IdentityParameters, Initiation
 from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.plots import track_plots
-from assoc.tracking.stages.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
+from assoc.tracking.stages.identity_evidence import LARGEST, MEMORY, Identities, log_ratio
 from tests.sizes import few_or_all, sample
 from tests.tracking.crossing import TURN, crossing, radar
 
@@ -176,7 +176,7 @@ def test_bad_identities_are_refused():
         ([np.zeros((2, 1), dtype=int)], "of shape"),
         ([np.zeros((2, 2))], "whole numbers"),
         ([np.array([[-1, 0], [0, 0]])], "from 0 to"),
-        ([np.array([[0, ADDRESSES], [0, 0]])], "from 0 to"),
+        ([np.array([[0, LARGEST + 1], [0, 0]])], "from 0 to"),
     ):
         with pytest.raises(InvalidInputError, match=words):
             tracker.step(10.0, [z], identities=bad)

@@ -18,6 +18,7 @@ from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import COORDINATES, coordinates
 from assoc.recordings.several import NO_HEIGHT, heights_above
+from assoc.tracking.stages.identity_evidence import LARGEST
 
 if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from assoc.sensors import Sensor
     from assoc.tracking import Picture, Track
 
-ADDRESSES = 2**24
-"""Number of ICAO addresses."""
 LONGEST = 10_000
 """Most characters of a line."""
 # bytes that may wait: beyond them stdin is not read on, and datagrams are lost and counted
@@ -152,17 +151,20 @@ def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
         A value is out of range or not a number.
     """
     found = []
-    for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, ADDRESSES - 1)):
+    for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, LARGEST)):
         number = 0
         if isinstance(given, str) and given.strip():
             digits = given.strip()
-            number = int(digits, base) if digits.isascii() and digits.isalnum() else -1
+            # nine decimal digits are a ship's MMSI
+            ship = base == 16 and len(digits) == 9 and digits.isdigit()
+            plain = digits.isascii() and digits.isalnum() and (ship or base == 10 or len(digits) <= 6)
+            number = int(digits, 10 if ship else base) if plain else -1
         elif isinstance(given, int) and not isinstance(given, bool):
             number = given
         elif given is not None and given != "":
             number = -1
         if not 0 <= number <= most:
-            kind = "a whole number up to 7777" if base == 10 else "six hexadecimal digits"
+            kind = "a whole number up to 7777" if base == 10 else "six hexadecimal digits, or the nine digits of a ship"
             raise ValueError(f"{what}: expected {kind}")
         found.append(number)
     return found[0], found[1]

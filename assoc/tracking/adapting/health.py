@@ -10,6 +10,7 @@ import numpy as np
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
+from assoc.tracking.identity_watch import OddIdentity
 
 _WIDTH = 1.96
 # differences smaller than this share are not worth a word, nor those within so many standard deviations
@@ -94,21 +95,25 @@ class Health:
     sensors : tuple of SensorHealth
     manoeuvres : Quantity
         Process noise of the filter, of its most agile model, relative to that declared.
+    identities : tuple of OddIdentity
+        Codes and addresses that cannot all be right.
     """
 
     sensors: tuple[SensorHealth, ...]
     manoeuvres: Quantity
+    identities: tuple[OddIdentity, ...] = ()
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """One line for each sensor, and one for the targets."""
+        """One line for each sensor, one for the targets, and one for each odd identity."""
         agile = self.manoeuvres.differs and self.manoeuvres.seen > 1.0
         targets = (
             f"manoeuvre about {_times(self.manoeuvres.seen)} as hard as the filter expects"
             if agile
             else ("no harder manoeuvres than the filter expects")
         )
-        return (*(f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors), f"targets: {targets}")
+        sensors = (f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors)
+        return (*sensors, f"targets: {targets}", *map(str, self.identities))
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
@@ -129,8 +134,8 @@ def _times(factor: float) -> str:
     return f"{factor:.2g} times"
 
 
-def health(sensors: Sequence[Sensor], estimates: Estimates) -> Health:
-    """Compare estimates with what was declared of these sensors."""
+def health(sensors: Sequence[Sensor], estimates: Estimates, identities: tuple[OddIdentity, ...] = ()) -> Health:
+    """Compare estimates with what was declared of these sensors; `identities` are those that are odd."""
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
@@ -144,7 +149,7 @@ def health(sensors: Sequence[Sensor], estimates: Estimates) -> Health:
         ]
         rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands)))
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
-    return Health(tuple(rows), manoeuvres)
+    return Health(tuple(rows), manoeuvres, identities)
 
 
 def _quantity(declared: float, seen: float, spread: float, column: int) -> Quantity:

@@ -21,6 +21,7 @@ from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.arrays import LARGEST
+from assoc.tracking.identity_watch import IdentityWatch
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
@@ -94,6 +95,7 @@ class LiveTracker:
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
+        self._watch = IdentityWatch(scene.sensors, decimal=True)
         self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
         self._first: list[list[Array]] = [[] for _ in scene.sensors]
@@ -378,8 +380,12 @@ class LiveTracker:
         begin, step = clock.perf_counter(), None
         try:
             step = state.tracker.step(end, z, times, sectors, identities)
-            for known in zip(step.assigned, step.confirmed, times, identities, strict=True):
-                self._kept.take(*known)
+            known = step.assigned, step.confirmed, times, identities
+            for one in zip(*known, strict=True):
+                self._kept.take(*one)
+            for odd in self._watch.take(end, *known, lambda: state.tracker.tracks):
+                self.counts["odd identities"] += 1
+                settings.tell(f"warning: {odd}")
             self.counts["late"] += step.late
             if step.refused:
                 self.counts["too old"] += step.refused

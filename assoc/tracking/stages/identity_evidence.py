@@ -28,6 +28,8 @@ from assoc.errors import InvalidInputError
 
 CODES, ADDRESSES = 2**12, 2**24
 """Numbers of Mode 3/A codes and of addresses."""
+LARGEST = 999_999_999
+"""Largest identity: ships have nine decimal digits (MMSI) in place of an address, above all addresses."""
 UNKNOWN = 0
 """Code or address of a plot without one."""
 MEMORY = 6
@@ -124,7 +126,7 @@ class Identities(NamedTuple):
         """
         ids, told = arrays[f"{PREFIX}ids"], arrays[f"{PREFIX}told"]
         good = ids.ndim == 1 and told.shape == (len(ids), MEMORY, 2) and bool((np.diff(ids) > 0).all())
-        if not good or (told < 0).any() or (told >= ADDRESSES).any():
+        if not good or (told < 0).any() or (told > LARGEST).any():
             raise InvalidInputError(f"the fields '{PREFIX}...' are no identities of tracks")
         return Identities(self.parameters, ids, told)
 
@@ -183,6 +185,6 @@ def checked_identities(identities: Sequence[Array], sizes: Sequence[int]) -> lis
                 f"got {array.dtype} {array.shape}"
             )
         # some sources write the four octal digits of a code as a decimal number, up to 7777
-        if array.size and not (array.min() >= 0 and array.max() < ADDRESSES):
-            raise InvalidInputError(f"identities of sensor {s}: expected numbers from 0 to {ADDRESSES - 1}")
+        if array.size and not (array.min() >= 0 and array.max() <= LARGEST):
+            raise InvalidInputError(f"identities of sensor {s}: expected numbers from 0 to {LARGEST}")
     return [array.astype(np.int64) for array in found]
