@@ -98,6 +98,14 @@ class Expected(NamedTuple):
     """With the sensor's noise, (B, d, d)."""
 
 
+class Fit(NamedTuple):
+    """How well K measurements fit targets."""
+
+    log_likelihood: Array
+    nis: Array
+    """Squared Mahalanobis distance from the expected measurement."""
+
+
 class History(NamedTuple, Generic[S]):
     """Result of `Filter.run`: the corrected states of K steps."""
 
@@ -230,6 +238,28 @@ class Filter(ABC, Generic[S]):
         if len(times) != len(z):
             raise InvalidInputError(f"dt must be one number or {len(z)}, got {len(times)}")
         return z, times
+
+    def fit(self, state: S, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
+        """How well measurements fit, as `update` says, without correcting anything.
+
+        Parameters
+        ----------
+        state
+            B targets.
+        expected : Expected
+            What `expected` returns for them.
+        rows : int array (K,)
+            Target of each measurement; those of one target side by side.
+        measured : array (K, d)
+        sensor
+            As in `update`.
+
+        Returns
+        -------
+        Fit or None
+            None: this filter, or this sensor's model, has to correct states for it.
+        """
+        return None
 
     def log_likelihood(self, state: S, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood of each of M measurements (M, d) under each of B targets, (B, M)."""

@@ -17,8 +17,10 @@ from assoc._parameters import positive
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, Update, check_dimension
+from assoc.filters.base import Expected, Filter, Fit, Update, check_dimension, complain
 from assoc.filters.batches import Batch
+from assoc.filters.kernels.gates import distances
+from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement
 from assoc.filters.state import Gaussian, finite, gaussian
@@ -258,6 +260,23 @@ class InteractingMultipleModel(Filter[Mixture]):
         covariance = np.einsum("bm,bmij->bij", state.weights, S)
         covariance += np.einsum("bm,bmi,bmj->bij", state.weights, spread, spread)
         return Expected(base[:, 0] + mean, covariance)
+
+    def fit(self, state: Mixture, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
+        """How well measurements fit, without correcting anything; see `Filter.fit`."""
+        each = []
+        for j, model in enumerate(self.filters):
+            found = model.fit(state.component(j), expected, rows, measured, sensor)
+            if found is None:
+                return None
+            each.append(found.log_likelihood)
+        with np.errstate(divide="ignore"):
+            joint = np.stack(each, axis=1) + np.log(state.weights)[rows]
+        top = joint.max(axis=1, keepdims=True)
+        total = np.exp(joint - top).sum(axis=1, keepdims=True)
+        status, nis = distances(*expected, rows, measured, self.observe(sensor).code)
+        if status != GOOD:
+            complain(status)
+        return Fit((top + np.log(total))[:, 0], nis)
 
     def log_likelihood(self, state: Mixture, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood under the mixture of the models' predictions, (B, M)."""

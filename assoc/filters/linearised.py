@@ -12,6 +12,7 @@ from assoc._types import Array
 from assoc.filters.base import (
     Expected,
     Filter,
+    Fit,
     History,
     Update,
     check_dimension,
@@ -19,8 +20,8 @@ from assoc.filters.base import (
     measured_array,
     update_of,
 )
-from assoc.filters.kernels.gates import expect
-from assoc.filters.kernels.gaussian import GOOD, STATUSES, follow
+from assoc.filters.kernels.gates import expect, fits
+from assoc.filters.kernels.gaussian import GOOD, PLAIN, STATUSES, follow
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.gaussian import step as step_kernel
 from assoc.filters.kernels.gaussian import update as update_kernel
@@ -166,3 +167,14 @@ class GaussianFilter(Filter[Gaussian]):
             H = o.model.jacobian(state.mean)
             return Expected(o.model.measure(state.mean), H @ state.covariance @ H.transpose(0, 2, 1) + o.covariance)
         return Expected(*expect(state.mean, state.covariance, o.packed, o.dim))
+
+    def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
+        """How well measurements fit, without correcting anything; see `Filter.fit`."""
+        o, own = self.observe(sensor), type(self)
+        if o.code < 0 or self.kind != PLAIN or own.update is not GaussianFilter.update:
+            return None
+        found = _empty((2, len(rows)))
+        status = fits(state.mean, state.covariance, rows, measured, o.packed, found)
+        if status != GOOD:
+            complain(status)
+        return Fit(found[0], found[1])

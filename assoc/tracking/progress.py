@@ -21,6 +21,9 @@ from assoc.tracking.track_batch import TrackBatch
 # default limits of the exact solver on one scan: visits of tuples in branch and bound, and the least number of nodes;
 # counted, not timed, so that the answer does not depend on the machine
 _VISITS, _LEAST_NODES = 500_000, 10
+# relative gap with which it may leave a component of 2,000 measurements and more: first scans of large crowds are
+# a single one, and the tracks are as good
+_GAP = 1e-3
 
 
 class Association(NamedTuple):
@@ -35,11 +38,12 @@ class Association(NamedTuple):
 
 
 class Work:
-    """New ids and calls of the solver in a step, counted on from the state before it."""
+    """New ids and calls of the solver in a step, counted on from the state before it, and the gap that is left."""
 
     def __init__(self, settings: TrackerSettings, state: TrackerState) -> None:
         self.settings, self.scan = settings, state.scan
         self.next_id, self.solver_calls = state.next_id, state.solver_calls
+        self.gap = 0.0
 
     def new_ids(self, count: int) -> Array:
         """Ids that no track has had, int64 (count,)."""
@@ -53,14 +57,21 @@ class Work:
         # seeded by scan and call, so that a restored tracker continues identically
         seed = np.random.SeedSequence((self.settings.seed, self.scan))
         options = solver_options(self.settings, problem.num_tuples)
-        return assign(problem, self.settings.solver, seed=seed, advise=False, **options)
+        solution = assign(problem, self.settings.solver, seed=seed, advise=False, **options)
+        if solution.status != "optimal":
+            self.leave(solution.gap / max(1.0, abs(solution.cost)))
+        return solution
+
+    def leave(self, gap: float) -> None:
+        """Note a relative gap that is left."""
+        self.gap = max(self.gap, gap)
 
 
 def solver_options(settings: TrackerSettings, tuples: int) -> dict[str, Any]:
     """Time limit and parameters of the solver for a problem with this many tuples."""
     options = {"time_limit": settings.time_limit, **settings.solver_parameters}
     if settings.solver == "exact" and settings.time_limit is None:
-        options = {"nodes": max(_LEAST_NODES, _VISITS // max(tuples, 1)), "patience": 0} | options
+        options = {"nodes": max(_LEAST_NODES, _VISITS // max(tuples, 1)), "patience": 0, "gap": _GAP} | options
     return options
 
 

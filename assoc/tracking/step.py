@@ -225,6 +225,8 @@ def remember_identities(progress: Progress) -> Progress:
 def report(progress: Progress) -> Progress:
     """End the step: set time, scan number and counters of the new state."""
     work, scan = progress.work, progress.scan
+    if work.gap > 0.0 and progress.step is not None:
+        progress = progress._replace(step=replace(progress.step, gap=work.gap))
     return progress.with_state(
         time=scan.time, scan=progress.state.scan + 1, next_id=work.next_id, solver_calls=work.solver_calls
     )

@@ -145,6 +145,9 @@ class Step(Decision):
     late, refused : int
         Measurements older than the last scan that were used, and those too old for that; see
         `assoc.tracking.LatePlots`.
+    gap : float
+        How far the score of the association may be from the best one's, relative, in the worst assignment problem of
+        the step; 0: all were proved to be best. First scans of thousands of targets are left with up to 0.001.
     """
 
     final: tuple[Decision, ...] = ()
@@ -152,6 +155,7 @@ class Step(Decision):
     merged: Array = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     late: int = 0
     refused: int = 0
+    gap: float = 0.0
 
 
 def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:

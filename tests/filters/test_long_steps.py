@@ -244,3 +244,33 @@ def test_without_the_compiler_it_is_the_same():
     for name, parts in compiled.items():
         for a, b in zip(plain[name], parts, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("name", every_filter())
+def test_a_fit_is_what_an_update_says(name):
+    """To the last bit, so that trackers may choose pairs first and correct states after; a mixture's NIS but nearly."""
+    one, sensor = every_filter()[name]
+    start, _ = problem(one, count=6)
+    state, rng = one.start(start), np.random.default_rng(4)
+    rows = np.repeat(np.arange(6), [3, 0, 1, 5, 2, 4])
+    if isinstance(sensor, LinearMeasurement):
+        places = start.mean[rows, :3]
+    else:
+        places = sensor.measure(start.mean[rows, :3])
+    z = places + 3.0 * rng.standard_normal(places.shape) * np.sqrt(np.diag(sensor.covariance))
+    fit = one.fit(state, one.expected(state, sensor), rows, z, sensor)
+    if name in ("modified", "unscented", "ensemble", "fuzzy"):
+        assert fit is None
+        return
+    done = one.update(state[rows], z, sensor)
+    np.testing.assert_array_equal(fit.log_likelihood, done.log_likelihood)
+    np.testing.assert_allclose(fit.nis, done.nis, rtol=1e-9 if name == "imm" else 0.0)
+
+
+def test_a_filter_with_its_own_update_is_asked_for_it():
+    class Cautious(KalmanFilter):
+        def update(self, state, measured, sensor):
+            return super().update(state, measured + 1.0, sensor)
+
+    one, state = Cautious(MOTION), random_state(2, np.random.default_rng(0))
+    assert one.fit(state, one.expected(state, PLACE), np.arange(2), state.mean[:, :3].copy(), PLACE) is None

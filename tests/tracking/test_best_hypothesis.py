@@ -36,7 +36,7 @@ def by_solver(tree, score, history):
 @pytest.mark.parametrize("seed", range(60))
 def test_the_best_hypothesis_is_that_of_a_solver(seed):
     tree, score, history = branches(seed, trees=2 + seed % 12, measurements=2 + seed % 17)
-    chosen, doubtful = choose(score, history, priced(tree, score, history), VISITS)
+    chosen, doubtful, _ = choose(score, history, priced(tree, score, history), VISITS)
     assert not doubtful.any()
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
     assert len(set(tree[chosen])) == chosen.sum()
@@ -51,14 +51,14 @@ def test_prices_that_say_nothing_change_nothing_but_the_work(seed):
     known = priced(tree, score, history)
     top = np.array([max(score[known.number == t].max(), 0.0) for t in range(len(known.trees))])
     plain = known._replace(trees=top, measurements=np.zeros_like(known.measurements), loss=top[known.number] - score)
-    chosen, doubtful = choose(score, history, plain, 10**9)
+    chosen, doubtful, _ = choose(score, history, plain, 10**9)
     assert not doubtful.any()
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 
 
 def test_when_the_work_is_too_much_a_hypothesis_is_found_and_its_branches_are_named():
     tree, score, history = branches(1, trees=12, measurements=9)
-    chosen, doubtful = choose(score, history, priced(tree, score, history), 20)
+    chosen, doubtful, _ = choose(score, history, priced(tree, score, history), 20)
     assert chosen.any()
     assert doubtful.any()
     assert (score[doubtful] > 0).all()
@@ -72,7 +72,7 @@ def test_a_group_that_takes_too_long_costs_others_nothing():
     tree = np.concatenate([hard[0], [1000, 1000, 1001, 1001]])
     score = np.concatenate([hard[1], [9.0, 8.0, 9.5, 4.0]])
     history = np.concatenate([hard[2], np.array([[10, 0, 0], [0, 0, 0]] * 2, dtype=np.int32)])
-    chosen, doubtful = choose(score, history, priced(tree, score, history), 20)
+    chosen, doubtful, _ = choose(score, history, priced(tree, score, history), 20)
     own = tree >= 1000
     assert doubtful[~own].any() and not doubtful[own].any()
     assert score[chosen & own].tolist() == [8.0, 9.5]
@@ -97,7 +97,7 @@ def test_a_solver_is_asked_where_the_search_takes_too_long():
 
     hits = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
     roots = Roots(np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int32), np.zeros(0), np.zeros(0))
-    kept, after, chosen = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve, 20)
+    _, after, chosen, _ = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve, 20)
     assert asked
     assert -after.numbers[chosen, SCORE].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 
@@ -122,7 +122,7 @@ def test_nothing_good_is_nothing_chosen():
     tree, score, history = branches(1, trees=12, measurements=9)
     for rows in (slice(None), slice(0)):
         t, s, h = tree[rows], -np.abs(score[rows]), history[rows]
-        chosen, doubtful = choose(s, h, priced(t, s, h), VISITS)
+        chosen, doubtful, _ = choose(s, h, priced(t, s, h), VISITS)
         assert not doubtful.any()
         assert not chosen.any()
         assert len(chosen) == len(t)
@@ -219,3 +219,25 @@ def test_positions_of_single_measurements(sensor):
         np.testing.assert_allclose(found[1], wanted[1], rtol=1e-9, atol=1e-9)
     empty = single_positions(scene, 1, z[:0])
     assert empty[0].shape == (0, 3) and empty[1].shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize(("trees", "settled"), [(300, False), (2_500, True)])
+def test_the_largest_groups_keep_a_small_gap(trees, settled):
+    """A search looks at all trees for each: one descent grows with the branches alone. Fewer trees go to a solver."""
+    rng = np.random.default_rng(trees)
+    tree = np.repeat(np.arange(trees), 6)
+    # each tree contends with those beside it, so that all are one group
+    history = (tree[:, None] + rng.integers(-2, 3, (len(tree), 2))) % trees + 1
+    history[::6] = tree[::6, None] + 1
+    history = history.astype(np.int32)
+    off = np.abs((history - tree[:, None] - 1 + trees // 2) % trees - trees // 2).sum(axis=1)
+    score = 300.0 - 3.0 * off + rng.normal(0.0, 1.0, len(tree))
+    known = priced(tree, score, history)
+    chosen, doubtful, gap = choose(score, history, known, VISITS)
+    total = score[chosen].sum()
+    assert len(set(tree[chosen])) == chosen.sum()
+    assert all(len(set(c)) == len(c) for c in history[chosen].T)
+    assert doubtful.any() != settled
+    if settled:
+        assert 0.0 < gap <= 1e-3
+        assert total * (1.0 + gap) >= -by_solver(tree, score, history) * (1.0 - 1e-9)

@@ -40,7 +40,7 @@ def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
     ("options", "expected"),
     [
         ({"time_limit": 7.0}, {"time_limit": 7.0}),
-        ({"solver_parameters": {"nodes": 3}}, {"time_limit": None, "nodes": 3, "patience": 0}),
+        ({"solver_parameters": {"nodes": 3}}, {"time_limit": None, "nodes": 3, "patience": 0, "gap": 1e-3}),
         ({"solver": "greedy"}, {"time_limit": None}),
     ],
 )
@@ -54,7 +54,7 @@ def test_the_work_is_less_for_large_problems(scene):
     for one in (settings, settings.nursery):
         found = [solver_options(one, count) for count in (0, 10, 10_000, 10_000_000)]
         assert [each.pop("nodes") for each in found] == [500_000, 50_000, 50, 10]
-        assert all(each == {"time_limit": None, "patience": 0} for each in found)
+        assert all(each == {"time_limit": None, "patience": 0, "gap": 1e-3} for each in found)
 
 
 @pytest.mark.parametrize("seed", (200, 201))

@@ -8,7 +8,7 @@ of (track, z_1, ..., z_S) is the negative logarithm of p(z_1, ..., z_S | track) 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks.gating import Near, angular_components, near_both, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.errors import LimitExceededError
-from assoc.filters.base import Filter
+from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import concatenate
 from assoc.filters.measurement import Measurement
 
@@ -42,13 +42,14 @@ class TrackTuples(NamedTuple):
 
 
 class TrackPairs(NamedTuple):
-    """K measurements of one sensor in the gates of tracks, and the tracks corrected by them."""
+    """K measurements of one sensor in the gates of tracks."""
 
     track: Array
     measurement: Array
     """0-based."""
     log_likelihood: Array
-    states: Any
+    correct: Callable[[Array], Any]
+    """The tracks' states corrected by the pairs in these rows: those that are used, not all."""
 
 
 def gate_of(sensor: Measurement, probability: float) -> float:
@@ -57,12 +58,13 @@ def gate_of(sensor: Measurement, probability: float) -> float:
 
 
 def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: Measurement, gate: float) -> TrackPairs:
-    """Correct tracks by every measurement of one sensor in their gates."""
-    nothing = np.zeros(0, dtype=np.int64)
+    """Pairs of tracks and the measurements of one sensor in their gates."""
     if not len(states) or not len(measurements):
-        return TrackPairs(nothing, nothing, np.zeros(0), states[nothing])
-    track, found = near_pairs(filter.expected(states, sensor), measurements, angular_components(sensor), gate)
-    return _corrected(filter, states, measurements, sensor, gate, track, found)
+        nothing = np.zeros(0, dtype=np.int64)
+        return TrackPairs(nothing, nothing, np.zeros(0), lambda rows: states[nothing])
+    expected = filter.expected(states, sensor)
+    track, found = near_pairs(expected, measurements, angular_components(sensor), gate)
+    return _gated(filter, states, expected, measurements, sensor, gate, track, found)
 
 
 def require_states(states: Any, count: int) -> None:
@@ -79,17 +81,36 @@ def require_states(states: Any, count: int) -> None:
     )
 
 
+def _gated(
+    filter: Filter[Any], states: Any, expected: Expected, z: Array, sensor: Measurement, gate: float,
+    track: Array, found: Array,
+) -> TrackPairs:  # fmt: skip
+    """Of these pairs those that are in the gate."""
+    fit = filter.fit(states, expected, track, np.ascontiguousarray(z[found]), sensor) if len(track) else None
+    if fit is None:
+        return _corrected(filter, states, z, sensor, gate, track, found)
+    inside = np.flatnonzero(fit.nis <= gate)
+    track, found = track[inside], found[inside]
+
+    def correct(rows: Array) -> Any:
+        require_states(states, len(rows))
+        if not len(rows):
+            return states[rows]
+        return filter.update(states[track[rows]], np.ascontiguousarray(z[found[rows]]), sensor).state
+
+    return TrackPairs(track, found, fit.log_likelihood[inside], correct)
+
+
 def _corrected(
-    filter: Filter[Any], states: Any, measurements: Array, sensor: Measurement, gate: float, track: Array, found: Array
+    filter: Filter[Any], states: Any, z: Array, sensor: Measurement, gate: float, track: Array, found: Array
 ) -> TrackPairs:
+    """The same with a filter that has to correct states to say how well measurements fit."""
     if not len(track):
-        return TrackPairs(track, found, np.zeros(0), states[track])
+        return TrackPairs(track, found, np.zeros(0), lambda rows: states[track])
     require_states(states, len(track))
-    done = filter.update(states[track], np.ascontiguousarray(measurements[found]), sensor)
-    inside = done.nis <= gate
-    if inside.all():
-        return TrackPairs(track, found, done.log_likelihood, done.state)
-    return TrackPairs(track[inside], found[inside], done.log_likelihood[inside], done.state[inside])
+    done = filter.update(states[track], np.ascontiguousarray(z[found]), sensor)
+    inside = np.flatnonzero(done.nis <= gate)
+    return TrackPairs(track[inside], found[inside], done.log_likelihood[inside], lambda rows: done.state[inside[rows]])
 
 
 def grow_track_tuples(
@@ -170,16 +191,16 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
     costs = np.zeros(len(states))
     alone = -misses.sum(axis=1)
     for s, (z, sensor, gate) in enumerate(zip(growth.measurements, growth.sensors, growth.gates, strict=True)):
+        expected = filter.expected(states, sensor)
         if s:
             # measurements so far narrow the gate
-            expected = filter.expected(states, sensor)
             parent, found = near_both(expected, track, near[s], z, growth.angles[s], gate, most)
         else:
             parent, found = np.repeat(track, np.diff(near[0].first)), near[0].found
         if len(parent) + len(track) > most:
             track = np.concatenate([track, track[parent]])
             return TrackTuples(track, np.zeros((len(track), rows.shape[1]), np.int32), np.zeros(len(track)))
-        done = _corrected(filter, states, z, sensor, gate, parent, found)
+        done = _gated(filter, states, expected, z, sensor, gate, parent, found)
         new = rows[done.track]
         new[:, s] = done.measurement + 1
         costs = np.concatenate(
@@ -190,8 +211,8 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
         # the sensors left must be able to bring the cost below that of a track all missed
         hopeful = np.flatnonzero((costs - growth.ahead[s + 1] < alone[track]) | ~rows.any(axis=1))
         if s < last:
-            states = concatenate([states, done.states])
-            states = states[hopeful] if len(hopeful) < len(rows) else states
+            old = int(np.searchsorted(hopeful, len(states)))
+            states = concatenate([states[hopeful[:old]], done.correct(hopeful[old:] - len(states))])
         costs, rows, track = costs[hopeful], rows[hopeful], track[hopeful]
     order = np.lexsort((*rows.T[::-1], track))
     return TrackTuples(track[order], rows[order], costs[order])

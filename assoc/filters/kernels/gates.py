@@ -14,9 +14,14 @@ from assoc.filters.kernels.gaussian import (
     LOG_TURN,
     PLAIN,
     STATUSES,
+    H,
+    R,
+    V,
     elevation_of,
+    innovate,
     linearise_at,
     modify,
+    squared,
     unpack,
 )
 from assoc.filters.kernels.linear_algebra import factor
@@ -78,3 +83,69 @@ def expect(mean: Array, P: Array, models: Array, d: int) -> tuple[Array, Array]:
             for e in range(d):
                 S[b, a, e] += R[a, e]
     return hs, S
+
+
+@njit
+def fits(mean: Array, P: Array, rows: Array, z: Array, models: Array, found: Array) -> int:
+    """Log-likelihoods and NIS of measurements z (K, d) of the targets in these rows, as `gaussian.update` has them.
+
+    They are written into found (2, K). Rows of one target should be side by side: it is looked at once. The model,
+    packed (1, ...), is linearised and PLAIN. Returns GOOD, or BAD_COVARIANCE plus STATUSES times the target's number.
+    """
+    K, d = z.shape
+    code, _, position, columns, matrix, noise = unpack(models[0], d)
+    c, wide = len(columns), max(mean.shape[1], d)
+    linear, work, S = np.empty((3, d, max(3, c, d))), np.empty((6, wide, wide)), np.empty((d, d))
+    h, v = np.empty(d), np.empty(d)
+    for a in range(d):
+        for e in range(d):
+            linear[R, a, e] = noise[a, e]
+    last, log_det = -1, 0.0
+    for k in range(K):
+        b = rows[k]
+        if b != last:
+            last = b
+            linearise_at(code, position, columns, matrix, mean[b], h, linear[H])
+            if d == 3 and c == 3:
+                good, log_det = innovate(3, 3, P[b], columns, linear, work, S)
+            else:
+                good, log_det = innovate(d, c, P[b], columns, linear, work, S)
+            if not good:
+                return BAD_COVARIANCE + STATUSES * b
+        for a in range(d):
+            v[a] = z[k, a] - h[a]
+        wrap(code, v)
+        for a in range(d):
+            linear[V, 0, a] = v[a]
+        nis = squared(3, linear, work) if d == 3 else squared(d, linear, work)
+        found[0, k] = -0.5 * (nis + log_det + d * LOG_TURN)
+        found[1, k] = nis
+    return GOOD
+
+
+@njit
+def distances(h: Array, S: Array, rows: Array, z: Array, code: int) -> tuple[int, Array]:
+    """Squared Mahalanobis distances (K,) of z (K, d) from what is expected of targets: h (B, d), S (B, d, d).
+
+    Rows of one target should be side by side. The first number is a status as of `fits`.
+    """
+    K, d = z.shape
+    square, L, v = np.empty(K), np.zeros((d, d)), np.empty(d)
+    last = -1
+    for k in range(K):
+        b = rows[k]
+        if b != last:
+            last = b
+            if not factor(S[b], d, L):
+                return BAD_COVARIANCE + STATUSES * b, square
+        for a in range(d):
+            v[a] = z[k, a] - h[b, a]
+        wrap(code, v)
+        total = 0.0
+        for a in range(d):
+            for e in range(a):
+                v[a] -= L[a, e] * v[e]
+            v[a] /= L[a, a]
+            total += v[a] * v[a]
+        square[k] = total
+    return GOOD, square

@@ -121,13 +121,10 @@ def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: A
 
 
 @literal_njit
-def correct(
-    d: int, c: int, P: Array, columns: Array, linear: Array, work: Array, S: Array, new_P: Array
-) -> tuple[bool, float, float]:
-    """Joseph's correction of one covariance; returns whether S is positive definite, NIS and ln det S.
+def innovate(d: int, c: int, P: Array, columns: Array, linear: Array, work: Array, S: Array) -> tuple[bool, float]:
+    """Covariance of a residual, S; the inverse of its factor goes to L; whether it is positive definite, and ln det S.
 
-    d and c are the numbers of measured quantities and of columns: the compiler unrolls the loops of a caller
-    that gives them literally. S receives the residual's covariance.
+    Of the working space it also writes X, P H'.
     """
     n = len(P)
     for i in range(n):
@@ -144,9 +141,8 @@ def correct(
             S[a, e] = total
             S[e, a] = total
     if not factor(S, d, work[L]):
-        return False, 0.0, 0.0
-    # the inverse of S; Joseph's form forgives rounding errors of the gain
-    log_det = nis = 0.0
+        return False, 0.0
+    log_det = 0.0
     for a in range(d):
         log_det += 2.0 * math.log(work[L, a, a])
         work[L, a, a] = 1.0 / work[L, a, a]
@@ -156,10 +152,36 @@ def correct(
             for k in range(a, e):
                 total -= work[L, e, k] * work[L, k, a]
             work[L, e, a] = total * work[L, e, e]
+    return True, log_det
+
+
+@literal_njit
+def squared(d: int, linear: Array, work: Array) -> float:
+    """NIS of the residual, after `innovate`."""
+    nis = 0.0
+    for a in range(d):
         total = 0.0
         for e in range(a + 1):
             total += work[L, a, e] * linear[V, 0, e]
         nis += total * total
+    return nis
+
+
+@literal_njit
+def correct(
+    d: int, c: int, P: Array, columns: Array, linear: Array, work: Array, S: Array, new_P: Array
+) -> tuple[bool, float, float]:
+    """Joseph's correction of one covariance; returns whether S is positive definite, NIS and ln det S.
+
+    d and c are the numbers of measured quantities and of columns: the compiler unrolls the loops of a caller
+    that gives them literally. S receives the residual's covariance.
+    """
+    n = len(P)
+    good, log_det = innovate(d, c, P, columns, linear, work, S)
+    if not good:
+        return False, 0.0, 0.0
+    # the inverse of S; Joseph's form forgives rounding errors of the gain
+    nis = squared(d, linear, work)
     for a in range(d):
         for e in range(a + 1):
             total = 0.0

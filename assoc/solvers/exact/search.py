@@ -40,17 +40,28 @@ _HARD = 500
 _DENSE = 15
 # columns per row up to which a component is nearly decided: branching goes first
 _THIN = 4
+# rows from which a component may keep the gap that the caller allows
+_VAST = 2000
 
 
 @dataclass(slots=True, kw_only=True)
 class _Searches(Turns):
     node_limit: int
     patience: int
+    gap: float = 0.0
     out_of_memory: bool = False
+    within_gap: bool = False
 
     @property
     def nodes_left(self) -> int:
         return self.node_limit - self.iterations
+
+    def good_enough(self, component: Component) -> bool:
+        """Whether a large component may keep its gap."""
+        left = component.weight - max(component.bound, component.proven)
+        enough = component.packing.num_rows >= _VAST and left <= self.gap * abs(component.weight)
+        self.within_gap |= enough
+        return enough
 
 
 @dataclass(slots=True)
@@ -69,6 +80,8 @@ class _Task:
     def turn(self) -> bool:
         """One iteration of a metaheuristic, or some nodes of branch and bound and sometimes an iteration."""
         component = self.component
+        if self.all.good_enough(component):
+            return True
         if not self.all.run.should_stop() and self.all.nodes_left > 0:
             if self._improves:
                 self._search_better()
@@ -146,14 +159,14 @@ class _Task:
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
 
 
-def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
-    """Solve a packing to proven optimality or until the nodes or the time are used up."""
+def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run, gap: float = 0.0) -> Outcome:
+    """Solve a packing to proven optimality, large components to a gap, or until the nodes or the time are used up."""
     found = _by_matching(packing, run) if packing.num_sensors == 2 else None
     if found is not None:
         return found
     if packing.num_columns > _HARD:
         compile_branching_ahead(surely=packing.num_columns > _DENSE * packing.num_rows)
-    searches = _Searches(run=run, node_limit=node_limit, patience=patience)
+    searches = _Searches(run=run, node_limit=node_limit, patience=patience, gap=gap)
     reduction = Reduction(packing, run)
     components = reduction.reduce()
     searches.columns += reduction.closed_columns
@@ -178,6 +191,8 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     cut_off = searches.out_of_memory or searches.nodes_left <= 0
     if cut_off and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if searches.out_of_memory else "iterations"
+    if searches.within_gap and not run.stopped_by:
+        run.stopped_by = "gap"
     return searches.outcome(None if components else reduction.proof)
 
 
@@ -208,7 +223,7 @@ def _match(component: Component) -> bool:
 def _sharpen(component: Component, searches: _Searches) -> list[Component]:
     """Repeat the dual ascent, with enough time at every temperature, on a component that the reduction left open."""
     run = searches.run
-    if run.should_stop():
+    if run.should_stop() or searches.good_enough(component):
         # one pass over a million columns takes longer than a short time limit
         return [component]
     component.take_over(dual_bound(component.packing, run=run))
@@ -218,8 +233,8 @@ def _sharpen(component: Component, searches: _Searches) -> list[Component]:
             close_by_regions(component, partial(_search_shortly, searches))
         parts = split_component(component)
         if parts:
-            return [smaller for part in parts for smaller in _with_program(part, run)]
-    return _with_program(component, run)
+            return [smaller for part in parts for smaller in _with_program(part, searches)]
+    return _with_program(component, searches)
 
 
 def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
@@ -230,8 +245,10 @@ def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
     return found
 
 
-def _with_program(component: Component, run: Run) -> list[Component]:
+def _with_program(component: Component, searches: _Searches) -> list[Component]:
     """Adopt the multipliers of the linear program; the components that are left, or the component itself."""
-    if not component.closed and not run.should_stop():
-        component.sharpen(run)
+    if searches.good_enough(component):
+        return [component]
+    if not component.closed and not searches.run.should_stop():
+        component.sharpen(searches.run)
     return (None if component.closed else split_component(component, share=0.9)) or [component]

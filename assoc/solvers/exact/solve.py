@@ -28,7 +28,7 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
     InfeasibleError
         There is no solution (proved), or none was found in time.
     """
-    outcome = search_to_the_end(packing, parameters.nodes, parameters.patience, run)
+    outcome = search_to_the_end(packing, parameters.nodes, parameters.patience, run, parameters.gap)
     return outcome if run.stopped_by else _where_costs_cancel(packing, outcome, run)
 
 

@@ -237,7 +237,7 @@ def _take_in(
         return tracks, np.zeros(0, dtype=np.bool_)
     target = np.concatenate([pairs.track, np.arange(count)])
     weights = np.concatenate([share, update.missed]) / update.after[target]
-    states = merged(concatenate([pairs.states, tracks.states]), target, weights, count)
+    states = merged(concatenate([pairs.correct(np.arange(len(share))), tracks.states]), target, weights, count)
     hit = update.detected > 0.5
     return tracks.scored(states, update.odds - tracks.existence, np.where(hit, time, np.nan)), hit
 

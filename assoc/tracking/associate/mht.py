@@ -117,13 +117,14 @@ class TrackTrees(DeferringMethod):
             return _solved(progress, tree, score, history)
 
         limits = self.max_branches, self.branch_drop
-        done = extend(tables, offers.missed, hits, Roots(*offers.births), s, scan, *limits, solve)
-        if len(done[0]) > most:
+        kept, grown, chosen, gap = extend(tables, offers.missed, hits, Roots(*offers.births), s, scan, *limits, solve)
+        if len(kept) > most:
             raise LimitExceededError(
-                f"scan {scan}: {len(done[0])} branches, more than max_tuples = {most}; "
+                f"scan {scan}: {len(kept)} branches, more than max_tuples = {most}; "
                 "lower gate_probability, depth or max_branches, or raise max_tuples"
             )
-        return done
+        progress.work.leave(gap)
+        return kept, grown, chosen
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
         """Confirm trees, decide the oldest scan of the window, delete branches that contradict it, and tracks."""

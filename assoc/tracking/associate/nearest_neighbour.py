@@ -144,7 +144,7 @@ def _corrected(tracks: TrackBatch, pairs: TrackPairs, chosen: Array, hit: Array)
         return tracks.states
     rest = np.flatnonzero(~hit)
     back = np.argsort(np.concatenate([pairs.track[chosen], rest]), kind="stable")
-    return concatenate([pairs.states[chosen], tracks.states[rest]])[back]
+    return concatenate([pairs.correct(chosen), tracks.states[rest]])[back]
 
 
 class NearestNeighbourTracker(Tracker):

@@ -4,7 +4,9 @@ The score of a global hypothesis is the sum of the prices of `assoc.tracking.mht
 branches taken and the prices of unused trees and measurements. Trees that share no measurement, not even through
 others, form independent groups. In each group the search tries the branches tree by tree, the least loss first, and
 prunes where even the branches that still fit cannot beat the incumbent. With good prices the first descent is nearly
-always optimal. Groups that exceed their limit of work are returned as doubtful, for a solver.
+always optimal. Groups that exceed their limit of work are returned as doubtful, for a solver. Groups so large that
+one descent exceeds it get only that; in the largest, first scans of crowds, it is enough if it is within a small gap of
+the prices.
 """
 
 from __future__ import annotations
@@ -23,6 +25,9 @@ from assoc.tracking.mht.losses import Priced
 VISITS = 20_000
 """Limit on branches visited in a group; less than a millisecond."""
 
+GAP, VAST = 1e-3, 2000
+"""Relative gap that groups of so many trees may keep."""
+
 
 @njit
 def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int) -> Any:
@@ -32,8 +37,8 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
     the same branches, and `visits` limits the branches visited in each group.
 
     Returns the chosen, (B,), at most one branch of each tree, no measurement twice, with the largest sum of scores
-    found; and branches of positive score in groups where the limit was reached before optimality was proved, (B,),
-    mostly none.
+    found; branches of positive score in groups where the limit was reached before optimality was proved, (B,), mostly
+    none; and the largest relative gap of the other groups, 0 but for the largest.
     """
     chosen, doubtful = np.zeros(score.size, np.bool_), np.zeros(score.size, np.bool_)
     good = np.flatnonzero(score > 0.0)
@@ -59,16 +64,24 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
         group[t] = _root(parent, t)
     used = np.zeros(known.measurements.size, np.bool_)
     order = order_of(group)
-    begin = 0
+    begin, gap = 0, 0.0
     while begin < num:
         end = begin + 1
         while end < num and group[order[end]] == group[order[begin]]:
             end += 1
-        if _search(order[begin:end], good, start, history, known, used, visits, chosen) < 0:
-            for t in order[begin:end]:
+        trees = order[begin:end]
+        if trees.size * (trees.size - 1) // 2 <= visits:
+            settled = _search(trees, good, start, history, known, used, visits, chosen) >= 0
+        else:
+            lost, total = _descend(trees, good, start, history, known, used, score, chosen)
+            settled = trees.size >= VAST and lost <= GAP * total
+            if settled:
+                gap = max(gap, lost / total)
+        if not settled:
+            for t in trees:
                 doubtful[good[start[t] : start[t + 1]]] = True
         begin = end
-    return chosen, doubtful
+    return chosen, doubtful, gap
 
 
 @njit
@@ -122,6 +135,40 @@ def _left_over(
         if taken[i] >= 0:
             _mark(history, known.first, used, taken[i], True)
     return total
+
+
+@njit
+def _descend(
+    trees: NDArray[np.int64],
+    good: NDArray[np.int64],
+    start: NDArray[np.int64],
+    history: NDArray[np.int32],
+    known: Priced,
+    used: NDArray[np.bool_],
+    score: Floats,
+    chosen: NDArray[np.bool_],
+) -> tuple[float, float]:
+    """The first descent of `_search`, without its bounds; how far it is below the prices, at most, and its score."""
+    taken = np.full(trees.size, -1, np.int64)
+    trees = trees[order_of(-known.trees[trees])]
+    lost = total = 0.0
+    for i in range(trees.size):
+        for k in range(start[trees[i]], start[trees[i] + 1]):
+            if _fits(history, known.first, used, good[k]):
+                taken[i] = good[k]
+                break
+        if taken[i] < 0:
+            lost += known.trees[trees[i]]
+            continue
+        lost += max(known.loss[taken[i]], 0.0)
+        total += score[taken[i]]
+        chosen[taken[i]] = True
+        _mark(history, known.first, used, taken[i], True)
+    lost += _left_over(trees, taken, good, start, history, known, used)
+    for i in range(trees.size):
+        if taken[i] >= 0:
+            _mark(history, known.first, used, taken[i], False)
+    return lost, total
 
 
 @njit

@@ -51,7 +51,7 @@ class Roots(NamedTuple):
 def extend(
     tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
     solve: Callable[[Array, Array, Array], Array], visits: int = VISITS,
-) -> tuple[Array, Tables, Array]:  # fmt: skip
+) -> tuple[Array, Tables, Array, float]:  # fmt: skip
     """Grow all B branches and keep those that matter to good global hypotheses.
 
     The branches of the best global hypothesis are always kept. Where the search does not find it quickly, a solver
@@ -60,10 +60,11 @@ def extend(
     the sensor in the history, `scan` the one in which the new trees begin; `most` and `drop` are as for `keep_best`,
     `visits` as for `choose`.
 
-    Returns rows of the candidates that are kept, their tables, and which of them form the best global hypothesis found.
+    Returns rows of the candidates that are kept, their tables, which of them form the best global hypothesis found, and
+    how far its score may be below the best one's where no solver was asked, relative; mostly 0.
     """
     limits = _Limits(most, drop, visits)
-    history, doubtful, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
+    history, doubtful, gap, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
     if doubtful.size:
         tree, score, _, chosen = grown
         other = solve(tree[doubtful], score[doubtful], history[doubtful])
@@ -71,7 +72,7 @@ def extend(
             chosen[doubtful] = other
             cut = _cut(tables, hits, roots, _Grown(*grown), column, scan, limits)
     kept, chosen, *rest = cut
-    return kept, Tables(*rest), chosen
+    return kept, Tables(*rest), chosen, gap
 
 
 class _Grown(NamedTuple):
@@ -114,11 +115,11 @@ def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int,
     for i in range(ids.size):
         copy_to(wide[old + pairs + i, : rows.shape[1]], rows[i])
     known = priced(tree, score, wide)
-    chosen, doubtful = choose(score, wide, known, limits.visits)
+    chosen, doubtful, gap = choose(score, wide, known, limits.visits)
     grown = _Grown(tree, score, known.loss, chosen)
     kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, hits, roots, grown, column, scan, limits)
     told = (tree, score, known.loss, chosen)
-    return wide, np.flatnonzero(doubtful), told, kept, ours, new_numbers, new_counts, new_history, new_born
+    return wide, np.flatnonzero(doubtful), gap, told, kept, ours, new_numbers, new_counts, new_history, new_born
 
 
 @njit

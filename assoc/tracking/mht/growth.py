@@ -8,7 +8,7 @@ measurements with times of their own.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,7 +119,8 @@ class AtOnce(Growth):
         super().__init__(progress)
         self.order = range(self.rows.shape[1])
         self._states = self._before.states
-        self._offered: list[Any] = []
+        self._corrected: Callable[[Array], Any] = self._states.__getitem__
+        self._begun: Any = None
 
     def offers(self, s: int) -> Offers:
         """Candidates by the measurements of sensor s."""
@@ -128,7 +129,7 @@ class AtOnce(Growth):
         gate = gate_of(sensor, settings.gate_probability)
         pairs = track_pairs(settings.filter, self._states, z, sensor, gate)
         begun, fit, positions, score = settings.births.singles(s, self._progress.scan, np.arange(len(z)))
-        self._offered = [self._states, pairs.states, begun]
+        self._corrected, self._begun = pairs.correct, begun
         numbers = np.flatnonzero(fit)
         births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
         missed, gain = misses_of(self._progress, self._states, s), pairs.log_likelihood + terms.detection[s]
@@ -136,7 +137,12 @@ class AtOnce(Growth):
         return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
-        self._states = concatenate(self._offered)[kept]
+        old, pairs = len(self._states), len(offers.branch)
+        # states are corrected for the pairs that are kept
+        before, hit, new = kept < old, (kept >= old) & (kept < old + pairs), kept >= old + pairs
+        back = np.argsort(np.concatenate([np.flatnonzero(of) for of in (before, hit, new)]))
+        parts = [self._states[kept[before]], self._corrected(kept[hit] - old), self._begun[kept[new] - old - pairs]]
+        self._states = concatenate(parts)[back]
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
         """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
@@ -158,7 +164,7 @@ class AtOnce(Growth):
         ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
         begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
-        self._offered = [self._states, begun]
+        self._corrected, self._begun = self._states.__getitem__, begun
         nothing = np.zeros(0, dtype=np.int64)
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
