@@ -31,8 +31,12 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
     return components
 
 
-def split_component(whole: Component, share: float = 2 / 3) -> list[Component] | None:
+def split_component(
+    whole: Component, share: float = 2 / 3, useful: NDArray[np.bool_] | None = None
+) -> list[Component] | None:
     """Drop the columns that no better solution can use; None if more than ``share`` of them are left.
+
+    No better solution uses a column that is not ``useful``, or whose reduced cost is above the gap.
 
     The rest may split into components, each with its part of the best cover and of the bound. A cover of one
     component and the best covers of the others together cover the whole, and weigh no less than the whole's bound.
@@ -41,6 +45,8 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
         return None
     step = whole.tolerance if whole.packing.granularity else 0.0
     keep = whole.reduced <= whole.weight - whole.bound - step
+    if useful is not None:
+        keep &= useful
     keep[chosen_columns(whole.packing.arrays.cols, whole.best)] = True
     if np.count_nonzero(keep) > share * keep.size:
         return None

@@ -7,7 +7,8 @@ of their columns. For any set A of rows with slack, every solution weighs at lea
 
 where the minimum is over packings of the rows of A. It falls into independent regions, which are solved exactly. An
 answer whose columns stay inside A replaces that part of the cover, and its region has no gap left; where columns reach
-out of A, A grows. In the end the gap is what the rows outside of A cost. Columns that cost more than that are dropped.
+out of A, A grows. Then the gap is what the rows outside of A cost: those that cost most of it join A, until nothing is
+left or regions become too hard or too large. Columns that cost more than what is left are dropped.
 """
 
 from __future__ import annotations
@@ -22,17 +23,16 @@ from numpy.typing import NDArray
 from assoc._types import Floats
 from assoc.packing.components.component import Component
 from assoc.packing.kernels.rounding import margin
-from assoc.packing.neighbourhoods.cover import Cover, own_all
+from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import Outcome
 
-# share of the gap that rows outside of the first regions may cost
+# share of the gap that rows outside of regions may cost
 _OUTSIDE = 0.02
-# share of the rows above which regions are not worth a search, and share of the columns for what they leave
+# share of the rows above which regions are not worth a search
 _MOST = 0.5
-_LEFT = 0.7
 # rounds of growth: a region grows by a column or two in each
-_ROUNDS = 40
+_ROUNDS = 100
 
 Solve = Callable[[Packing], Outcome]
 
@@ -45,44 +45,46 @@ class _Searched(NamedTuple):
     extra: Floats
     """What a solution with this column weighs more than the bound, at least, (N,)."""
     reaching: NDArray[np.int32]
-    """Columns of the answers that have rows outside of all regions; empty if regions could not be closed."""
+    """Columns of the answers that have rows outside of all regions."""
+    hard: bool
+    """Whether regions could not be closed."""
 
 
-def close_by_regions(component: Component, solve: Solve) -> None:
-    """Improve the cover and the bound of a component, whose rows all have slack, by searches of regions."""
-    packing = component.packing
-    inside = _costly(component)
+def close_by_regions(component: Component, solve: Solve) -> NDArray[np.bool_] | None:
+    """Improve the cover and the bound of a component, whose rows all have slack, by searches of regions.
+
+    Returns the columns that a better cover may have, and those of the best one; None if regions are no way to go.
+    """
+    packing, searched = component.packing, None
+    inside = _costly(component, component.weight - component.bound)
     for _ in range(_ROUNDS):
         _complete(component, inside)
         if np.count_nonzero(inside) > _MOST * packing.num_rows:
-            return
+            break
         weight = component.weight
         searched = _search(component, inside, solve)
         component.proven = max(component.proven, min(searched.bound, weight))
-        if component.closed or not searched.reaching.size:
+        if component.closed or searched.hard:
             break
+        if not searched.reaching.size:
+            inside |= _costly(component, weight - searched.bound)
         inside[packing.cols[searched.reaching]] = True
-    if component.closed:
-        return
+    if searched is None:
+        return None
     cutoff = component.weight - (component.tolerance if packing.granularity else 0.0)
     keep = searched.bound + searched.extra <= cutoff
     keep[component.best_columns()] = True
-    rest = packing.restrict(keep)
-    if rest.num_columns <= _LEFT * packing.num_columns:
-        found = solve(rest)
-        cover = Cover.of(packing, rest.origin[found.columns])
-        component.offer(cover.owner, cover.weight)
-        component.proven = max(component.proven, min(found.lower_bound, cutoff))
+    return np.asarray(keep)
 
 
-def _costly(component: Component) -> NDArray[np.bool_]:
-    """The rows that cost most of the gap, shape (R + 1,); the last is no row, a sensor that missed."""
+def _costly(component: Component, gap: float) -> NDArray[np.bool_]:
+    """The rows that cost most of a gap, shape (R + 1,); the last is no row, a sensor that missed."""
     best = component.best
     assert best is not None
     cost = np.where(best >= 0, component.reduced[best], -component.duals)
     order = np.argsort(cost)
     # all rows of a column name its reduced cost
-    outside = np.cumsum(cost[order]) <= _OUTSIDE * component.packing.num_sensors * (component.weight - component.bound)
+    outside = np.cumsum(cost[order]) <= _OUTSIDE * component.packing.num_sensors * gap
     inside = np.zeros(cost.size + 1, dtype=np.bool_)
     inside[order[~outside]] = True
     return inside
@@ -129,5 +131,4 @@ def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _S
     component.offer(owner, component.weight_of(owner))
     # regions that are too hard would only become harder
     left = float(regions.weights[found.columns].sum()) - found.lower_bound
-    hard = left > _OUTSIDE * (component.weight - component.bound)
-    return _Searched(bound, extra, chosen[reaches & (not hard)])
+    return _Searched(bound, extra, chosen[reaches], hard=left > _OUTSIDE * (component.weight - component.bound))

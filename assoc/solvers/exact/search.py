@@ -229,9 +229,10 @@ def _sharpen(component: Component, searches: _Searches) -> list[Component]:
     component.take_over(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():
         packing = component.packing
+        useful = None
         if packing.num_rows >= _LARGE and not packing.is_axial and component.best is not None:
-            close_by_regions(component, partial(_search_shortly, searches))
-        parts = split_component(component)
+            useful = close_by_regions(component, partial(_search_shortly, searches))
+        parts = None if component.closed else split_component(component, useful=useful)
         if parts:
             return [smaller for part in parts for smaller in _with_program(part, searches)]
     return _with_program(component, searches)
