@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
+from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.packing import Packing, PackingArrays
 
@@ -85,21 +86,19 @@ def _match(packing: PackingArrays, side: Ints, owner: NDArray[np.int32], duals: 
     num = side.size
     number, count = np.empty(num, np.int64), np.zeros(2, np.int64)
     # a row alone: uncovered, or covered by its cheapest column without another row
-    price, alone = np.full((2, num), np.inf), np.full(num, -1, np.int32)
+    price, alone = np.empty((2, num)), np.full(num, -1, np.int32)
     rows = np.empty((2, num), np.int64)
-    edges = 0
     for r in range(num):
-        at = count[side[r]]
-        number[r], rows[side[r], at] = at, r
+        number[r], rows[side[r], count[side[r]]] = count[side[r]], r
+        price[side[r], count[side[r]]] = 0.0 if slack[r] else np.inf
         count[side[r]] += 1
-        least = 0.0 if slack[r] else np.inf
-        for k in range(row_ptr[r], row_ptr[r + 1]):
-            j = row_cols[k]
-            if _other_row(cols, j, r) >= 0:
-                edges += side[r] == 0
-            elif weights[j] < least:
-                least, alone[r] = weights[j], j
-        price[side[r], at] = least
+    edges = 0
+    for j in range(weights.size):
+        r = first_row(cols, j)
+        if _other_row(cols, j, r) >= 0:
+            edges += 1
+        elif weights[j] < price[side[r], number[r]]:
+            price[side[r], number[r]], alone[r] = weights[j], j
     indptr, indices = np.zeros(count[0] + 1, np.int64), np.empty(edges, np.int64)
     costs, column = np.empty(edges), np.empty(edges, np.int32)
     edges = 0

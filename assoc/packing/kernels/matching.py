@@ -314,12 +314,11 @@ def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
     indptr, indices, costs, row_slack, base = problem
     row_edge, u, v, owner, pending = state
     n, m = row_slack.size, base.size
-    matrix, edge, mate = np.full((n, m), np.inf), np.empty((n, m), np.int64), np.full(n, -1, np.int64)
+    matrix, mate = np.full((n, m), np.inf), np.full(n, -1, np.int64)
     for i in range(n):
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
-            if costs[k] - base[j] < matrix[i, j]:
-                matrix[i, j], edge[i, j] = costs[k] - base[j], k
+            matrix[i, j] = min(matrix[i, j], costs[k] - base[j])
         if row_edge[i] >= 0:
             mate[i] = indices[row_edge[i]]
     distance, previous = np.empty(m), np.empty(m, np.int64)
@@ -374,5 +373,8 @@ def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
             if i == start:
                 break
     for i in range(n):
-        row_edge[i] = edge[i, mate[i]] if mate[i] >= 0 else -1
+        row_edge[i] = -1
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == mate[i] and (row_edge[i] < 0 or costs[k] < costs[row_edge[i]]):
+                row_edge[i] = k
     return True
