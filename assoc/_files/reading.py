@@ -27,6 +27,8 @@ EXPANSION = 30
 MOST_BYTES = 2_000_000_000
 """Largest size of any file in bytes, compressed or not, unless its reader allows less."""
 LONGEST_LINE = 10_000
+# bytes that are read at once
+_BLOCK = 1 << 20
 
 
 def _open_zipped(file: IO[bytes]) -> IO[bytes]:
@@ -128,19 +130,38 @@ def read_lines(
     """Yield the lines of a text file (UTF-8, or the encoding ``fallback``), each at most ``longest`` bytes."""
     with open_input(path, most) as file:
         number = 0
-        while line := file.readline(longest + 1):
-            number += 1
-            if len(line) > longest:
-                raise InvalidInputError(f"{path}: line {number} is longer than {longest} bytes")
-            if b"\0" in line:
-                raise InvalidInputError(f"{path}: line {number} holds a NUL byte, expected text (UTF-8)")
+        while block := file.read(_BLOCK):
+            # up to the end of a line, if it is not too long
+            block += file.readline(longest + 1)
             try:
-                yield line.decode("utf-8-sig" if number == 1 else "utf-8")
+                text = block.decode("utf-8-sig" if number == 0 else "utf-8")
             except UnicodeDecodeError:
-                if not fallback:
-                    raise InvalidInputError(f"{path}: line {number} is not UTF-8 text") from None
-                # signs that it lacks are wrong anyway
-                yield line.decode(fallback, "replace")
+                text = ""
+            lines = text.split("\n")
+            if text and "\0" not in text and max(map(len, block.split(b"\n"))) < longest:
+                last = lines.pop()
+                yield from [f"{line}\n" for line in lines]
+                yield from [last] if last else []
+                number += len(lines)
+            else:
+                # line by line: one of them may be wrong
+                for line in io.BytesIO(block):
+                    number += 1
+                    yield _line(line, f"{path}: line {number}", longest, fallback, first=number == 1)
+
+
+def _line(line: bytes, where: str, longest: int, fallback: str, *, first: bool) -> str:
+    if len(line) > longest:
+        raise InvalidInputError(f"{where} is longer than {longest} bytes")
+    if b"\0" in line:
+        raise InvalidInputError(f"{where} holds a NUL byte, expected text (UTF-8)")
+    try:
+        return line.decode("utf-8-sig" if first else "utf-8")
+    except UnicodeDecodeError:
+        if not fallback:
+            raise InvalidInputError(f"{where} is not UTF-8 text") from None
+        # signs that it lacks are wrong anyway
+        return line.decode(fallback, "replace")
 
 
 def check_regular(path: FilePath) -> None:

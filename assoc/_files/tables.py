@@ -3,17 +3,59 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING, Any
 
+import numpy as np
+
 from assoc._files.output import FilePath, written_gradually
+from assoc._types import Array
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_QUOTED = re.compile(r'[,"\r\n]')
+
 # rows that are written at once: few row groups make Parquet small
 _ROWS = 50_000
+
+
+def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
+    """What `pandas.DataFrame.to_csv` makes of a table of numbers and texts without an index, in half its time."""
+    columns: list[list[str]] = []
+    for name in frame:
+        values = frame[name]
+        kind = values.dtype.kind
+        if kind == "f":
+            texts = _floats(values.to_numpy())
+        elif kind in "iub":
+            texts = [*map(str, values.tolist())]
+        else:
+            quoted = {text: _cell(text) for text in values.unique().tolist()}
+            texts = [quoted[text] for text in values.tolist()]
+        columns.append(texts)
+    lines = map(",".join, zip(*columns, strict=True))
+    first = [",".join(map(_cell, map(str, frame.columns)))] if header else []
+    return "\n".join([*first, *lines, ""])
+
+
+def _floats(values: Array) -> list[str]:
+    """The shortest texts that are read as these numbers; empty for NaN."""
+    numbers = values.tolist()
+    distinct = {*numbers}
+    if len(distinct) > 0.5 * len(numbers) or ((values == 0.0) & np.signbit(values)).any():
+        texts = [*map(repr, numbers)]
+    else:
+        # many are alike; 0.0 and -0.0 are equal, and no such numbers
+        text_of = {number: repr(number) for number in distinct}
+        texts = [text_of[number] for number in numbers]
+    return ["" if text == "nan" else text for text in texts] if np.isnan(values).any() else texts
+
+
+def _cell(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if _QUOTED.search(text) else text
 
 
 class TableWriter:
@@ -41,7 +83,7 @@ class TableWriter:
         frame = pd.concat(full, ignore_index=True)
         self._parts, self._waiting = [], 0
         if not self.parquet:
-            self._file.write(frame.to_csv(index=False, header=not self._begun).encode("utf-8", "backslashreplace"))
+            self._file.write(csv_text(frame, header=not self._begun).encode("utf-8", "backslashreplace"))
         else:
             import pyarrow as pa
             from pyarrow import parquet

@@ -73,11 +73,11 @@ class GaussianFilter(Filter[Gaussian]):
         linear = self._linear
         if linear is None:
             return super().predict_each(state, dt)
-        steps, which = np.unique(dt, return_inverse=True)
+        # the kernel takes one of each for all
+        steps = dt[:1] if len(dt) and (dt == dt[0]).all() else dt
         F, Q = linear.matrices_of_each(steps)
         # some models add noise at every step, however short: none where there is no step
         Q[steps == 0.0] = 0.0
-        F, Q = F[which], Q[which]
         mean, P = _empty(state.mean.shape), _empty(state.covariance.shape)
         predict_kernel(state.mean, state.covariance, F, Q, _NOTHING2, mean, P)
         return gaussian(mean, P)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +72,8 @@ class RatesSoFar:
 
     def __init__(self) -> None:
         self._last = LastPlots()
-        self._previous: dict[int, int] = {}
+        # aircraft, ascending, and the tracks that took their last plots
+        self._aircraft = self._takers = np.zeros(0, dtype=np.int64)
         self._windows: list[Array] = []
         self._rates: list[Array] = []
 
@@ -79,12 +81,7 @@ class RatesSoFar:
         """Add plots."""
         sure = confirmed.astype(bool)
         correct = sure & (sources >= 0) & (self._last.identities(sources, tracks) == sources)
-        previous = self._previous
-        kept = np.zeros(len(windows), dtype=bool)
-        for row, (aircraft, taker) in enumerate(zip(sources.tolist(), tracks.tolist(), strict=True)):
-            if aircraft >= 0:
-                kept[row] = taker >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
-                previous[aircraft] = taker
+        kept = sure & (sources >= 0) & (tracks >= 0) & (self._previous(sources, tracks) == tracks)
         real, given = sources >= 0, tracks >= 0
         names, index = np.unique(windows, return_inverse=True)
 
@@ -97,7 +94,20 @@ class RatesSoFar:
         self._windows.append(names)
         self._rates.append(np.stack(rates, axis=1))
 
-    def keep(self, tracks: set[int]) -> None:
+    def _previous(self, sources: Array, tracks: Array) -> Array:
+        """The track that took the plot before of each plot's aircraft; -2 for the first, -1 if none did."""
+        previous = np.full(len(sources), -2, dtype=np.int64)
+        real, known = np.flatnonzero(sources >= 0), len(self._aircraft)
+        every = np.concatenate([self._aircraft, sources[real]])
+        order = np.argsort(every, kind="stable")
+        every, takers = every[order], np.concatenate([self._takers, tracks[real]])[order]
+        again = np.flatnonzero(np.diff(every, prepend=-1) == 0)
+        previous[real[order[again] - known]] = takers[again - 1]
+        last = np.flatnonzero(np.diff(every, append=-1))
+        self._aircraft, self._takers = every[last], takers[last]
+        return previous
+
+    def keep(self, tracks: Collection[int]) -> None:
         """Forget the last plots of all tracks but these."""
         self._last.keep(tracks)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Collection
 
 import numpy as np
 
@@ -40,24 +41,39 @@ class LastPlots:
     """The last plots of tracks."""
 
     def __init__(self) -> None:
-        self._recent: dict[int, deque[int]] = {}
+        self._tracks = self._sources = np.zeros(0, dtype=np.int64)
 
     def identities(self, sources: Array, tracks: Array) -> Array:
         """`identity_after_each` of the plots that follow."""
         identity = np.full(len(sources), -1, dtype=np.int64)
-        for row, (aircraft, taker) in enumerate(zip(sources.tolist(), tracks.tolist(), strict=True)):
-            if taker >= 0:
-                plots = self._recent.get(taker)
-                if plots is None:
-                    plots = self._recent[taker] = deque(maxlen=MEMORY)
-                plots.append(aircraft)
-                sure = aircraft >= 0 and 2 * plots.count(aircraft) >= len(plots)
-                identity[row] = aircraft if sure else majority(plots)
+        taken, known = np.flatnonzero(tracks >= 0), len(self._tracks)
+        every = np.concatenate([self._tracks, tracks[taken]])
+        order = np.argsort(every, kind="stable")
+        every, plots = every[order], np.concatenate([self._sources, sources[taken]])[order]
+        row, begins = np.arange(len(every)), np.flatnonzero(np.diff(every, prepend=-1))
+        counts = np.diff(begins, append=len(every))
+        new = np.flatnonzero(order >= known)
+        identity[taken[order[new] - known]] = _most(plots, new, np.repeat(begins, counts)[new])
+        kept = np.repeat(begins + counts, counts) - row <= MEMORY
+        self._tracks, self._sources = every[kept], plots[kept]
         return identity
 
-    def keep(self, tracks: set[int]) -> None:
+    def keep(self, tracks: Collection[int]) -> None:
         """Forget all tracks but these."""
-        self._recent = {track: plots for track, plots in self._recent.items() if track in tracks}
+        kept = np.isin(self._tracks, np.array([*tracks], dtype=np.int64))
+        self._tracks, self._sources = self._tracks[kept], self._sources[kept]
+
+
+def _most(plots: Array, rows: Array, begins: Array) -> Array:
+    """`majority` of up to MEMORY plots that end at each of rows (n,), none before `begins` (n,)."""
+    columns = rows[:, None] - np.arange(MEMORY)
+    last = np.where(columns >= begins[:, None], plots[columns], -1)
+    votes = np.zeros(last.shape, dtype=np.int64)
+    for column in last.T:
+        votes += last == column[:, None]
+    votes[last < 0] = 0
+    # of equals the first here, which is the last plot; of false plots alone -1
+    return np.asarray(last[np.arange(len(rows)), np.argmax(votes, axis=1)])
 
 
 def majority(plots: deque[int]) -> int:
@@ -118,7 +134,9 @@ class IdentitiesSoFar:
 
     def __init__(self) -> None:
         self._last = LastPlots()
-        self._of: dict[int, int] = {}
+        # tracks that had an identity, ascending, and it, -1 if they had several; and counts of forgotten ones
+        self._tracks = self._had = np.zeros(0, dtype=np.int64)
+        self._kept = self._count = 0
         self.any = False
         """Whether any plot had an identity."""
 
@@ -127,14 +145,23 @@ class IdentitiesSoFar:
         self.any |= bool((sources >= 0).any())
         identity = self._last.identities(sources, tracks)
         held = confirmed.astype(bool) & (tracks >= 0) & (identity >= 0)
-        for track, aircraft in zip(tracks[held].tolist(), identity[held].tolist(), strict=True):
-            if self._of.setdefault(track, aircraft) != aircraft:
-                self._of[track] = -1
+        every = np.concatenate([self._tracks, tracks[held]])
+        self._tracks, of = np.unique(every, return_inverse=True)
+        had = np.concatenate([self._had, identity[held]])
+        least = np.full(len(self._tracks), np.iinfo(np.int64).max)
+        np.minimum.at(least, of, had)
+        most = np.full(len(self._tracks), -1)
+        np.maximum.at(most, of, had)
+        self._had = np.where(least == most, most, -1)
 
-    def keep(self, tracks: set[int]) -> None:
-        """Forget the last plots of all tracks but these."""
+    def keep(self, tracks: Collection[int]) -> None:
+        """Forget all tracks but these: they get no more plots."""
         self._last.keep(tracks)
+        kept = np.isin(self._tracks, np.array([*tracks], dtype=np.int64))
+        self._kept += int((self._had[~kept] >= 0).sum())
+        self._count += int((~kept).sum())
+        self._tracks, self._had = self._tracks[kept], self._had[kept]
 
     def result(self) -> tuple[int, int]:
         """The numbers so far."""
-        return sum(one >= 0 for one in self._of.values()), len(self._of)
+        return self._kept + int((self._had >= 0).sum()), self._count + len(self._had)

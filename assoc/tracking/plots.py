@@ -16,7 +16,7 @@ from assoc.recordings import Recording, Window
 from assoc.scene.scene import Scene
 from assoc.tracking.quality import Qualities
 from assoc.tracking.smoothing import smoothed
-from assoc.tracking.track import Step, Track
+from assoc.tracking.track import Step, TrackColumns
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
@@ -157,9 +157,10 @@ class Followed(NamedTuple):
     qualities: Qualities
     """Shared likewise."""
 
-    def listed(self, confirmed: bool) -> tuple[list[Track], Sequence[int], dict[int, float], Qualities]:
+    def listed(self, confirmed: bool) -> tuple[TrackColumns, Sequence[int], dict[int, float], Qualities]:
         """Arguments of `TrackTable.add`: the tracks after this window, or only the confirmed ones."""
-        listed = [track for track in self.tracker.tracks if track.reported or not confirmed]
+        listed = self.tracker.track_columns()
+        listed = listed.rows(listed.reported) if confirmed else listed
         return listed, self.tracker.filter.motion.position, self.altitudes, self.qualities
 
 
@@ -209,7 +210,7 @@ def known_of(window: Window) -> Array:
 
 def may_return(tracker: Tracker) -> set[int]:
     """Ids of the tracks that live, or that may be taken up again."""
-    return {track.track_id for track in tracker.tracks} | {*tracker.state.lost.track_id.tolist()}
+    return {*tracker.track_columns().track_id.tolist(), *tracker.state.lost.track_id.tolist()}
 
 
 class TakenPlots:

@@ -13,9 +13,8 @@ Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Trackin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,36 +34,22 @@ _ALARM = 3.0
 """A track is inconsistent when its NIS is so many standard deviations above its mean."""
 
 
-@dataclass
-class TrackQuality:
+class TrackQuality(NamedTuple):
     """One track so far.
 
     Attributes
     ----------
+    nis : float
+        Mean NIS by components, at most 1 if all is as declared; NaN before the second detection.
+    consistent : bool
+        Whether the NIS is not far above its mean.
     hits : int64 array (S,)
         Measurements of each sensor that were the track's, by the decisions at the time.
     """
 
+    nis: float
+    consistent: bool
     hits: Array
-    _squares: float = 0.0
-    _freedom: float = 0.0
-    _variance: float = 0.0
-
-    def take(self, square: float, freedom: float) -> None:
-        """Take in a scan's mean NIS and number of components over the sensors, whose predictions err together."""
-        self._squares = _KEEP * self._squares + square
-        self._freedom = _KEEP * self._freedom + freedom
-        self._variance = _KEEP**2 * self._variance + 2.0 * freedom
-
-    @property
-    def nis(self) -> float:
-        """Mean NIS by components, at most 1 if all is as declared; NaN before the second detection."""
-        return self._squares / self._freedom if self._freedom else math.nan
-
-    @property
-    def consistent(self) -> bool:
-        """Whether the NIS is not far above its mean."""
-        return self._squares - self._freedom <= _ALARM * math.sqrt(self._variance)
 
 
 class Qualities:
@@ -77,25 +62,52 @@ class Qualities:
     """
 
     def __init__(self, sensors: int) -> None:
-        self._sensors = sensors
-        self._of: dict[int, TrackQuality] = {}
+        self._ids = np.zeros(0, dtype=np.int64)
+        """Ascending."""
+        self._hits = np.zeros((0, sensors), dtype=np.int64)
+        # fading sums of a scan's mean NIS, its number of components, and the variance of the first
+        self._sums = np.zeros((0, 3))
+
+    def of(self, ids: Array) -> tuple[Array, Array, Array]:
+        """NIS (n,), whether consistent (n,), and hits (n, S) of tracks (n,); see `TrackQuality`."""
+        rows = self._rows(ids)
+        squares, freedom, variance = self._sums[rows].T
+        with np.errstate(invalid="ignore"):
+            nis = np.where(freedom > 0.0, squares, np.nan) / freedom
+        return nis, squares - freedom <= _ALARM * np.sqrt(variance), self._hits[rows]
 
     def of_track(self, track_id: int) -> TrackQuality:
         """Quality of a track, also of one that has ended."""
-        found = self._of.get(track_id)
-        if found is None:
-            found = self._of[track_id] = TrackQuality(np.zeros(self._sensors, np.int64))
-        return found
+        nis, consistent, hits = self.of(np.array([track_id]))
+        return TrackQuality(float(nis[0]), bool(consistent[0]), hits[0])
+
+    def _rows(self, ids: Array) -> Array:
+        """Rows of tracks (n,), which need not be known."""
+        if not np.isin(ids, self._ids).all():
+            known = np.union1d(self._ids, ids)
+            rows = np.searchsorted(known, self._ids)
+            hits, sums = np.zeros((len(known), self._hits.shape[1]), np.int64), np.zeros((len(known), 3))
+            hits[rows], sums[rows] = self._hits, self._sums
+            self._ids, self._hits, self._sums = known, hits, sums
+        return np.searchsorted(self._ids, ids)
 
     def keep(self, track_ids: Iterable[int]) -> None:
         """Forget all tracks but these."""
-        self._of = {number: self._of[number] for number in track_ids if number in self._of}
+        rows = np.isin(self._ids, np.array([*track_ids], dtype=np.int64))
+        self._ids, self._hits, self._sums = self._ids[rows], self._hits[rows], self._sums[rows]
 
     def count(self, assigned: Sequence[Array]) -> None:
         """Count measurements of each sensor by their tracks; 0 is none."""
         for s, ids in enumerate(assigned):
-            for number in ids[ids > 0].tolist():
-                self.of_track(number).hits[s] += 1
+            rows = self._rows(ids[ids > 0])
+            self._hits[:, s] += np.bincount(rows, minlength=len(self._ids))
+
+    def _take(self, ids: Array, squares: Array, dims: Array) -> None:
+        """Take in a scan: NIS and components of measurements (n,) of tracks (n,); those of one err together."""
+        rows, of, counts = np.unique(self._rows(ids), return_inverse=True, return_counts=True)
+        square, freedom = (np.bincount(of, weights=one) / counts for one in (squares, dims))
+        self._sums[rows] *= _KEEP, _KEEP, _KEEP**2
+        self._sums[rows] += np.stack([square, freedom, 2.0 * freedom], axis=1)
 
     def after(
         self,
@@ -140,25 +152,26 @@ class Qualities:
         if before.estimates is not None:
             settings = in_use(settings, before.estimates)
         known = current(settings, before)
-        names = names or {}
-        row_of = {names.get(number, number): row for row, number in enumerate(known.track_id.tolist())}
-        found: dict[int, list[tuple[float, int]]] = {}
+        # those that were renamed under their ids in the step
+        named = known.track_id.copy()
+        for number, name in (names or {}).items():
+            named[known.track_id == number] = name
+        order = np.argsort(named, kind="stable")
+        found: list[tuple[Array, Array, Array]] = []
         stamps = scan.own_times()
         for s, (z, ids, sensor) in enumerate(zip(scan.measurements, step.assigned, settings.sensors, strict=True)):
-            fit = [(m, i, row_of[i]) for m, i in enumerate(ids.tolist()) if i in row_of]
+            number = np.flatnonzero(np.isin(ids, named))
             # from a platform that moved since the scan began: the prediction would be seen from elsewhere
-            if not fit or before.time is None or (scan.paths and scan.paths[s] is not None):
+            if not len(number) or before.time is None or (scan.paths and scan.paths[s] is not None):
                 continue
-            number, rows = np.array([m for m, _, _ in fit]), np.array([row for _, _, row in fit])
+            rows = order[np.searchsorted(named, ids[number], side="right", sorter=order) - 1]
             states = predict_each(settings.filter, known.states[rows], stamps[s][number] - before.time)
             expected = settings.filter.expected(states, sensor)
             off = sensor.residual(z[number], expected.mean)
             square = (off * np.linalg.solve(expected.covariance, off[:, :, None])[:, :, 0]).sum(axis=1)
             # beyond the gate it was another branch that took the measurement, with another past
-            gate = gate_of(sensor, settings.gate_probability)
-            for (_, i, _), value in zip(fit, square.tolist(), strict=True):
-                if value <= gate:
-                    found.setdefault(i, []).append((value, sensor.dim))
-        for i, values in found.items():
-            squares, freedoms = zip(*values, strict=True)
-            self.of_track(i).take(sum(squares) / len(values), sum(freedoms) / len(values))
+            inside = square <= gate_of(sensor, settings.gate_probability)
+            taken = ids[number[inside]]
+            found.append((taken, square[inside], np.full(len(taken), float(sensor.dim))))
+        if found:
+            self._take(*(np.concatenate(one) for one in zip(*found, strict=True)))

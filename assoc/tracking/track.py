@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -97,6 +97,48 @@ class Track(Shown):
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)
         return f"Track({self.track_id}, {self.status}, ({place}) m at {moment(self.time)}, score {self.score:.4g})"
+
+
+class TrackColumns(NamedTuple):
+    """T tracks as columns: the fields of `Track`, an array (T, ...) each; states of different widths are no columns."""
+
+    track_id: Array
+    time: Array
+    mean: Array
+    covariance: Array
+    position: Array
+    velocity: Array
+    confirmed: Array
+    score: Array
+    hits: Array
+    started: Array
+    last_detection: Array
+    existence: Array
+    missed: Array
+    hidden: Array
+    parent: Array
+
+    @staticmethod
+    def of(tracks: Sequence[Track]) -> TrackColumns:
+        """The columns of one or more tracks."""
+        return TrackColumns(*(np.array([getattr(one, name) for one in tracks]) for name in TrackColumns._fields))
+
+    @property
+    def status(self) -> Array:
+        """`Track.status` of each, str (T,)."""
+        known = (self.missed > 0) & (self.missed < _LOST_AFTER) & (self.hits >= _KNOWN_AFTER)
+        lost = (self.existence < 0.5) & ~known
+        unseen = (self.missed > 0) | (self.hidden != 0.0)
+        return np.select([~self.confirmed, lost, unseen], ["tentative", "lost", "coasting"], "confirmed")
+
+    @property
+    def reported(self) -> Array:
+        """`Track.reported` of each, bool (T,)."""
+        return np.isin(self.status, ("confirmed", "coasting"))
+
+    def rows(self, chosen: Array) -> TrackColumns:
+        """Some of the tracks."""
+        return TrackColumns(*(column[chosen] for column in self))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

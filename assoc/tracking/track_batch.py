@@ -13,7 +13,7 @@ from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.filters.state import gaussian
 from assoc.tracking.births.initiation import velocity_components
 from assoc.tracking.stages.life_cycle import HISTORY, LifeCycle
-from assoc.tracking.track import Track
+from assoc.tracking.track import Track, TrackColumns
 
 MASK = (1 << HISTORY) - 1
 """Number of last scans whose detections are stored, one bit each."""
@@ -199,21 +199,28 @@ class TrackBatch:
         state = {name: arrays[f"state.{name}"] for name in arrays_of(self.states)}
         return TrackBatch(state_from(type(self.states), state), numbers, counts)
 
-    def tracks(self, filter: Filter[Any], time: float) -> list[Track]:
-        """Hand out the tracks."""
-        motion = filter.motion
-        position, velocity = np.zeros((len(self), 3)), np.zeros((len(self), 3))
-        mean, covariance = self.states.mean, self.states.covariance
+    def columns(self, filter: Filter[Any], time: float) -> TrackColumns:
+        """The tracks as columns."""
+        motion, count = filter.motion, len(self)
+        position, velocity = np.zeros((count, 3)), np.zeros((count, 3))
+        mean = self.states.mean
         position[:, : len(motion.position)] = mean[:, list(motion.position)]
         places = velocity_components(motion)
         velocity[:, : len(places)] = mean[:, places]
         values = {name: getattr(self, name) for name in _HANDED_OUT}
         values["existence"] = 1.0 / (1.0 + np.exp(np.clip(-self.existence, -500.0, 500.0)))
-        columns = [value.tolist() for value in values.values()]
+        states = {"mean": mean, "covariance": self.states.covariance, "position": position, "velocity": velocity}
+        return TrackColumns(time=np.full(count, time), **states, **values)
+
+    def tracks(self, filter: Filter[Any], time: float) -> list[Track]:
+        """Hand out the tracks."""
+        found = self.columns(filter, time)
+        columns = [column.tolist() for column in (found.track_id, *found[6:])]
         return [
-            Track(i, time, mean[row].copy(), covariance[row].copy(), position[row], velocity[row], *rest)
+            Track(i, time, found.mean[row].copy(), found.covariance[row].copy(), found.position[row],
+                  found.velocity[row], *rest)
             for row, (i, *rest) in enumerate(zip(*columns, strict=True))
-        ]
+        ]  # fmt: skip
 
 
 def one_state(filter: Filter[Any]) -> Any:

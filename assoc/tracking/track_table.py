@@ -7,15 +7,15 @@ import os
 import pickle
 import tempfile
 import weakref
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.tables import table_writer
+from assoc._files.tables import csv_text, table_writer
 from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
+from assoc._text.plain import spreadsheet_text
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.exports.maps import FOLLOWED_WITHIN, coordinates, followed_targets
@@ -24,7 +24,7 @@ from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.filter_choice import open_heights
 from assoc.tracking.quality import Qualities
-from assoc.tracking.track import Decision, Track
+from assoc.tracking.track import Decision, Track, TrackColumns
 from assoc.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -45,6 +45,9 @@ compass heading."""
 
 # rows that wait to be written together
 _ROWS = 20_000
+# types of columns that are no floats
+_KINDS: dict[str, type] = {"track_id": np.int64, "confirmed": np.bool_, "hits": np.int64, "status": np.str_,
+                           "parent": np.int64}  # fmt: skip
 
 
 @doors
@@ -70,19 +73,18 @@ class TrackTable(Shown):
     """
 
     def __repr__(self) -> str:
-        return f"TrackTable({len({row[0] for row in self._rows})} tracks, {len(self._rows)} rows)"
+        return f"TrackTable({len(np.unique(self._column('track_id')))} tracks, {len(self)} rows)"
 
     def __init__(self, origin: Origin | None = None) -> None:
         self.origin = origin
         self.targets: dict[int, str] = {}
         self.identities: dict[int, tuple[str, str]] = {}
-        self._known: dict[int, tuple[Counter[str], Counter[str]]] = {}
-        self._rows: list[tuple[Any, ...]] = []
-        self._quality: list[dict[str, Any]] = []
+        self._known = _Names(), _Names()
+        self._parts: list[dict[str, Array]] = []
 
     def add(
         self,
-        tracks: Iterable[Track],
+        tracks: Iterable[Track] | TrackColumns,
         positions: Sequence[int] = (0, 1, 2),
         altitudes: Mapping[int, float] | None = None,
         qualities: Qualities | None = None,
@@ -92,7 +94,7 @@ class TrackTable(Shown):
 
         Parameters
         ----------
-        tracks : iterable of Track
+        tracks : iterable of Track, or TrackColumns
         positions : sequence of int
             Indices of x, y (and z) in the state: ``filter.motion.position``.
         altitudes : mapping of track id to metres, optional
@@ -103,31 +105,40 @@ class TrackTable(Shown):
             Positions of all targets at this time: the table then has the column nees, the normalised estimation error
             squared of the position over its number of components, by the nearest target; NaN if none is within 1 km.
         """
-        listed = list(tracks)
-        if not listed:
+        if not isinstance(tracks, TrackColumns):
+            listed = list(tracks)
+            if not listed:
+                return
+            tracks = TrackColumns.of(listed)
+        count, axes = len(tracks.track_id), list(positions)
+        if not count:
             return
-        axes, sigmas = list(positions), np.zeros((len(listed), 3))
-        variances = np.diagonal(np.stack([track.covariance for track in listed]), axis1=1, axis2=2)
-        sigmas[:, : len(axes)] = np.sqrt(variances[:, axes])
-        for track, sigma in zip(listed, sigmas.tolist(), strict=True):
-            x, y, z = track.position.tolist()
-            vx, vy, vz = track.velocity.tolist()
-            altitude = z if altitudes is None and len(axes) > 2 else math.nan
-            speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
-            altitude = altitude if altitudes is None else altitudes.get(track.track_id, math.nan)
-            self._rows.append((
-                track.track_id, track.time, x, y, z, vx, vy, vz, track.confirmed, track.score, track.hits,
-                track.started, track.last_detection, *sigma, track.existence, speed, heading, altitude, track.status,
-                track.parent,
-            ))  # fmt: skip
-            quality: dict[str, Any] = {}
-            if qualities is not None:
-                one = qualities.of_track(track.track_id)
-                quality = {"nis": one.nis, "consistent": one.consistent}
-                quality |= {f"hits_{s}": count for s, count in enumerate(one.hits.tolist(), 1)}
-            if truth is not None:
-                quality["nees"] = _nees(track, positions, truth)
-            self._quality.append(quality)
+        sigmas = np.zeros((count, 3))
+        sigmas[:, : len(axes)] = np.sqrt(np.diagonal(tracks.covariance, axis1=1, axis2=2)[:, axes])
+        east, north = tracks.velocity[:, 0], tracks.velocity[:, 1]
+        if altitudes is not None:
+            heights = np.array([altitudes.get(number, math.nan) for number in tracks.track_id.tolist()])
+        else:
+            heights = tracks.position[:, 2] if len(axes) > 2 else np.full(count, math.nan)
+        values = (
+            tracks.track_id, tracks.time, *tracks.position.T, *tracks.velocity.T, tracks.confirmed, tracks.score,
+            tracks.hits, tracks.started, tracks.last_detection, *sigmas.T, tracks.existence, np.hypot(east, north),
+            np.mod(np.degrees(np.arctan2(east, north)), 360.0), heights, tracks.status, tracks.parent,
+        )  # fmt: skip
+        part = dict(zip(COLUMNS, values, strict=True))
+        if qualities is not None:
+            nis, consistent, hits = qualities.of(tracks.track_id)
+            part |= {"nis": nis, "consistent": consistent}
+            part |= {f"hits_{s}": column for s, column in enumerate(hits.T, 1)}
+        if truth is not None:
+            both = zip(tracks.mean, tracks.covariance, strict=True)
+            part["nees"] = np.array([_nees(*one, positions, truth) for one in both])
+        self._parts.append(part)
+
+    def _column(self, name: str) -> Array:
+        """One of `COLUMNS` of all rows."""
+        parts = [part[name] for part in self._parts]
+        return np.concatenate(parts) if parts else np.zeros(0, _KINDS.get(name, np.float64))
 
     def name_targets(self, scene: Scene) -> None:
         """Find the target that each track followed most, where the truth of its scene has names."""
@@ -136,15 +147,17 @@ class TrackTable(Shown):
 
     def count_identities(self, ids: Array, known: Array) -> None:
         """Count the codes and addresses (n, 2) of measurements by the tracks (n,) that took them."""
-        for number, (code, address) in zip(ids.tolist(), known.tolist(), strict=True):
-            for kind, known_as in enumerate((f"{address:06x}" if address else "", f"{code:04o}" if code else "")):
-                if known_as and number > 0:
-                    self._known.setdefault(number, (Counter(), Counter()))[kind][known_as] += 1
+        taken = ids > 0
+        for kind, column in zip(self._known, (known[:, 1], known[:, 0]), strict=True):
+            rows = np.flatnonzero(taken & (column != 0))
+            kind.count(ids[rows], column[rows])
 
     def name_by_identities(self) -> None:
         """Take the codes and addresses that were counted most."""
-        for number, counted in self._known.items():
-            address, code = ("".join(name for name, _ in one.most_common(1)) for one in counted)
+        addresses, codes = (kind.most() for kind in self._known)
+        for number in dict.fromkeys([*addresses, *codes]):
+            address = f"{addresses[number]:06x}" if number in addresses else ""
+            code = f"{codes[number]:04o}" if number in codes else ""
             self.identities[number] = address, code
             self.targets.setdefault(number, address or code)
 
@@ -153,50 +166,44 @@ class TrackTable(Shown):
         self.targets, self.identities = other.targets, other.identities
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return sum(len(part["track_id"]) for part in self._parts)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table; see `COLUMNS`."""
         import pandas as pd
 
-        frame = pd.DataFrame.from_records(self._rows, columns=list(COLUMNS))
-        kinds = dict.fromkeys(COLUMNS, "float64") | {
-            "track_id": "int64",
-            "confirmed": "bool",
-            "hits": "int64",
-            "status": "str",
-            "parent": "int64",
-        }
-        frame = frame.astype(kinds)
+        kinds = dict.fromkeys(COLUMNS, "float64") | {name: "str" if kind is np.str_ else kind for name, kind in _KINDS.items()}
+        frame = pd.DataFrame({name: self._column(name) for name in COLUMNS}).astype(kinds)
         if self.origin is not None:
             latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
             # planar tracks have no z; altitudes by transponders stay
             frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
             frame = frame.assign(latitude=latitude, longitude=longitude)
-        if any(self._quality):
-            frame = frame.join(pd.DataFrame.from_records(self._quality))
+        for name in dict.fromkeys(name for part in self._parts for name in part if name not in COLUMNS):
+            frame[name] = np.concatenate([
+                part[name] if name in part else np.full(len(part["track_id"]), np.nan) for part in self._parts
+            ])
         return self.with_names(frame)
 
     def with_names(self, frame: pd.DataFrame) -> pd.DataFrame:
         """The frame with the columns of targets and identities, where there are any."""
-        ids = frame["track_id"].tolist()
+        ids, of = np.unique(frame["track_id"].to_numpy(), return_inverse=True)
         if self.targets:
-            frame = frame.assign(target=[self.targets.get(number, "") for number in ids])
+            frame = frame.assign(target=_texts([self.targets.get(number, "") for number in ids.tolist()])[of])
         if self.identities:
-            names = [self.identities.get(number, ("", "")) for number in ids]
-            addresses, codes = zip(*names, strict=True) if names else ((), ())
+            names = [self.identities.get(number, ("", "")) for number in ids.tolist()]
+            addresses, codes = (_texts([one[kind] for one in names])[of] for kind in (0, 1))
             frame = frame.assign(address_hex=addresses, mode3_oct=codes)
         return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV; the file appears whole or not at all."""
         from assoc._files.output import write_text
-        from assoc._text.plain import spreadsheet_text
 
         frame = self.to_frame()
         if self.targets:
-            frame["target"] = frame["target"].map(spreadsheet_text)
-        write_text(path, frame.to_csv(index=False))
+            frame["target"] = _escaped(frame["target"])
+        write_text(path, csv_text(frame))
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Write the table as Parquet; the file appears whole or not at all.
@@ -216,24 +223,26 @@ class TrackTable(Shown):
     def inconsistent(self) -> dict[int, float]:
         """Tracks whose NIS was far above its mean at any time, and the largest one of each."""
         found: dict[int, float] = {}
-        for row, quality in zip(self._rows, self._quality, strict=True):
-            if not quality.get("consistent", True):
-                found[row[0]] = max(found.get(row[0], 0.0), quality["nis"])
+        for part in self._parts:
+            if "consistent" not in part:
+                continue
+            rows = np.flatnonzero(~part["consistent"])
+            for number, nis in zip(part["track_id"][rows].tolist(), part["nis"][rows].tolist(), strict=True):
+                found[number] = max(found.get(number, 0.0), nis)
         return found
 
     def confirmed_ids(self) -> set[int]:
         """Ids of tracks that were confirmed at any time."""
-        return {row[0] for row in self._rows if row[8]}
+        return {*self._column("track_id")[self._column("confirmed")].tolist()}
 
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
         """Times (n,), track ids (n,) and positions (n, 3) of confirmed tracks or of all, for metrics.
 
         Of several scans at one time, the last row of each track.
         """
-        rows = [row for row in self._rows if row[8] or not confirmed]
-        times = np.array([row[1] for row in rows], dtype=np.float64)
-        ids = np.array([row[0] for row in rows], dtype=np.int64)
-        positions = np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
+        rows = self._column("confirmed") | (not confirmed)
+        times, ids = self._column("time")[rows], self._column("track_id")[rows]
+        positions = np.stack([self._column(name)[rows] for name in ("x", "y", "z")], axis=1)
         kept = last_at_each_instant(times, ids)
         return times[kept], ids[kept], positions[kept]
 
@@ -285,15 +294,13 @@ class LongTable:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write all rows: Parquet if the name ends so, else CSV."""
-        from assoc._text.plain import spreadsheet_text
-
         end = self._file.tell()
         self._file.seek(0)
         with table_writer(path) as writer:
             while self._file.tell() < end:
                 frame = self.names.with_names(pickle.load(self._file))
                 if "target" in frame and not writer.parquet:
-                    frame["target"] = frame["target"].map(spreadsheet_text)
+                    frame["target"] = _escaped(frame["target"])
                 writer.add(frame)
 
     def confirmed_ids(self) -> set[int]:
@@ -314,15 +321,60 @@ def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Tra
     return truth, found
 
 
-def _nees(track: Track, positions: Sequence[int], truth: Array) -> float:
+def _escaped(names: pd.Series) -> pd.Series:
+    """Names as a CSV file may have them; see `spreadsheet_text`."""
+    return names.map({name: spreadsheet_text(name) for name in names.unique()})
+
+
+def _texts(values: list[str]) -> Array:
+    """Texts as objects, (n,)."""
+    found = np.empty(len(values), dtype=object)
+    found[:] = values
+    return found
+
+
+class _Names:
+    """How often each track was known by each number."""
+
+    def __init__(self) -> None:
+        # track, number, how often, in the order in which the pairs came first
+        self._counted = np.zeros((0, 3), dtype=np.int64)
+        self._new: list[Array] = []
+        self._waiting = 0
+
+    def count(self, ids: Array, known: Array) -> None:
+        """Count numbers (n,) of tracks (n,)."""
+        self._new.append(np.stack([ids, known, np.ones_like(ids)], axis=1))
+        self._waiting += len(ids)
+        # so that it is sorted anew only when it has grown by a share of its length
+        if self._waiting > _ROWS + len(self._counted):
+            self._settle()
+
+    def _settle(self) -> None:
+        every = np.concatenate([self._counted, *self._new])
+        _, first, of = np.unique(every[:, :2], axis=0, return_index=True, return_inverse=True)
+        counts = np.bincount(of.ravel(), weights=every[:, 2]).astype(np.int64)
+        order = np.argsort(first)
+        self._counted = np.column_stack([every[first, :2], counts])[order]
+        self._new, self._waiting = [], 0
+
+    def most(self) -> dict[int, int]:
+        """The number by which each track was known most; of equals the one that came first."""
+        self._settle()
+        # the last one of a track counts
+        order = np.argsort(self._counted[::-1, 2], kind="stable")
+        return {track: number for track, number, _ in self._counted[::-1][order].tolist()}
+
+
+def _nees(mean: Array, covariance: Array, positions: Sequence[int], truth: Array) -> float:
     """Normalised estimation error squared over its components; NaN if no target is near."""
     axes = list(positions)
-    off = truth[:, : len(axes)] - track.mean[axes]
+    off = truth[:, : len(axes)] - mean[axes]
     distance = np.linalg.norm(off, axis=1)
     if not (distance < FOLLOWED_WITHIN).any():
         return math.nan
     nearest = off[np.argmin(distance)]
-    return float(nearest @ np.linalg.solve(track.covariance[np.ix_(axes, axes)], nearest)) / len(axes)
+    return float(nearest @ np.linalg.solve(covariance[np.ix_(axes, axes)], nearest)) / len(axes)
 
 
 @door
@@ -370,7 +422,8 @@ def track_scene(
         for ids, codes in zip(step.assigned, known or (), strict=False):
             table.count_identities(ids, codes)
         qualities.after(tracker, before, step, scan.measurements, scan.times)
-        listed = (track for track in tracker.tracks if track.reported or not confirmed)
+        listed = tracker.track_columns()
+        listed = listed.rows(listed.reported) if confirmed else listed
         truth = None if scene.truth is None else scene.truth.positions[k]
         table.add(listed, tracker.filter.motion.position, qualities=qualities, truth=truth)
     table.name_targets(scene)

@@ -34,7 +34,7 @@ from assoc.tracking.stages.life_cycle import LifeCycle
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
 from assoc.tracking.target_kinds import target_kind
-from assoc.tracking.track import Decision, Step, Track
+from assoc.tracking.track import Decision, Step, Track, TrackColumns
 from assoc.tracking.track_batch import TrackBatch
 
 
@@ -203,6 +203,11 @@ class Tracker:
         if self.state.time is None:
             return []
         return current(self.settings, self.state).tracks(self.filter, self.state.time)
+
+    def track_columns(self) -> TrackColumns:
+        """The same as columns, after the first step."""
+        assert self.state.time is not None
+        return current(self.settings, self.state).columns(self.filter, self.state.time)
 
     def begin(self, time: float, tracks: Gaussian, score: float = 20.0) -> Array:
         """Start confirmed tracks of known targets, from another system or a plan, before the first step.

@@ -115,8 +115,9 @@ class LinearMotion(Motion):
 
     def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
         """F and Q of each of k time steps, both (k, n, n)."""
-        F, Q = np.concatenate([self.models(step)[2] for step in dt.tolist()], axis=1)
-        return F, Q
+        steps, which = np.unique(dt, return_inverse=True)
+        F, Q = np.concatenate([self.models(step)[2] for step in steps.tolist()], axis=1)
+        return F[which], Q[which]
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""
@@ -200,7 +201,9 @@ class ConstantVelocity(LinearMotion):
     def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
         """F and Q of each of k time steps, both (k, n, n); the polynomials are taken of all steps at once."""
         order, axes = self.order, len(self.position)
-        F, Q = np.zeros((2, len(dt), (order + 1) * axes, (order + 1) * axes))
+        both = np.zeros((2, len(dt), order + 1, axes, order + 1, axes))
+        # the diagonal of each block, which has a place for each axis
+        F, Q = np.einsum("mkiaja->mkija", both)
         # coefficients of the powers of the time step
         unit_F, unit_Q = polynomial(order, 1.0), polynomial_noise(order, 1.0, self.sigma, self.kind)
         for i in range(order + 1):
@@ -209,11 +212,11 @@ class ConstantVelocity(LinearMotion):
                     power = max(2 - i, 0) + max(2 - j, 0)
                 else:
                     power = 2 * order - i - j + 1
-                for axis in range(axes):
-                    if j >= i:
-                        F[:, i * axes + axis, j * axes + axis] = unit_F[i, j] * dt ** (j - i)
-                    Q[:, i * axes + axis, j * axes + axis] = unit_Q[i, j] * dt**power
-        return F, Q
+                if j >= i:
+                    F[:, i, j] = (unit_F[i, j] * dt ** (j - i))[:, None]
+                Q[:, i, j] = (unit_Q[i, j] * dt**power)[:, None]
+        n = (order + 1) * axes
+        return both[0].reshape(-1, n, n), both[1].reshape(-1, n, n)
 
 
 class ConstantAcceleration(ConstantVelocity):

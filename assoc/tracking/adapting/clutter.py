@@ -99,21 +99,23 @@ def _densities(sensor: Sensor, here: Array, places: Array, clocks: Array, now: f
     around: Any = [
         (2.0 * math.pi + 1e-9) / unit if turns else 0.0 for unit, turns in zip(units, part.angular, strict=False)
     ]
-    found = cKDTree(every, boxsize=around).query(here, min(_LOOKED_AT, len(every)))
-    distance, near = (np.asarray(one) for one in found)
     # volume of a ball of radius 1, and false alarms there since the first plot
     ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
     span = max(now - float(clocks[0]) if len(clocks) else 0.0, 0.0) + 1.0
     usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * span * ball
     least = max(_LEAST, _IN_GATE * span / (_GATE**d * usual))
-    dense = np.flatnonzero(distance[:, _OTHERS] < (_OTHERS / (least * usual)) ** (1.0 / d))
+    tree, near_by = cKDTree(every, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
+    # few places are dense: only there many neighbours are sought
+    farther = np.asarray(tree.query(here, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
+    dense = np.flatnonzero(farther < near_by)
     if not len(dense):
         return result
-    turn = np.floor(np.append(clocks, np.full(n, now)))[near[dense]]
+    distance, near = (np.asarray(one) for one in tree.query(here[dense], min(_LOOKED_AT, len(every))))
+    turn = np.floor(np.append(clocks, np.full(n, now)))[near]
     nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
     others = np.cumsum(nearer >= _TARGETS, axis=1)
     last = np.argmax(others == _OTHERS, axis=1)
-    radius = np.maximum(distance[dense, last], _NEAREST)
+    radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
     ratio = (last + 1) / (radius**d * usual)
     result[dense] = np.where((others[:, -1] >= _OTHERS) & (ratio > least), np.log(np.maximum(ratio, 1.0)), 0.0)
     return result
