@@ -28,6 +28,7 @@ def spread(
     scheduler: str | None = None,
     ordered: bool = True,
     together: int = 1,
+    here: bool = False,
 ) -> Generator[Any]:
     """Yield ``task(item)`` for each item; the results are the same wherever they are made.
 
@@ -35,7 +36,8 @@ def spread(
     by ``jobs`` processes of this machine (1: this process), or by the workers of a dask ``scheduler``, where items of a
     lost worker are repeated by another. Without ``ordered``, results come as they arrive, and items are read only as
     far as the processes need. ``together`` items are sent at once: more of them where a task takes less than some
-    milliseconds.
+    milliseconds. With ``here`` this process is one of the ``jobs``, and works while the others start: for tasks that
+    end in seconds, and cannot end the process.
 
     LimitExceededError: a process died or could not start, or memory does not suffice for so many. InvalidInputError:
     the task or its result cannot be sent, or the scheduler does not answer. LostError: the scheduler is lost, or
@@ -45,9 +47,9 @@ def spread(
     if together > 1 and not alone:
         left = iter(items)
         batches = list(iter(lambda: list(islice(left, together)), []))
-        for results in spread(_Batch(task), batches, jobs=jobs, scheduler=scheduler, ordered=ordered):
+        for results in spread(_Batch(task), batches, jobs=jobs, scheduler=scheduler, ordered=ordered, here=here):
             yield from results
     elif scheduler is None:
-        yield from parallel_map(task, items, jobs, ordered=ordered)
+        yield from parallel_map(task, items, jobs, ordered=ordered, here=here)
     else:
         yield from dask_map(task, items, scheduler, ordered=ordered)

@@ -35,7 +35,7 @@ def start_python(path: Sequence[str], **options: Any) -> subprocess.Popen[bytes]
 
 
 def parallel_map(
-    task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True
+    task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True, here: bool = False
 ) -> Generator[Any]:
     """Yield ``task(item)`` for each item, made by ``jobs`` processes; the rest is as of `engine.spread`."""
     if isinstance(items, Sized):
@@ -55,8 +55,11 @@ def parallel_map(
 
     def attend(worker: subprocess.Popen[bytes]) -> None:
         try:
-            with suppress(OSError):  # it died, which its first item will find
+            # if it died, its first item will find that
+            with suppress(OSError, EOFError, pickle.UnpicklingError):
                 _write(worker.stdin, tasks.get())
+                # others may take the first items until it has started
+                pickle.load(worker.stdout)  # type: ignore[arg-type]
             while (entry := questions.get()) is not None and not ended:
                 number, item = entry
                 try:
@@ -71,7 +74,7 @@ def parallel_map(
     numbered, asked, given = enumerate(items), 0, 0
     arrived: dict[int, Any] = {}
     try:
-        _start(workers, jobs)
+        _start(workers, jobs - here)
         for worker in workers:
             tasks.put(content)
             _thread.start_new_thread(attend, (worker,))
@@ -83,9 +86,17 @@ def parallel_map(
                 asked += 1
             if given == asked:
                 return
+            busy = False
+            if here:
+                with suppress(queue.Empty):
+                    number, item = questions.get_nowait()  # type: ignore[misc]
+                    arrived[number if ordered else given + len(arrived)] = _tried(task, item)
+                    busy = True
             with suppress(queue.Empty):
-                number, value, failed = answers.get(timeout=_POLL)
-                arrived[number if ordered else given] = value, failed
+                while True:
+                    number, value, failed = answers.get(timeout=0.0 if busy else _POLL)
+                    arrived[number if ordered else given + len(arrived)] = value, failed
+                    busy = True
             while given in arrived:
                 value, failed = arrived.pop(given)
                 given += 1
@@ -102,6 +113,14 @@ def parallel_map(
             left.get()
         for worker in workers:
             worker.communicate()
+
+
+def _tried(task: Callable[[Any], Any], item: Any) -> tuple[Any, bool]:
+    """The answer of this process, or its error; and whether it is one."""
+    try:
+        return task(item), False
+    except Exception as error:
+        return error, True
 
 
 def _asked(worker: subprocess.Popen[bytes], item: Any) -> tuple[Any, bool]:
@@ -182,6 +201,8 @@ def serve() -> None:
 
     threading.Thread(target=listen, name="parent", daemon=True).start()
     task = _loaded(received.get())
+    with suppress(OSError):
+        _write(answers, b"")
     with announcement.silenced(), suppress(OSError):
         while (item := received.get()) and not leaving.is_set():
             _write(answers, _answer(task, item))

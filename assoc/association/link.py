@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from assoc._parameters import is_whole, positive
 from assoc._system import memory as memory_left
@@ -86,6 +85,9 @@ def link(frames: Iterable[object], search_range: float, *, memory: int = 0) -> L
 def _candidates(points: list[Array], reach: float, memory: int) -> tuple[Array, Array]:
     """Pairs (point, later point) within reach, counted from 0 over all frames, and their costs."""
     first = np.cumsum([0, *map(len, points)])
+    # quarter of a second to import
+    from scipy.spatial import cKDTree
+
     trees = [cKDTree(frame) for frame in points]
     pairs, costs = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for k, tree in enumerate(trees):

@@ -177,7 +177,9 @@ class Plan:
             return (self._tiled(item, int(jobs), scheduler) for item in items)
         # enough batches that processes end at about the same time
         together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
-        return spread(self, items, jobs=int(jobs), scheduler=scheduler, together=together)
+        # what other processes do is not watched
+        plan = self if jobs == 1 and scheduler is None else replace(self, watch=None)
+        return spread(plan, items, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
 
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""

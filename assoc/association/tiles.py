@@ -7,17 +7,18 @@ owns its first measurement, and are solved together. So costs and bounds of all 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
 
 from assoc._system.engine import spread
 from assoc._types import Array
 from assoc.costs import build_problem
 from assoc.costs.build import GATE_PROBABILITY
+from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.positions import positions_of_scan
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
@@ -161,7 +162,7 @@ def solve_in_tiles(
 def tiles_of(scene: Scene, scan: Scan, count: int, probability: float) -> Iterator[Tile]:
     """Tiles with about equally many measurements of their own; none is in two, and none is left out."""
     places, reach = [], []
-    limit = _MARGIN * np.sqrt(chi2.ppf(probability, _FREEDOM))
+    limit = _MARGIN * math.sqrt(chi_square_quantiles(float(probability), _FREEDOM)[_FREEDOM])
     for s in range(len(scene.sensors)):
         positions, covariances = positions_of_scan(scene, scan, s)
         places.append(positions[:, :2])

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import expm, logm
 
 from assoc._parameters import positive
 from assoc._system.door import door
@@ -67,6 +66,9 @@ def transition_rates(transition: Array, interval: float) -> Array:
     # away from a negative or zero eigenvalue the logarithm is real
     values = np.linalg.eigvals(transition)
     good = bool((np.abs(values) > 1e-12).all() and not ((np.abs(values.imag) < 1e-12) & (values.real < 0)).any())
+    # slow to import: not every tracker has several models
+    from scipy.linalg import expm, logm
+
     rates = np.real(logm(transition)) if good else np.full(transition.shape, -1.0)
     off = rates - np.diag(np.diagonal(rates))
     if not good or (off < -1e-9).any() or np.abs(expm(rates) - transition).max() > 1e-9:
@@ -99,6 +101,8 @@ def transition_from_sojourns(seconds: Sequence[float], interval: float = 1.0) ->
         raise InvalidInputError(f"seconds: expected at least 2 modes, got {m}")
     rates = np.repeat(leave[:, None] / (m - 1), m, axis=1)
     np.fill_diagonal(rates, -leave)
+    from scipy.linalg import expm
+
     return np.asarray(expm(rates * positive(interval, "interval")))
 
 
@@ -195,6 +199,8 @@ class InteractingMultipleModel(Filter[Mixture]):
             )
         values, vectors, inverse = self._eigen
         if inverse is None:
+            from scipy.linalg import expm
+
             return np.stack([expm(self.rates * step) for step in dt.tolist()])
         # much quicker than expm, which plots with times of their own would call once each
         return np.maximum(np.real((vectors * np.exp(values * dt[:, None])[:, None]) @ inverse), 0.0)

@@ -67,7 +67,7 @@ class LastPlots:
 def _most(plots: Array, rows: Array, begins: Array) -> Array:
     """`majority` of up to MEMORY plots that end at each of rows (n,), none before `begins` (n,)."""
     columns = rows[:, None] - np.arange(MEMORY)
-    last = np.where(columns >= begins[:, None], plots[columns], -1)
+    last = np.where(columns >= begins[:, None], plots[np.maximum(columns, 0)], -1)
     votes = np.zeros(last.shape, dtype=np.int64)
     for column in last.T:
         votes += last == column[:, None]

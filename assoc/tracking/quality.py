@@ -154,8 +154,8 @@ class Qualities:
         known = current(settings, before)
         # those that were renamed under their ids in the step
         named = known.track_id.copy()
-        for number, name in (names or {}).items():
-            named[known.track_id == number] = name
+        for own, name in (names or {}).items():
+            named[known.track_id == own] = name
         order = np.argsort(named, kind="stable")
         found: list[tuple[Array, Array, Array]] = []
         stamps = scan.own_times()

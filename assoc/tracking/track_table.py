@@ -172,7 +172,7 @@ class TrackTable(Shown):
         """Return the table; see `COLUMNS`."""
         import pandas as pd
 
-        kinds = dict.fromkeys(COLUMNS, "float64") | {name: "str" if kind is np.str_ else kind for name, kind in _KINDS.items()}
+        kinds = {name: _KINDS.get(name, np.float64) for name in COLUMNS} | {"status": "str"}
         frame = pd.DataFrame({name: self._column(name) for name in COLUMNS}).astype(kinds)
         if self.origin is not None:
             latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
@@ -180,9 +180,9 @@ class TrackTable(Shown):
             frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
             frame = frame.assign(latitude=latitude, longitude=longitude)
         for name in dict.fromkeys(name for part in self._parts for name in part if name not in COLUMNS):
-            frame[name] = np.concatenate([
-                part[name] if name in part else np.full(len(part["track_id"]), np.nan) for part in self._parts
-            ])
+            frame[name] = np.concatenate(
+                [part[name] if name in part else np.full(len(part["track_id"]), np.nan) for part in self._parts]
+            )
         return self.with_names(frame)
 
     def with_names(self, frame: pd.DataFrame) -> pd.DataFrame:

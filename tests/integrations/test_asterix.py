@@ -17,10 +17,12 @@ from assoc import asterix2csv, track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
 from assoc.integrations.asterix.blocks import edition, library, value
+from assoc.integrations.asterix.parts import AsterixPlots
 from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
 from assoc.recordings import write_plots as write_table
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.recordings.recording import joined
 from assoc.simulation import simulate_recording
 
 
@@ -56,6 +58,40 @@ def test_plots_there_and_back(plots, file, tmp_path):
     again = read_asterix(tmp_path / "again.ast").plots[25, 201]
     for name in ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "addresses"):
         np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
+
+
+def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
+    """Also with plots that come late, garbled altitudes at the borders, and another radar between."""
+    monkeypatch.setattr("assoc.integrations.asterix.parts._ROWS", 60)
+    made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording
+    pieces = []
+    for number, rows in enumerate(np.array_split(np.arange(len(made)), 40)):
+        write_plots(tmp_path / "piece.ast", made.take(rows), (1, 1 + (number % 5 == 3)))
+        pieces.append((tmp_path / "piece.ast").read_bytes())
+    # some 50 s late
+    pieces[9], pieces[10] = pieces[10], pieces[9]
+    (tmp_path / "plots.ast").write_bytes(b"".join(pieces))
+    whole = read_asterix(tmp_path / "plots.ast").plots
+    assert whole[1, 1].garbled.any() and not whole[1, 1].garbled.all()
+    for radar, one in (("1/1", whole[1, 1]), ("1/2", whole[1, 2])):
+        reader = AsterixPlots(tmp_path / "plots.ast", radar)
+        parts = [*reader]
+        assert len(parts) > 2 and not reader.notes
+        together = joined(parts, {}, "")
+        for name in ("times", "ranges", "identities", "altitudes", "garbled", "addresses"):
+            np.testing.assert_array_equal(getattr(together, name), getattr(one, name))
+    for radar, message in ((None, "radar: the file holds plots of 1/1, 1/2; name one"), ("3/4", "name one")):
+        with pytest.raises(InvalidInputError, match=message):
+            [*AsterixPlots(tmp_path / "plots.ast", radar)]
+    # what came later than plots that are given already is counted
+    (tmp_path / "late.ast").write_bytes(b"".join([*pieces[5:], pieces[0]]))
+    reader = AsterixPlots(tmp_path / "late.ast", "1/1")
+    parts = [*reader]
+    (count,) = reader.notes.values()
+    assert (
+        count == len(np.array_split(np.arange(len(made)), 40)[0]) and "came more than 300 s late" in [*reader.notes][0]
+    )
+    assert (np.diff(joined(parts, {}, "").times) >= 0).all()
 
 
 def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):

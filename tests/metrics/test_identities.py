@@ -24,6 +24,8 @@ from assoc.metrics import (
     track_rmse,
     tracks_of_one_identity,
 )
+from assoc.metrics.ct_mt_it import RatesSoFar
+from assoc.metrics.plot_identity import IdentitiesSoFar
 from assoc.metrics.trajectories import last_at_each_instant
 
 
@@ -191,6 +193,25 @@ def test_ct_mt_it_against_a_plain_reading():
         for axis, mean in enumerate((found.ct, found.mt, found.it)):
             rates = [np.mean(cell[axis]) for cell in expected.values() if cell[axis]]
             assert mean == pytest.approx(100 * np.mean(rates))
+
+
+def test_plots_in_parts_count_as_all_at_once():
+    rng, n = np.random.default_rng(5), 400
+    windows, sources = np.arange(n) // 10, rng.integers(-1, 6, n)
+    # each track lives for 80 plots
+    tracks = np.where(rng.random(n) < 0.2, -1, 3 * (np.arange(n) // 80) + rng.integers(0, 3, n))
+    confirmed = rng.random(n) < 0.7
+    rates, kept = RatesSoFar(), IdentitiesSoFar()
+    for begin in range(0, n, 20):
+        rows = slice(begin, begin + 20)
+        rates.add(windows[rows], sources[rows], tracks[rows], confirmed[rows])
+        kept.add(sources[rows], tracks[rows], confirmed[rows])
+        living = {*tracks[begin + 20 :].tolist()}
+        rates.keep(living)
+        kept.keep(living)
+    whole = ct_mt_it(windows, sources, tracks, confirmed)
+    np.testing.assert_array_equal(rates.result().per_window, whole.per_window)
+    assert kept.result() == tracks_of_one_identity(sources, tracks, confirmed)
 
 
 def test_association_accuracy():

@@ -17,6 +17,7 @@ from assoc.recordings import (
     irregular_groups,
     read_plots,
 )
+from assoc.recordings.rotation import _sums
 from tests.recordings.common import GROUPS_WITH_WINDOW, TABLE_2_1, circling
 
 
@@ -169,3 +170,12 @@ def test_rotations_of_numpy():
     expected = [len(one) for one in clustering_time_window(recording, 10)]
     assert [len(one) for one in clustering_time_window(recording, np.int64(10))] == expected
     assert [len(one) for one in clustering_time_window(recording, np.float32(10))] == expected
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 1000])
+def test_sums_over_plots_at_many_frequencies(count):
+    rng = np.random.default_rng(count)
+    times, bearings = np.sort(rng.uniform(0.0, 300.0, 50)), rng.uniform(0.0, 2 * np.pi, 50)
+    frequencies = 0.05 + 1e-3 * np.arange(count)
+    expected = np.exp(1j * (2 * np.pi * np.outer(frequencies, times) - bearings)).sum(axis=1)
+    np.testing.assert_allclose(_sums(times, bearings, frequencies), expected, atol=1e-9)

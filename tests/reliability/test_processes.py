@@ -8,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -202,8 +203,38 @@ def test_an_interrupt_can_leave_no_lock_locked():
     before = sys.getprofile()
     sys.setprofile(look)
     try:
-        found = [list(parallel_map(abs, range(-40, 0), 2, ordered=ordered)) for ordered in (True, False)]
+        choices = [{"ordered": ordered, "here": here} for here in (False, True) for ordered in (True, False)]
+        found = [list(parallel_map(abs, range(-40, 0), 2, **choice)) for choice in choices]
     finally:
         sys.setprofile(before)
-    assert found[0] == list(range(40, 0, -1)) and sorted(found[1]) == found[0][::-1]
+    assert found[0] == found[2] == list(range(40, 0, -1))
+    assert sorted(found[1]) == sorted(found[3]) == found[0][::-1]
     assert not {"__enter__", "acquire", "release", "wait", "start", "join"} & {*entered}
+
+
+def test_this_process_works_while_others_start(tmp_path):
+    """The first items are done here; others, as soon as the other process is there, by both."""
+    here, there = os.getpid(), tmp_path / "there"
+
+    def task(item):
+        if os.getpid() != here:
+            there.touch()
+        for _ in range(6000 if item == 5 and os.getpid() == here else 0):
+            if there.exists():
+                break
+            time.sleep(0.01)
+        return item, os.getpid()
+
+    for ordered in (True, False):
+        there.unlink(missing_ok=True)
+        found = list(parallel_map(task, range(40), 2, ordered=ordered, here=True))
+        assert sorted(item for item, _ in found) == list(range(40)) and found[0] == (0, here)
+        assert len({process for _, process in found}) == 2
+        assert not ordered or [item for item, _ in found] == list(range(40))
+
+
+def test_an_error_here_is_raised_in_its_turn():
+    results = parallel_map(lambda item: 1 / (item - 3), range(40), 2, here=True)
+    assert [next(results) for _ in range(3)] == [1 / -3, 1 / -2, -1.0]
+    with pytest.raises(ZeroDivisionError):
+        next(results)

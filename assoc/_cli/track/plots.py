@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.options import Given, flag_of
 from assoc._cli.track.options import RADAR
-from assoc._cli.track.radars_file import ASTERIX, read_asterix_plots
+from assoc._cli.track.radars_file import ASTERIX
 from assoc.errors import InvalidInputError, warn
 
 if TYPE_CHECKING:
@@ -99,13 +99,13 @@ def _parts(file: str, given: Given, notes: Counter[str]) -> Iterator[Recording]:
     from assoc.recordings.reading import PlotReader
 
     if is_asterix(file):
-        content, source = read_asterix_plots(file, given["radar"], "--radar")
-        yield content.plots[source]
-        notes.update(content.plots[source].notes)
+        from assoc.integrations.asterix.parts import AsterixPlots
+
+        reader: Any = AsterixPlots(file, given["radar"], "--radar")
     else:
         reader = PlotReader(file)
-        yield from reader
-        notes.update(reader.notes)
+    yield from reader
+    notes.update(reader.notes)
 
 
 class Windows:

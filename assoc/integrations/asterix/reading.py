@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -121,23 +121,26 @@ class SourceRows:
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []
         self.day = self.latest = 0.0
+        self.begun = False
+        """Whether it has had any time."""
 
     def time(self, raw: int) -> float:
         """Seconds of the recording, by the raw time of day."""
         running = raw * SECOND + self.day
-        if self.rows and running < self.latest - DAY / 2:
+        if self.begun and running < self.latest - DAY / 2:
             self.day += DAY
             running += DAY
         elif self.day and running > self.latest + DAY / 2:
             # late, from before midnight
             running -= DAY
-        self.latest = max(self.latest, running) if self.rows else running
+        self.latest = max(self.latest, running) if self.begun else running
+        self.begun = True
         return running
 
-    def columns(self) -> list[Array]:
-        """Columns, sorted by the first one, the time."""
+    def table(self) -> Array:
+        """The rows, sorted by the first column, the time."""
         table = np.array(self.rows, dtype=np.float64)
-        return list(table[np.argsort(table[:, 0], kind="stable")].T)
+        return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
 @door
@@ -166,77 +169,87 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
         libasterix is not installed.
     """
     seen_from = None if origin is None else checked_origin(origin)
-    content = read_bytes(path)
-    notes: dict[str, int] = {}
-    plots: dict[Source, SourceRows] = {}
-    reports: dict[Source, SourceRows] = {}
-    located: dict[Source, SourceRows] = {}
-    radars: dict[Source, dict[str, Any]] = {}
-    clocks: dict[Source, SourceRows] = {}
-    for block in data_blocks(content, notes):
-        if block.category not in _PLOTS and block.category not in _REPORTS and block.category not in _SERVICE:
-            what = f"data blocks of category {block.category:03d}"
-            notes[what] = notes.get(what, 0) + 1
-            continue
-        for record in records(block, notes):
-            sac, sic = value(record, "010", "SAC"), value(record, "010", "SIC")
-            if sac is None or sic is None:
-                notes["records without a source"] = notes.get("records without a source", 0) + 1
-                continue
-            source = (sac, sic)
-            if block.category in _SERVICE:
-                radar, clock = radars.setdefault(source, {"norths": []}), clocks.setdefault(source, SourceRows())
-                _take_service(record, radar, clock)
-                continue
-            if not _taken(record, block.category, source, clocks, plots, reports if block.category == 21 else located):
-                what = f"records of category {block.category:03d} without time or position"
-                notes[what] = notes.get(what, 0) + 1
-    if not any(rows.rows for rows in (*plots.values(), *reports.values(), *located.values())):
-        skipped = "; ".join(f"{count} {what}" for what, count in notes.items())
-        raise InvalidInputError(
-            f"{os.fspath(path)}: holds no ASTERIX plots (001, 010, 020, 048) or reports (010, 020, 021)"
-            f"{': ' + skipped if skipped else ''}"
-        )
+    read = Decoded()
+    for _ in read.blocks(path):
+        pass
+    read.check(path)
+    notes, plots, reports, located = read.notes, read.plots, read.reports, read.located
     name = os.path.basename(os.fspath(path))
     if seen_from is None:
         first = next((rows.rows[0] for rows in (*reports.values(), *located.values()) if rows.rows), None)
         seen_from = None if first is None else (first[1], first[2], 0.0)
     return AsterixContent(
-        {source: _recording(rows, name, notes) for source, rows in plots.items() if rows.rows},
+        {source: recording_of(rows.table(), name, notes) for source, rows in plots.items() if rows.rows},
         {source: _seen(rows, seen_from, name, notes) for source, rows in reports.items() if rows.rows and seen_from},
-        {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in radars.items()},
+        {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in read.radars.items()},
         seen_from,
         notes,
         {source: _seen(rows, seen_from, name, notes) for source, rows in located.items() if rows.rows and seen_from},
     )
 
 
-def _taken(
-    record: Any,
-    category: int,
-    source: Source,
-    clocks: dict[Source, SourceRows],
-    plots: dict[Source, SourceRows],
-    reports: dict[Source, SourceRows],
-) -> bool:
-    """Whether a record is a report or a plot; it is added to those of its source."""
-    report = _report(record, _REPORTS[category]) if category in _REPORTS else None
-    plot = _plot(record, _PLOTS[category]) if report is None and category in _PLOTS else None
-    found = plot or report
-    if found is None:
-        return False
-    kept = reports if plot is None else plots
-    rows = kept.setdefault(source, SourceRows())
-    raw, *rest = found
-    if category == 1:
-        raw = full_time(int(raw), rows, clocks.get(source))
-    rows.rows.append((rows.time(int(raw)), *rest))
-    return True
+class Decoded:
+    """What has been decoded of a file so far."""
+
+    def __init__(self) -> None:
+        self.notes: dict[str, int] = {}
+        self.plots: dict[Source, SourceRows] = {}
+        self.reports: dict[Source, SourceRows] = {}
+        self.located: dict[Source, SourceRows] = {}
+        self.radars: dict[Source, dict[str, Any]] = {}
+        self._clocks: dict[Source, SourceRows] = {}
+
+    def blocks(self, path: str | os.PathLike[str]) -> Iterator[None]:
+        """Decode block after block."""
+        for block in data_blocks(read_bytes(path), self.notes):
+            if block.category not in _PLOTS and block.category not in _REPORTS and block.category not in _SERVICE:
+                self._count(f"data blocks of category {block.category:03d}")
+                continue
+            for record in records(block, self.notes):
+                self._take(record, block.category)
+            yield
+
+    def check(self, path: str | os.PathLike[str]) -> None:
+        """Refuse a file in which there is nothing, once it is read."""
+        if not (self.plots or self.reports or self.located):
+            skipped = "; ".join(f"{count} {what}" for what, count in self.notes.items())
+            raise InvalidInputError(
+                f"{os.fspath(path)}: holds no ASTERIX plots (001, 010, 020, 048) or reports (010, 020, 021)"
+                f"{': ' + skipped if skipped else ''}"
+            )
+
+    def _count(self, what: str) -> None:
+        self.notes[what] = self.notes.get(what, 0) + 1
+
+    def _take(self, record: Any, category: int) -> None:
+        sac, sic = value(record, "010", "SAC"), value(record, "010", "SIC")
+        if sac is None or sic is None:
+            self._count("records without a source")
+        elif category in _SERVICE:
+            radar = self.radars.setdefault((sac, sic), {"norths": []})
+            _take_service(record, radar, self._clocks.setdefault((sac, sic), SourceRows()))
+        elif not self._taken(record, category, (sac, sic)):
+            self._count(f"records of category {category:03d} without time or position")
+
+    def _taken(self, record: Any, category: int, source: Source) -> bool:
+        """Whether a record is a report or a plot; it is added to those of its source."""
+        report = _report(record, _REPORTS[category]) if category in _REPORTS else None
+        plot = _plot(record, _PLOTS[category]) if report is None and category in _PLOTS else None
+        found = plot or report
+        if found is None:
+            return False
+        kept = self.plots if plot is not None else self.reports if category == 21 else self.located
+        rows = kept.setdefault(source, SourceRows())
+        raw, *rest = found
+        if category == 1:
+            raw = full_time(int(raw), rows, self._clocks.get(source))
+        rows.rows.append((rows.time(int(raw)), *rest))
+        return True
 
 
 def full_time(raw: int, *clocks: SourceRows | None) -> int:
     """The raw time of day of a truncated one: that nearest to the latest time on the source's clocks."""
-    known = [clock.latest for clock in clocks if clock is not None and clock.rows]
+    known = [clock.latest for clock in clocks if clock is not None and clock.begun]
     if not known:
         return raw
     steps = round(max(known) % DAY / SECOND)
@@ -290,7 +303,6 @@ def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None
     kind, time, turn = value(record, "000"), value(record, "030"), value(record, "041")
     if time is not None:
         now = clock.time(time)
-        clock.rows.append((now,))
         if kind == 1:
             radar["norths"].append(now)
     if turn:
@@ -300,18 +312,19 @@ def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None
         radar["place"] = (signed(lat, 24) * _COARSE, signed(lon, 24) * _COARSE, float(signed(height, 16)))
 
 
-def _recording(rows: SourceRows, name: str, notes: Mapping[str, int]) -> Recording:
-    times, ranges, azimuths, identities, altitudes, doubtful, addresses = rows.columns()
+def recording_of(rows: Array, name: str, notes: Mapping[str, int]) -> Recording:
+    """Plots of rows in the order of time."""
+    times, ranges, azimuths, identities, altitudes, doubtful, addresses = rows.T
     known = identities.astype(np.int64)
     return Recording(
         times=times, ranges=ranges, azimuths=azimuths, identities=known, altitudes=altitudes,
-        garbled=(doubtful > 0) | garbled_altitudes(altitudes / FLIGHT_LEVEL, known, ()),
+        garbled=(doubtful > 0) | garbled_altitudes(altitudes / FLIGHT_LEVEL, known, (), times),
         addresses=addresses.astype(np.int64), notes=dict(notes), name=name,
     )  # fmt: skip
 
 
 def _seen(rows: SourceRows, origin: tuple[float, float, float], name: str, notes: Mapping[str, int]) -> Recording:
-    times, lat, lon, identities, altitudes, addresses = rows.columns()
+    times, lat, lon, identities, altitudes, addresses = rows.table().T
     place = east_north_up(lat, lon, np.nan_to_num(altitudes), origin)
     return Recording(
         times=times, ranges=np.linalg.norm(place, axis=1), azimuths=np.arctan2(place[:, 1], place[:, 0]),

@@ -98,7 +98,6 @@ def _rows(content: bytes, notes: dict[str, int]) -> Iterator[dict[str, Any]]:
                 if category == 1:
                     time = full_time(time, clock, clocks.get((2, row["sac"], row["sic"])))
                 row["time"] = clock.time(time)
-                clock.rows = [(row["time"],)]  # what counts is whether there were any
             for name, step, bits, items in _NUMBERS:
                 raw = value(record, *items[category]) if category in items else None
                 if raw is not None:

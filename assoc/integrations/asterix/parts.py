@@ -1,0 +1,89 @@
+"""The plots of an ASTERIX file part by part."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix.reading import Decoded, Source, recording_of
+from assoc.recordings.altitude import NEARBY
+from assoc.recordings.recording import Recording
+
+# plots that are given at once
+_ROWS = 50_000
+
+
+class AsterixPlots:
+    """The plots of one radar in a file in parts, in the order of time, so that memory grows by the file's bytes alone.
+
+    Parameters
+    ----------
+    path : path-like
+    radar : str, optional
+        SAC/SIC of the radar; needed if the file has plots of several.
+    label : str
+        What gives the radar, for errors.
+
+    Attributes
+    ----------
+    notes : dict of str to int
+        As those of `AsterixContent`, and plots that came too late; complete after the last part.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], radar: str | None = None, label: str = "radar") -> None:
+        self._path, self._radar, self._label = path, radar, label
+        self.notes: dict[str, int] = {}
+
+    def __iter__(self) -> Iterator[Recording]:
+        read, name = Decoded(), os.path.basename(os.fspath(self._path))
+        self.notes = read.notes
+        waiting = _Waiting(name, read.notes)
+        for _ in read.blocks(self._path):
+            for source, rows in read.plots.items():
+                if self._radar not in (None, _name(source)) or len(read.plots) > 1 and self._radar is None:
+                    rows.rows = []
+                elif len(rows.rows) >= _ROWS:
+                    yield from waiting.of(rows.rows, last=False)
+                    rows.rows = []
+        read.check(self._path)
+        known = {_name(source): rows for source, rows in sorted(read.plots.items())}
+        if not known:
+            raise InvalidInputError(f"{os.fspath(self._path)}: holds no plots (categories 001, 010, 020, 048)")
+        if self._radar not in known and (self._radar is not None or len(known) > 1):
+            raise InvalidInputError(f"{self._label}: the file holds plots of {', '.join(known)}; name one")
+        yield from waiting.of(known[self._radar or next(iter(known))].rows, last=True)
+
+
+def _name(source: Source) -> str:
+    return f"{source[0]}/{source[1]}"
+
+
+class _Waiting:
+    """Plots that wait for those before them, and for those after them by which garbled altitudes are found."""
+
+    def __init__(self, name: str, notes: dict[str, int]) -> None:
+        self._name, self._notes = name, notes
+        self._rows = np.zeros((0, 7))
+        self._done = 0
+        """Rows that are given, and kept for those after them."""
+
+    def of(self, new: list[tuple[float, ...]], *, last: bool) -> Iterator[Recording]:
+        """Take rows in, and yield the plots that are complete."""
+        rows = np.array(new, dtype=np.float64).reshape(-1, 7)
+        given = float(self._rows[self._done - 1, 0]) if self._done else -math.inf
+        late = rows[:, 0] < given
+        if late.any():
+            what = f"plots left out that came more than {NEARBY:g} s late"
+            self._notes[what] = self._notes.get(what, 0) + int(late.sum())
+        rows = np.concatenate([self._rows, rows[~late]])
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        times, begin = rows[:, 0], self._done
+        end = len(rows) if last or not len(rows) else int(np.searchsorted(times, times[-1] - NEARBY))
+        if end > begin:
+            yield recording_of(rows, self._name, self._notes).take(np.arange(begin, end))
+        kept = int(np.searchsorted(times, times[end - 1] - NEARBY)) if end else 0
+        self._rows, self._done = rows[kept:], max(end, begin) - kept

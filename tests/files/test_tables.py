@@ -1,0 +1,23 @@
+"""Tables as CSV."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc._files.tables import csv_text
+
+
+@pytest.mark.parametrize("rows", [0, 1, 200])
+def test_the_text_is_that_of_pandas(rows):
+    rng = np.random.default_rng(rows)
+    odd = np.array([0.0, -0.0, 1e-7, 1e22, 5e-324, np.inf, -np.inf, np.nan, 0.1 + 0.2, 4.0])
+    frame = pd.DataFrame({
+        "every": rng.normal(0.0, 1e4, rows),
+        "odd": rng.choice(odd, rows),
+        "few, alike": rng.choice([1.5, np.nan, 0.1], rows),
+        "count": rng.integers(-5, 10**12, rows),
+        "sure": rng.random(rows) < 0.5,
+        "name": rng.choice(["plain", 'a "b", c', "two\nlines", ""], rows),
+    })  # fmt: skip
+    for header in (True, False):
+        assert csv_text(frame, header=header) == frame.to_csv(index=False, header=header, lineterminator="\n")
