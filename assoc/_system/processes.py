@@ -24,6 +24,8 @@ from assoc.errors import InvalidInputError, LimitExceededError
 _PROCESS = 100e6
 # seconds; a waiting main thread hears of a signal that another thread received only when it wakes up
 _POLL = 0.05
+# items a process that may be asked for before the first of them is done: results wait for it
+_AHEAD = 16
 _DIED = "a worker process died: it was killed or ran out of memory; fewer processes take less memory"
 
 
@@ -81,7 +83,7 @@ def parallel_map(
             threads += 1
         del content  # it may be large
         while True:
-            for entry in islice(numbered, None if ordered else 2 * jobs - (asked - given)):
+            for entry in islice(numbered, (_AHEAD if ordered else 2) * jobs - (asked - given)):
                 questions.put(entry)
                 asked += 1
             if given == asked:

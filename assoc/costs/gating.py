@@ -45,10 +45,13 @@ def degrees_of_freedom(sensors: SensorArrays, detected: Array) -> Array:
     Components measured, less the coordinates found from them: three if a sensor of the tuple measures full positions,
     else two (a height found from slant ranges alone is not counted, which widens the gate).
     """
-    coordinates = np.where(detected[:, sensors.full].any(axis=1), 3, 2)
-    # whole numbers all the same: the product is quick for floats alone
-    measured = (detected @ sensors.dim.astype(np.float64)).astype(np.int64)
-    return np.maximum(measured - coordinates, 0)
+    measured, full = np.zeros(len(detected), dtype=np.int64), np.zeros(len(detected), dtype=np.bool_)
+    # sensor by sensor: products of truth values and selected columns take longer
+    for s, (dim, whole) in enumerate(zip(sensors.dim.tolist(), sensors.full.tolist(), strict=True)):
+        measured += dim * detected[:, s]
+        if whole:
+            full |= detected[:, s]
+    return np.maximum(measured - (2 + full), 0)
 
 
 def make_gates(sensors: SensorArrays, probability: float) -> Gates:

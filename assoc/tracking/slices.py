@@ -103,6 +103,9 @@ class TrackSlice:
             done.append(followed)
             if number >= part.early - 1:
                 tables[number >= part.early].add(*followed.listed(self._confirmed))
+        if len(done) < len(part.windows):
+            # the end was asked for: half a slice is none
+            raise KeyboardInterrupt
         own = done[part.early :]
         none = np.zeros(0, dtype=np.int64)
         return SliceTracks(

@@ -54,7 +54,7 @@ class Slices:
         while again:
             again, self.lost = False, ""
             parts = self._left(slices_of(windows, seconds, early))
-            results = spread(work, parts, ordered=False, **places)
+            results = spread(work, parts, ordered=False, here=True, **places)
             try:
                 for result in results:
                     again = True
