@@ -19,7 +19,7 @@ from assoc.costs.limits import fitting
 from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
-from assoc.costs.prices import position_prior, with_prior
+from assoc.costs.prices import PositionPrior, position_prior, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
@@ -99,23 +99,29 @@ def build_problem(
     ----------
     The ant colony paper, equations 1-5; with clutter density r / V in place of 1 / V.
     """
-    try:
-        probability = float(gate_probability)
-    except (TypeError, ValueError):
-        probability = math.nan
-    if not 0.0 < probability <= 1.0:
-        raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
+    probability = _checked_probability(gate_probability)
     scene, chosen = _standing(scene, scan)
-    most = fitting(chosen.sizes.tolist()) if max_tuples is None else max_tuples
-    if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
-        raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
+    most = _most_tuples(max_tuples, chosen)
     if all_tuples:
-        return _whole_grid(scene, chosen, int(most), speed, target_density)
+        return _whole_grid(scene, chosen, most, speed, target_density)
     if not chosen.at_once:
         _refuse_prior(target_density)
-        return timed_problem(scene, chosen, probability, int(most), speed)
+        return timed_problem(scene, chosen, probability, most, speed)
+    prior = position_prior(scene, sensor_arrays(scene), target_density)
+    return _gated_problem(scene, chosen, probability, most, speed, prior, blind)
+
+
+def _gated_problem(
+    scene: Scene,
+    scan: Scan,
+    probability: float,
+    most: int,
+    speed: float | Sequence[float],
+    prior: PositionPrior | None,
+    blind: Array | None,
+) -> AssignmentProblem:
+    """The candidates of a scan of one instant: pairs that pass their gates, grown to tuples."""
     bare = sensor_arrays(scene)
-    prior = position_prior(scene, bare, target_density)
     sensors = with_prior(bare, prior)
     if blind is not None and blind.any():
         misses = np.log1p([-sensor.detection_probability for sensor in scene.sensors])
@@ -123,14 +129,31 @@ def build_problem(
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
-    measured, index = scan_arrays(sensors, chosen, reach, least)
-    limits = {"number": chosen.index, "max_tuples": int(most)}
+    measured, index = scan_arrays(sensors, scan, reach, least)
+    limits = {"number": scan.index, "max_tuples": most}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, chosen, speed), prior=prior, **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, scan, speed), prior=prior, **limits)
     if blind is not None and blind.any():
         costs = costs - np.where(blind & (rows < 0), misses, 0.0).sum(axis=1)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
-    return AssignmentProblem(padded[rows], costs, chosen.sizes)
+    return AssignmentProblem(padded[rows], costs, scan.sizes)
+
+
+def _checked_probability(gate_probability: object) -> float:
+    try:
+        probability = float(gate_probability)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        probability = math.nan
+    if not 0.0 < probability <= 1.0:
+        raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
+    return probability
+
+
+def _most_tuples(max_tuples: int | None, scan: Scan) -> int:
+    most = fitting(scan.sizes.tolist()) if max_tuples is None else max_tuples
+    if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
+        raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
+    return int(most)
 
 
 def _whole_grid(

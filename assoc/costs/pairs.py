@@ -251,7 +251,7 @@ def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
 def _alike(scan: ScanArrays, others: Array) -> list[Array]:
     """Located measurements by the size of their ellipsoids: a window is as wide as the largest in it asks for."""
     size = np.frexp(np.sqrt(scan.spread[others, 0] + scan.spread[others, 3]))[1]
-    return [others[size == one] for one in np.unique(size)]
+    return [others[size == exponent] for exponent in np.unique(size)]
 
 
 def _windows(sensors: SensorArrays, scan: ScanArrays, rows: Array, others: Array, limit: float) -> _Windows:

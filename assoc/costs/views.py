@@ -110,7 +110,7 @@ class Views:
 
     def _users(self, sensors: slice) -> list[tuple[int, Sensor]]:
         """Sensors of users' own classes, which have no compiled model."""
-        return [(s, one) for s, one in enumerate(self._sensors[sensors]) if type(one) not in CODES]
+        return [(s, sensor) for s, sensor in enumerate(self._sensors[sensors]) if type(sensor) not in CODES]
 
     def _looked(self, states: Any, bounds: Array, soft: bool) -> Array:
         if isinstance(states, Mixture):
@@ -140,22 +140,22 @@ def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axe
     B, m = weights.shape
     S, d = bounds.shape[0], axes.size
     result = np.zeros((B, S))
-    place, spread, h, H = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    position, spread, h, H = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     for b in range(B):
-        place[:], spread[:] = 0.0, 0.0
+        position[:], spread[:] = 0.0, 0.0
         for j in range(m):
             for i in range(d):
-                place[i] += weights[b, j] * means[b, j, axes[i]]
+                position[i] += weights[b, j] * means[b, j, axes[i]]
         for j in range(m if soft else 0):
             for i in range(d):
                 for k in range(d):
-                    away = (means[b, j, axes[i]] - place[i]) * (means[b, j, axes[k]] - place[k])
+                    away = (means[b, j, axes[i]] - position[i]) * (means[b, j, axes[k]] - position[k])
                     spread[i, k] += weights[b, j] * (covariances[b, j, axes[i], axes[k]] + away)
         for s in range(S):
             code, dim, share = int(bounds[s, 0]), int(bounds[s, 1]), 1.0
             if code < 0:
                 continue
-            linearise(code, dim, bounds[s, 2:5], place[0], place[1], place[2], h, H)
+            linearise(code, dim, bounds[s, 2:5], position[0], position[1], position[2], h, H)
             for a in range(dim):
                 low, high = bounds[s, 6 + 3 * a] - h[a], bounds[s, 7 + 3 * a] - h[a]
                 if bounds[s, 5 + 3 * a] != 0.0:
@@ -173,7 +173,9 @@ def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axe
                 share *= 0.5 * (math.erfc(-high / unit) - math.erfc(-low / unit))
             share = 0.0 if share < _SURE else 1.0 if share > 1.0 - _SURE else share
             if bounds[s, 14] > 0.0:
-                away = math.hypot(math.hypot(place[0] - bounds[s, 2], place[1] - bounds[s, 3]), place[2] - bounds[s, 4])
+                away = 0.0
+                for i in range(3):
+                    away = math.hypot(away, position[i] - bounds[s, 2 + i])
                 share *= bounds[s, 15 + min(int(BANDS * away / bounds[s, 14]), BANDS - 1)]
             result[b, s] = share
     return result
@@ -233,5 +235,5 @@ def blind_somewhere(sensors: Sequence[Sensor], region: Array) -> Array:
     # not quite to its edge, where views often end
     inner = region + 0.01 * (region[:, 1:] - region[:, :1]) * np.array([1.0, -1.0])
     axes = [np.linspace(low, high, count) for (low, high), count in zip(inner, _TRIED, strict=True)]
-    places = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
-    return np.array([bool((share_in_view(sensor, places, None) < 1.0).any()) for sensor in sensors])
+    tried = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
+    return np.array([bool((share_in_view(sensor, tried, None) < 1.0).any()) for sensor in sensors])

@@ -163,11 +163,9 @@ def find(parent: NDArray[np.int32], i: int) -> int:
     return i
 
 
-@njit
-def assembled(
-    rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
-) -> Any:
-    """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering."""
+@inner_njit
+def _numbered_components(rows: NDArray[np.int32], slack: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
+    """Component of each row, by their first rows, -1 of rows that count nowhere; and the number of components."""
     num, num_sensors = rows.shape
     total = slack.size
     parent = np.empty(total, np.int32)
@@ -199,6 +197,31 @@ def assembled(
                 component[root] = num_components
                 num_components += 1
             component[r] = component[root]
+    return component, num_components
+
+
+@inner_njit
+def _indexed_by_row(cols: NDArray[np.int32], row_ptr: NDArray[np.int64]) -> NDArray[np.int32]:
+    """The columns of each row, ascending."""
+    end = row_ptr[:-1].copy()
+    row_cols = np.empty(row_ptr[-1], np.int32)
+    for k in range(cols.shape[0]):
+        for s in range(cols.shape[1]):
+            r = cols[k, s]
+            if r >= 0:
+                row_cols[end[r]] = k
+                end[r] += 1
+    return row_cols
+
+
+@njit
+def assembled(
+    rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
+) -> Any:
+    """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering."""
+    num, num_sensors = rows.shape
+    total = slack.size
+    component, num_components = _numbered_components(rows, slack)
     row_start = np.zeros(num_components + 1, np.int64)
     col_start = np.zeros(num_components + 1, np.int64)
     for r in range(total):
@@ -245,12 +268,5 @@ def assembled(
                 cols[k, s] = -1
     for r in range(row_origin.size):
         row_ptr[r + 1] += row_ptr[r]
-    place = row_ptr[:-1].copy()
-    row_cols = np.empty(row_ptr[-1], np.int32)
-    for k in range(num):
-        for s in range(num_sensors):
-            r = cols[k, s]
-            if r >= 0:
-                row_cols[place[r]] = k
-                place[r] += 1
+    row_cols = _indexed_by_row(cols, row_ptr)
     return cols, new_weights, new_slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin

@@ -37,7 +37,7 @@ class Conditioned(NamedTuple):
             return solution
         cost = math.fsum(problem.costs[solution.indices].tolist())
         bound = min(math.nextafter(solution.lower_bound * self.unit, -math.inf), cost)
-        duals = tuple(own * self.unit for own in solution.duals)
+        duals = tuple(given * self.unit for given in solution.duals)
         return replace(solution, cost=cost, lower_bound=bound, duals=duals)
 
     def alters(self, solution: Solution) -> bool:
@@ -74,9 +74,9 @@ class Prepared:
     @property
     def arrays(self) -> PreparedArrays:
         """The columns and the data to convert solutions back, as kernels take them."""
-        one = self.packing
-        own = one.cols, one.weights, one.slack, one.origin, one.row_origin
-        return PreparedArrays(*own, self.single, one.row_ptr, one.row_cols)
+        packing = self.packing
+        given = packing.cols, packing.weights, packing.slack, packing.origin, packing.row_origin
+        return PreparedArrays(*given, self.single, packing.row_ptr, packing.row_cols)
 
 
 def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,8 +72,7 @@ def assign(
     advise : bool, default True
         Whether to warn of costs that are probably not likelihood ratios. Trackers switch it off.
     proof : path-like, optional
-        Write a proof of the answer to this file, as JSON; ``python -m assoc.check`` replays it in exact arithmetic
-        (``assoc.proofs.write_proof``). It is computed after the answer, without time limit.
+        Write a proof of the answer to this file, without time limit; see ``assoc.proofs.write_proof``.
     **parameters
         Parameters of the solver (``assoc.solvers.parameters(name)``).
 
@@ -93,40 +93,60 @@ def assign(
     Warns
     -----
     AssocWarning
-        No tuple costs less than its measurements as false alarms, so that no target can be found. Or the proof could
-        not be written. Or an array was given, which may be meant in another way. Or costs are so large that rounding
-        alone keeps the answer from being proved.
+        No tuple costs less than its measurements as false alarms. The proof could not be written. An array may be
+        meant in another way. Costs are so large that rounding keeps the answer from being proved.
     """
-    started, compiled = time.perf_counter(), compile_seconds()
+    begun: Any = {"started": time.perf_counter(), "compiled": compile_seconds()}
     problem = taken_problem(problem)
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
-    for name, function in (("callback", callback), ("watch", watch)):
-        if function is not None and not callable(function):
-            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
+    _require_functions(callback=callback, watch=watch)
     if proof is not None:
         check_writable(proof)
-    source = _seed(seed)
+    make_run = partial(Run, _seed(seed), time_limit=limit, callback=callback, watch=watch, **begun)
     with interruptible():
-        for own in conditioned(problem):
-            run = Run(source, time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
-            run.unit, run.known = own.unit, own.known
-            solution = start = own.restored(problem, _answer(problem, own.problem, (solver, solve), chosen, run, start))
-            if not own.alters(solution) or run.stopped_by in _EARLY:
-                break
+        solution = _solution(problem, (solver, solve), chosen, make_run, start)
         if proof is not None:
-            from assoc.proofs import write_proof  # loads what few calls need
-
-            try:
-                write_proof(proof, problem, solution)
-            except ValueError as error:  # the answer is returned all the same
-                warn(f"proof: not written: {error}")
+            _prove(proof, problem, solution)
     _warn_of_rounding(problem, solution)
     # checked only where nothing was found: every column of a problem with dummies is a target
     if advise and problem.dummy and len(solution.tuples) == problem.sizes.sum():
         for line in cost_warnings(problem):
             warn(line)
+    return solution
+
+
+def _require_functions(**given: object) -> None:
+    for name, function in given.items():
+        if function is not None and not callable(function):
+            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
+
+
+def _prove(file: FilePath, problem: AssignmentProblem, solution: Solution) -> None:
+    """Write a proof; the answer is returned even where that fails."""
+    from assoc.proofs import write_proof  # loads what few calls need
+
+    try:
+        write_proof(file, problem, solution)
+    except ValueError as error:
+        warn(f"proof: not written: {error}")
+
+
+def _solution(
+    problem: AssignmentProblem,
+    called: tuple[str, SolveFunction],
+    chosen: Parameters,
+    make_run: Callable[[], Run],
+    start: Solution | None,
+) -> Solution:
+    """Solve a problem, first with large costs lowered; again, from there, while the answer has one of these."""
+    for posed in conditioned(problem):
+        run = make_run()
+        run.unit, run.known = posed.unit, posed.known
+        solution = start = posed.restored(problem, _answer(problem, posed.problem, called, chosen, run, start))
+        if not posed.alters(solution) or run.stopped_by in _EARLY:
+            break
     return solution
 
 

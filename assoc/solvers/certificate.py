@@ -153,8 +153,8 @@ def _cheapest_copy(costs: Floats, prepared: PreparedArrays, j: int) -> int:
     for s in range(cols.shape[1]):
         r = max(r, cols[j, s])
     best = j
-    for place in range(row_ptr[r], row_ptr[r + 1]):
-        k = row_cols[place]
+    for at in range(row_ptr[r], row_ptr[r + 1]):
+        k = row_cols[at]
         # rounding keeps the order of weights, so few columns need the full comparison
         if prepared.weights[k] <= prepared.weights[best] and costs[origin[k]] < costs[origin[best]]:
             same = True

@@ -100,8 +100,7 @@ def solver(name: str) -> SolveFunction:
         from assoc.solvers.own_solver import guarded  # loads a compiler
 
         return guarded(name, _REGISTERED[name][1])
-    solve: SolveFunction = _module(name, "solve").solve
-    return solve
+    return _module(name, "solve").solve
 
 
 def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
@@ -119,8 +118,7 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
 
 @cache
 def _kind(name: str) -> type[Parameters]:
-    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
-    return kind
+    return getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
 
 
 @cache

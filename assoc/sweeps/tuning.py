@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,8 +89,7 @@ def tune(
     sources : Scene, AssignmentProblem, or sequence of them
     solver : str
     space : mapping, optional
-        Values or range of each parameter; by default the solver's numbers from a quarter of their default to
-        four times it, within the solver's limits.
+        Values or range of each parameter; by default a quarter of each number's default to four times it.
     trials : int, default 100
         Number of settings to try; the first is the default if the space contains it.
     target : str, default "gap"
@@ -113,13 +113,8 @@ def tune(
     """
     if target not in TARGETS:
         raise InvalidInputError(f"target: expected gap or time, got {target!r}")
-    for name, count in (("trials", trials), ("repeats", repeats)):
-        if not is_whole(count, 1):
-            raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
-    optuna = _optuna()
-    ranges = dict(space) if space else default_space(solver)
-    if not any(isinstance(choice, Range) or len(choice.values) > 1 for choice in ranges.values()):
-        raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
+    _require_counts(trials=trials, repeats=repeats)
+    optuna, ranges = _optuna(), _ranges(solver, space)
     sources = study_sources(sources)
     every = [range(source.num_scans) for source in sources] if scans is None else scans
     training, test, words = _split([list(numbers) for numbers in every], repeats)
@@ -128,22 +123,17 @@ def tune(
         seeds = range(repeats, 2 * repeats) if held_out else range(repeats)
         return Study(sources, settings, seeds, seed, time_limit, gating or {}, test if held_out else training)
 
-    single = {name: choice.values for name, choice in ranges.items() if isinstance(choice, Values)}
-    default = Setting(solver, {name: values[0] for name, values in single.items() if len(values) == 1})
+    default = _default(solver, ranges)
     size = study([default]).size * trials + study([default], held_out=True).size * 2
     with Store(folder, study([default]).manifest) as store:
         runs = _Runs(store, size, progress, {"jobs": jobs, "scheduler": scheduler})
         first = runs.of(study([default]))
         cutoff = time_limit if time_limit is not None else float(np.nanmax(first[2], initial=1e-6))
-        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
-        search.enqueue_trial(_point(default, ranges))
         values: dict[Setting, float] = {}
-        for _ in range(trials):
-            trial = search.ask()
-            setting = Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
+        for setting, learn in _proposed(optuna, solver, ranges, default, trials, seed):
             if setting not in values:
                 values[setting] = float(scores(*runs.of(study([setting])), target, cutoff).mean())
-            search.tell(trial, values[setting])
+            learn(values[setting])
         tuned = min(values, key=lambda setting: values[setting])
         training_scores = float(scores(*first, target, cutoff).mean()), values[tuned]
         last = study([default, tuned], held_out=True)
@@ -152,6 +142,25 @@ def tune(
     report = _report(solver, target, trials, tuned, default, training_scores, held, cutoff, words)
     _save(Path(folder) / REPORT, report)
     return report
+
+
+def _require_counts(**given: object) -> None:
+    for name, count in given.items():
+        if not is_whole(count, 1):
+            raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
+
+
+def _ranges(solver: str, space: Mapping[str, Space] | None) -> dict[str, Space]:
+    ranges = dict(space) if space else default_space(solver)
+    if not any(isinstance(choice, Range) or len(choice.values) > 1 for choice in ranges.values()):
+        raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
+    return ranges
+
+
+def _default(solver: str, ranges: Mapping[str, Space]) -> Setting:
+    """The default setting, but for parameters that have a single value here."""
+    single = {name: choice.values for name, choice in ranges.items() if isinstance(choice, Values)}
+    return Setting(solver, {name: values[0] for name, values in single.items() if len(values) == 1})
 
 
 def _optuna() -> Any:
@@ -163,6 +172,18 @@ def _optuna() -> Any:
         ) from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
+
+
+def _proposed(
+    optuna: Any, solver: str, ranges: Mapping[str, Space], default: Setting, trials: int, seed: int
+) -> Iterator[tuple[Setting, Callable[[float], object]]]:
+    """Settings to try, each with the function that takes its score; the first is the default."""
+    search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+    search.enqueue_trial(_point(default, ranges))
+    for _ in range(trials):
+        trial = search.ask()
+        setting = Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
+        yield setting, partial(search.tell, trial)
 
 
 def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[list[int]], str]:

@@ -132,14 +132,14 @@ def _deposit_unlimited(self: Any, cols: Any, owner: Any, share: float) -> None:
     max_min._update(self.pheromone, self.slack_pheromone, owner, share, 0.0)
 
 
-def _rewritten(kernel: Any, old: str, new: str) -> Any:
-    """A kernel with a part of its text replaced, compiled when it is called."""
+def _rewritten(kernel: Any, old: str, new: str, **kernels: Any) -> Any:
+    """A kernel with a part of its text replaced, perhaps to call other kernels, compiled when it is called."""
     function = getattr(kernel, "py_func", kernel)
     text = textwrap.dedent(inspect.getsource(function))
     if text.count(old) != 1:
         raise ValueError(f"{function.__name__}: expected {old!r} once")
-    names = dict(function.__globals__)
-    names["njit"] = lambda plain: plain
+    names = {**function.__globals__, **kernels}
+    names["njit"] = names["inner_njit"] = lambda plain: plain
     exec(compile(text.replace(old, new), function.__code__.co_filename, "exec"), names)
     return numba.njit(nogil=True, error_model="numpy")(names[function.__name__])
 
@@ -153,7 +153,8 @@ def _no_aspiration() -> Iterator[None]:
 @cache
 def _moves_without_aspiration() -> Any:
     rule = "(until[j] < clock or current + gain[j] < record - 1e-9)"
-    return _rewritten(moves._moves, rule, "until[j] < clock")
+    chosen = _rewritten(moves._best_insertion, rule, "until[j] < clock")
+    return _rewritten(moves._moves, "_best_insertion(", "_without(", _without=chosen)
 
 
 @contextmanager

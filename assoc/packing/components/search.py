@@ -114,4 +114,4 @@ class _Task:
 
     def split(self) -> list[_Task]:
         """Tasks for the remaining components."""
-        return [_Task(one, self.all) for one in split_component(self.component) or ()]
+        return [_Task(part, self.all) for part in split_component(self.component) or ()]

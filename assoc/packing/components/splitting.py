@@ -60,11 +60,11 @@ def split_component(
     owner = np.where(owner >= 0, index[owner], -1).astype(np.int32)
     components = split_components(smaller, duals, whole.origin[smaller.origin])
     give_covers(components, smaller, owner)
-    rounding = 1e-12 * (sum(abs(one.weight) for one in components) + abs(whole.weight))
-    for one in components:
-        one.iterations, one.stalled = whole.iterations, whole.stalled
-        one.run, one.refinement = whole.run, whole.refinement
-        one.proven = whole.proven - (whole.weight - one.weight) - rounding
+    rounding = 1e-12 * (sum(abs(component.weight) for component in components) + abs(whole.weight))
+    for component in components:
+        component.iterations, component.stalled = whole.iterations, whole.stalled
+        component.run, component.refinement = whole.run, whole.refinement
+        component.proven = whole.proven - (whole.weight - component.weight) - rounding
     return components
 
 

@@ -18,10 +18,10 @@ def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
     least = np.int64(2**63 - 1)
     for a in range(count):
         least = min(least, bits[a])
-    place = count
+    index = count
     for a in range(count):
-        place = min(place, a if bits[a] == least else count)
-    return place
+        index = min(index, a if bits[a] == least else count)
+    return index
 
 
 @inner_njit
@@ -30,7 +30,7 @@ def place_of_largest(bits: NDArray[np.int64], count: int) -> int:
     most = np.int64(0)
     for a in range(count):
         most = max(most, bits[a])
-    place = count
+    index = count
     for a in range(count):
-        place = min(place, a if bits[a] == most else count)
-    return place if most > 0 else -1
+        index = min(index, a if bits[a] == most else count)
+    return index if most > 0 else -1

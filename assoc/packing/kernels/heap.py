@@ -33,16 +33,16 @@ def doubled_rows(table: Array) -> Any:
 @inner_njit
 def push(key: Floats, item: Ints, size: int, value: float, thing: int) -> None:
     """Add an item under a key; ``size`` is the number of items before."""
-    place = size
-    while place > 0:
-        parent = (place - 1) >> 1
+    index = size
+    while index > 0:
+        parent = (index - 1) >> 1
         if key[parent] <= value:
             break
-        key[place] = key[parent]
-        item[place] = item[parent]
-        place = parent
-    key[place] = value
-    item[place] = thing
+        key[index] = key[parent]
+        item[index] = item[parent]
+        index = parent
+    key[index] = value
+    item[index] = thing
 
 
 @inner_njit
@@ -50,17 +50,17 @@ def pop(key: Floats, item: Ints, size: int) -> None:
     """Remove the root; ``size`` is the number of items left."""
     value = key[size]
     thing = item[size]
-    place = 0
+    index = 0
     while True:
-        child = 2 * place + 1
+        child = 2 * index + 1
         if child >= size:
             break
         if child + 1 < size and key[child + 1] < key[child]:
             child += 1
         if key[child] >= value:
             break
-        key[place] = key[child]
-        item[place] = item[child]
-        place = child
-    key[place] = value
-    item[place] = thing
+        key[index] = key[child]
+        item[index] = item[child]
+        index = child
+    key[index] = value
+    item[index] = thing

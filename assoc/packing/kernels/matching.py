@@ -216,6 +216,21 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
 
 
 @inner_njit
+def _augment(indices: Ints, edge_row: Ints, previous: Ints, state: _State, start: int, j: int) -> None:
+    """Match along the path that ends in column j, back to the row where it starts."""
+    row_edge, owner = state.row_edge, state.owner
+    while True:
+        k = previous[j]
+        i = edge_row[k]
+        after = row_edge[i]
+        row_edge[i] = k
+        owner[j] = i
+        if i == start:
+            break
+        j = indices[after]
+
+
+@inner_njit
 def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     """Augment along a shortest path from each pending row; False if a row that must be matched cannot be."""
     indptr, indices, costs, row_slack, base = problem
@@ -290,21 +305,11 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
                 closed[j] = False
             distance[j] = np.inf
         if sink_column >= 0:
-            j = sink_column
-        elif sink_row == start:
-            continue
-        else:
+            _augment(indices, edge_row, previous, state, start, sink_column)
+        elif sink_row != start:
             j = indices[row_edge[sink_row]]
             row_edge[sink_row] = -1
-        while True:
-            k = previous[j]
-            i = edge_row[k]
-            after = row_edge[i]
-            row_edge[i] = k
-            owner[j] = i
-            if i == start:
-                break
-            j = indices[after]
+            _augment(indices, edge_row, previous, state, start, j)
     return True
 
 
@@ -334,24 +339,24 @@ def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
         while True:
             if d + row_slack[i] - u[i] < sink_distance:
                 sink_distance, sink_row = d + row_slack[i] - u[i], i
-            least, place, row, shift = np.inf, -1, matrix[i], d - u[i]
+            least, nearest, row, shift = np.inf, -1, matrix[i], d - u[i]
             for t in range(num_open):
                 j = order[t]
                 value, known = shift + row[j] - v[j], distance[j]
                 if value < known:
                     distance[j], previous[j], known = value, i, value
                 if known < least or (known == least and owner[j] < 0):
-                    least, place = known, t
+                    least, nearest = known, t
             if least >= sink_distance:
                 break
-            j = order[place]
+            j = order[nearest]
             # rounding may make a reduced cost negative
             d = max(d, least)
             if owner[j] < 0:
                 sink_distance, sink_column = d, j
                 break
             num_open -= 1
-            order[place], order[num_open] = order[num_open], j
+            order[nearest], order[num_open] = order[num_open], j
             tree_distance[num_open] = d
             i = owner[j]
         if sink_distance == np.inf:

@@ -26,8 +26,7 @@ def ascending(values: Floats) -> NDArray[np.int32]:
     if values.size < _FEW:
         return np.argsort(values, kind="stable").astype(np.int32)
     # adding 0 turns -0.0 into 0.0, so that equal numbers have equal bits
-    order: NDArray[np.int32] = _by_digits((values + 0.0).view(np.int64))
-    return order
+    return _by_digits((values + 0.0).view(np.int64))
 
 
 def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
@@ -35,8 +34,7 @@ def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
     if values.size < _FEW:
         return np.argsort(values, kind="stable").astype(np.int32)
     # as floats, these bits have the same order
-    order: NDArray[np.int32] = _by_digits(np.ascontiguousarray(values))
-    return order
+    return _by_digits(np.ascontiguousarray(values))
 
 
 def _order_by_numpy(values: Array) -> Any:
@@ -52,23 +50,23 @@ def order_of(values: Array) -> Any:
         order[i] = i
     for begin in range(0, num, _RUN):
         for i in range(begin + 1, min(begin + _RUN, num)):
-            own = order[i]
-            place = i
-            while place > begin and values[order[place - 1]] > values[own]:
-                order[place] = order[place - 1]
-                place -= 1
-            order[place] = own
+            moved = order[i]
+            index = i
+            while index > begin and values[order[index - 1]] > values[moved]:
+                order[index] = order[index - 1]
+                index -= 1
+            order[index] = moved
     width = _RUN
     while width < num:
         for begin in range(0, num, 2 * width):
             middle, end = min(begin + width, num), min(begin + 2 * width, num)
             i, j = begin, middle
-            for place in range(begin, end):
+            for index in range(begin, end):
                 if i < middle and (j == end or values[order[i]] <= values[order[j]]):
-                    other[place] = order[i]
+                    other[index] = order[i]
                     i += 1
                 else:
-                    other[place] = order[j]
+                    other[index] = order[j]
                     j += 1
         order, other = other, order
         width *= 2

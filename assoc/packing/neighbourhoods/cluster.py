@@ -25,7 +25,7 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
-from assoc.packing.kernels.columns import first_row
+from assoc.packing.kernels.columns import choose, first_row
 from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
 from assoc.packing.packing import Packing, PackingArrays
@@ -249,9 +249,7 @@ def _search_clusters(
                     for t in range(num_best):
                         k = origin[best[t]]
                         if k >= 0:
-                            for s in range(num_sensors):
-                                if cols[k, s] >= 0:
-                                    owner[cols[k, s]] = k
+                            choose(cols, k, owner)
         for i in range(num):
             local[rows[i]] = -1
     return change, cut

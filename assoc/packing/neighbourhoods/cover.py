@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import njit
 from assoc._types import Ints
 from assoc.packing.branching.feasibility import first_solution
+from assoc.packing.kernels.columns import choose_all
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
@@ -41,13 +42,12 @@ class Cover:
     def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
         """Return the cover of columns that share no row."""
         cover = cls.empty(packing)
-        own_all(packing.arrays.cols, np.asarray(columns, dtype=np.int32), cover.owner)
+        choose_all(packing.arrays.cols, np.asarray(columns, dtype=np.int32), cover.owner)
         return cover
 
     def columns(self) -> NDArray[np.int32]:
         """Return the chosen columns, ascending."""
-        columns: NDArray[np.int32] = chosen_columns(self.packing.arrays.cols, self.owner)
-        return columns
+        return chosen_columns(self.packing.arrays.cols, self.owner)
 
     @property
     def weight(self) -> float:
@@ -100,21 +100,6 @@ def weight_of(packing: Packing, owner: NDArray[np.int32]) -> float:
 def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:
     """Return whether a cover covers all rows without slack."""
     return not bool((owner[~packing.slack] < 0).any())
-
-
-@inner_njit
-def own(cols: Ints, j: int, owner: Ints) -> None:
-    """Choose column j: make it the owner of its rows."""
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0:
-            owner[cols[j, s]] = j
-
-
-@njit
-def own_all(cols: Ints, columns: Ints, owner: Ints) -> None:
-    """Choose columns: make them the owners of their rows."""
-    for j in columns:
-        own(cols, j, owner)
 
 
 @njit

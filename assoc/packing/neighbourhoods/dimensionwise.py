@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats, Ints
-from assoc.packing.kernels.columns import first_row
+from assoc._types import Ints
+from assoc.packing.kernels.columns import choose_matched, sum_of_weights
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.cover import own
 from assoc.packing.packing import Packing, PackingArrays
 
 _MOST_SPLITS_FOR = 6
@@ -115,15 +114,15 @@ def _match_of(cols: Ints, j: int, mask: int, side: int, half: Ints, size: Ints) 
     """The half that is column j's part on a side; -1 if it has no rows there, -2 if its part is not one whole half."""
     found = -1
     members = 0
-    one = True
+    whole = True
     # a single return: with several, numba counts array references at each call, which takes longer than the rest
     for s in range(cols.shape[1]):
         q = cols[j, s]
         if q >= 0 and (mask >> s) & 1 == side:
-            one = one and (found < 0 or half[q] == found)
+            whole = whole and (found < 0 or half[q] == found)
             found = half[q]
             members += 1
-    if not one or (found >= 0 and members != size[found]):
+    if not whole or (found >= 0 and members != size[found]):
         found = -2
     return found
 
@@ -191,39 +190,18 @@ def _rematch(packing: PackingArrays, owner: Ints, sensor: Ints, mask: int) -> fl
         # all on the left must be matched, so that all on the right will be
         for q in range(num_right):
             price[q] = 0.0
-    before = _weight(cols, weights, owner)
+    before = sum_of_weights(cols, weights, owner)
     row_edge = np.empty(num_left, np.int64)
     u, v = np.empty(num_left), np.empty(num_right)
     after = match_sparse(indptr, indices[:count], costs[:count], left_alone, price, row_edge, u, v)
     if not after < before - 1e-9 * max(1.0, abs(before)):
         return 0.0
     previous = owner.copy()
-    for r in range(num_rows):
-        owner[r] = -1
-    taken = np.zeros(num_right, np.bool_)
-    for p in range(num_left):
-        e = row_edge[p]
-        if e >= 0:
-            taken[indices[e]] = True
-            own(cols, column[e], owner)
-        elif left_column[p] >= 0:
-            own(cols, left_column[p], owner)
-    for q in range(num_right):
-        if not taken[q] and right_column[q] >= 0:
-            own(cols, right_column[q], owner)
+    owner[:] = -1
+    choose_matched(cols, row_edge, (indices, column), (left_column, right_column), owner)
     # summed as before: else rounding of costs that cancel could look like an improvement again and again
-    change = _weight(cols, weights, owner) - before
+    change = sum_of_weights(cols, weights, owner) - before
     if change < 0.0:
         return change
     copy_to(owner, previous)
     return 0.0
-
-
-@inner_njit
-def _weight(cols: Ints, weights: Floats, owner: Ints) -> float:
-    total = 0.0
-    for r in range(owner.size):
-        k = owner[r]
-        if k >= 0 and first_row(cols, k) == r:
-            total += weights[k]
-    return total

@@ -31,7 +31,7 @@ from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import MOST_ROWS, root_with_cuts
 from assoc.packing.branching.short_search import Part, search_shortly, short_memory
-from assoc.packing.neighbourhoods.cover import own_all
+from assoc.packing.kernels.columns import choose_all
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.cuts import with_cuts
@@ -140,7 +140,7 @@ class Diver:
         found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
-        own_all(self._packing.arrays.cols, self._core.origin[found], owner)
+        choose_all(self._packing.arrays.cols, self._core.origin[found], owner)
         return owner
 
 

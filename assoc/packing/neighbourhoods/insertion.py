@@ -15,6 +15,7 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
+from assoc.packing.kernels.columns import choose
 from assoc.packing.packing import Packing, PackingArrays
 
 # columns tried between two checks of the clock: about a millisecond
@@ -59,9 +60,7 @@ def add_greedily(packing: PackingArrays, order: Ints, owner: Ints) -> None:
                     break
                 duty = duty or not slack[r]
         if fits and (weights[j] < 0.0 or duty):
-            for s in range(num_sensors):
-                if cols[j, s] >= 0:
-                    owner[cols[j, s]] = j
+            choose(cols, j, owner)
 
 
 @inner_njit

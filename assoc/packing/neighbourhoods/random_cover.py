@@ -19,7 +19,7 @@ from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.bounds.priced import Prices
-from assoc.packing.kernels.columns import first_row, fits
+from assoc.packing.kernels.columns import choose, fits, sum_of_weights
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
 from assoc.packing.packing import PackingArrays
@@ -54,6 +54,33 @@ def _first_fitting(packing: PackingArrays, owner: Ints, r: int) -> int:
     return -1
 
 
+@inner_njit
+def _cover_row(packing: PackingArrays, r: int, value: Floats, stay: float, owner: Ints, rng: Any) -> None:
+    """Draw one of the columns of an open row that fit, or none, by their values and that of staying uncovered."""
+    cols, row_ptr, row_cols = packing.cols, packing.row_ptr, packing.row_cols
+    total = stay
+    for k in range(row_ptr[r], row_ptr[r + 1]):
+        j = row_cols[k]
+        # most values are 0, which is quicker to test than whether a column fits
+        if value[j] > 0.0 and fits(cols, owner, j):
+            total += value[j]
+    draw = rng.random() * total - stay
+    if draw < 0.0:
+        return
+    chosen = -1
+    for k in range(row_ptr[r], row_ptr[r + 1]):
+        j = row_cols[k]
+        if value[j] > 0.0 and fits(cols, owner, j):
+            draw -= value[j]
+            chosen = j
+            if draw < 0.0:
+                break
+    if chosen < 0:
+        chosen = _first_fitting(packing, owner, r)
+    if chosen >= 0:
+        choose(cols, chosen, owner)
+
+
 @njit
 def walk(
     packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
@@ -64,11 +91,9 @@ def walk(
     built a complete one.
     """
     cols, weights, slack = packing.cols, packing.weights, packing.slack
-    row_ptr, row_cols = packing.row_ptr, packing.row_cols
     reduced, duals = prices
     alpha, beta, temperature = trail.alpha, trail.beta, trail.temperature
-    num, num_sensors = cols.shape
-    num_rows = slack.size
+    num, num_rows = weights.size, slack.size
     value = np.empty(num)
     # in loops: numpy's powers of arrays are rounded differently where this is interpreted
     trace, slack_trace = np.empty(num), np.empty(num_rows)
@@ -100,39 +125,11 @@ def walk(
             k = rng.integers(0, i + 1)
             order[i], order[k] = order[k], order[i]
         for i in range(num_rows):
-            r = order[i]
-            if owner[r] >= 0:
-                continue
-            total = stay[r]
-            for k in range(row_ptr[r], row_ptr[r + 1]):
-                j = row_cols[k]
-                # most values are 0, which is quicker to test than whether a column fits
-                if value[j] > 0.0 and fits(cols, owner, j):
-                    total += value[j]
-            draw = rng.random() * total - stay[r]
-            if draw < 0.0:
-                continue
-            chosen = -1
-            for k in range(row_ptr[r], row_ptr[r + 1]):
-                j = row_cols[k]
-                if value[j] > 0.0 and fits(cols, owner, j):
-                    draw -= value[j]
-                    chosen = j
-                    if draw < 0.0:
-                        break
-            if chosen < 0:
-                chosen = _first_fitting(packing, owner, r)
-            if chosen >= 0:
-                for s in range(num_sensors):
-                    if cols[chosen, s] >= 0:
-                        owner[cols[chosen, s]] = chosen
+            if owner[order[i]] < 0:
+                _cover_row(packing, order[i], value, stay[order[i]], owner, rng)
         if inserts:
             insert_and_eject(packing, owner, everything, deadline)
-        weight = 0.0
-        for r in range(num_rows):
-            j = owner[r]
-            if j >= 0 and first_row(cols, j) == r:
-                weight += weights[j]
+        weight = sum_of_weights(cols, weights, owner)
         if weight < best_weight:
             best_weight = weight
             copy_to(best, owner)

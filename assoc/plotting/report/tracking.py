@@ -16,7 +16,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.metrics.trajectories import last_at_each_instant
-from assoc.plotting.places import places
+from assoc.plotting.measured import positions_of
 from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.plots import plot_data
@@ -96,16 +96,7 @@ def write_tracking_report(
         A column is missing or holds values that are not finite numbers, or the file cannot be written.
     """
     check_report()
-    missing = [column for column in _NEEDED if column not in tracks.columns]
-    if missing:
-        raise InvalidInputError(f"tracks: the column {missing[0]!r} is missing")
-    for column in _NEEDED:
-        try:
-            finite = bool(np.isfinite(tracks[column].to_numpy(dtype=float)).all())
-        except (TypeError, ValueError):
-            finite = False
-        if not finite:
-            raise InvalidInputError(f"tracks: the column {column!r} must hold finite numbers")
+    _check_columns(tracks)
     frame = tracks.sort_values(["track_id", "time"], kind="stable")
     if "z" not in frame.columns:
         frame = frame.assign(z=0.0)
@@ -139,6 +130,19 @@ def write_tracking_report(
         **{part: plain_numbers(np.sqrt([getattr(gospa, part) for gospa in values]), 4) for part in Gospa._fields[1:4]},
     }
     Page(title, f"{len(rows)} tracks", sections, data, ["tracks.js"]).write(path)
+
+
+def _check_columns(tracks: pd.DataFrame) -> None:
+    missing = [column for column in _NEEDED if column not in tracks.columns]
+    if missing:
+        raise InvalidInputError(f"tracks: the column {missing[0]!r} is missing")
+    for column in _NEEDED:
+        try:
+            finite = bool(np.isfinite(tracks[column].to_numpy(dtype=float)).all())
+        except (TypeError, ValueError):
+            finite = False
+        if not finite:
+            raise InvalidInputError(f"tracks: the column {column!r} must hold finite numbers")
 
 
 def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, list[Gospa]]:
@@ -232,7 +236,7 @@ def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
     for k in range(scene.num_scans):
         scan = scene.scan(k).aligned(scene.sensors)
         sensors = scene.at(scan.time).sensors
-        at = np.concatenate([places(sensors[s], scan.measurements[s], middle, 0.0)[:, :2] for s in named])
+        at = np.concatenate([positions_of(sensors[s], scan.measurements[s], middle, 0.0)[:, :2] for s in named])
         found.append({"t": round(scan.time, _DECIMALS), "at": plain_numbers(at, decimals)})
     return found
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.components.component import Component
+from assoc.packing.kernels.columns import choose_all
 from assoc.packing.kernels.rounding import margin
-from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import Outcome
 
@@ -127,7 +127,7 @@ def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _S
     assert component.best is not None
     owner = component.best.copy()
     owner[regions.row_origin[np.repeat(settled, np.diff(regions.row_start))]] = -1
-    own_all(packing.arrays.cols, chosen[settled[region]], owner)
+    choose_all(packing.arrays.cols, chosen[settled[region]], owner)
     component.offer(owner, component.weight_of(owner))
     # regions that are too hard would only become harder
     left = float(regions.weights[found.columns].sum()) - found.lower_bound

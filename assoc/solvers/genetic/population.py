@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.components.component import Component
-from assoc.packing.kernels.columns import first_row, fits
+from assoc.packing.kernels.columns import choose, first_row, fits
 from assoc.packing.kernels.sorting import ascending, order_of
-from assoc.packing.neighbourhoods.cover import Cover, own
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
 from assoc.packing.packing import PackingArrays
 
@@ -152,5 +152,5 @@ def _cross(
     for i in order:
         j = rest[i]
         if fits(cols, owner, j):
-            own(cols, j, owner)
+            choose(cols, j, owner)
     return owner

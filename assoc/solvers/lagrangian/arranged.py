@@ -56,19 +56,19 @@ def _arrange(cols: Any, slack: NDArray[np.bool_]) -> Any:
     for r in range(num_rows):
         if not slack[r]:
             must[sensor[r]] = True
-    place = np.empty(num_sensors, np.int64)
+    rank = np.empty(num_sensors, np.int64)
     count = 0
     for wanted in (True, False):
         for s in range(num_sensors):
             if must[s] == wanted:
-                place[s] = count
+                rank[s] = count
                 count += 1
     ordered = np.empty_like(cols)
     for j in range(num):
         for s in range(num_sensors):
-            ordered[j, place[s]] = cols[j, s]
+            ordered[j, rank[s]] = cols[j, s]
     for r in range(num_rows):
-        sensor[r] = place[sensor[r]]
+        sensor[r] = rank[sensor[r]]
     # counting sort, by the second row and then by the first
     by_pair, other = np.empty(num, np.int64), np.empty(num, np.int64)
     for j in range(num):

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
+from assoc.packing.kernels.columns import choose_matched
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.cover import chosen_columns, own
+from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
 
 
@@ -34,8 +35,7 @@ def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
         owner[arranged.cols[order, 0]] = order
     elif not _recover(arranged, duals, owner):
         return None
-    chosen: NDArray[np.int32] = chosen_columns(arranged.cols, owner)
-    return chosen
+    return chosen_columns(arranged.cols, owner)
 
 
 @inner_njit
@@ -56,23 +56,43 @@ def _prefix(cols: NDArray[np.int32], j: int, stop: int, of_row: NDArray[np.int64
 
 
 @inner_njit
+def _by_left_end(
+    indptr: NDArray[np.int64], left: NDArray[np.int64], right: NDArray[np.int64], price: Floats
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Right ends, columns and costs of the edges, those of each left end together; ``indptr`` counts them first."""
+    for p in range(indptr.size - 1):
+        indptr[p + 1] += indptr[p]
+    count = indptr[indptr.size - 1]
+    indices, column, costs = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
+    end = indptr[:-1].copy()
+    for j in range(left.size):
+        if left[j] >= 0:
+            e = end[left[j]]
+            end[left[j]] += 1
+            indices[e] = right[j]
+            column[e] = j
+            costs[e] = price[j]
+    return indices, column, costs
+
+
+@inner_njit
 def _keep_cheapest(
     indptr: NDArray[np.int64], indices: NDArray[np.int64], column: NDArray[np.int64], costs: Floats, num_right: int
 ) -> None:
     """Keep only the cheapest edge between two nodes: dense problems have one for each row of a sensor."""
-    place = np.full(num_right, -1, np.int64)
+    edge = np.full(num_right, -1, np.int64)
     end = first = 0
     for p in range(indptr.size - 1):
         begin, first = first, indptr[p + 1]
         indptr[p] = end
         for e in range(begin, first):
             q = indices[e]
-            if place[q] < indptr[p]:
-                place[q] = end
+            if edge[q] < indptr[p]:
+                edge[q] = end
                 indices[end], column[end], costs[end] = q, column[e], costs[e]
                 end += 1
-            elif costs[e] < costs[place[q]]:
-                column[place[q]], costs[place[q]] = column[e], costs[e]
+            elif costs[e] < costs[edge[q]]:
+                column[edge[q]], costs[edge[q]] = column[e], costs[e]
     indptr[indptr.size - 1] = end
 
 
@@ -98,7 +118,6 @@ def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> boo
     price = np.empty(num_columns)
     for level in range(1, num_sensors):
         num_right = number_rows(sensor, level, local, rows)
-        last = level == num_sensors - 1
         left_alone = np.zeros(num_partial)
         for p in range(num_partial):
             if must[p]:
@@ -126,36 +145,15 @@ def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> boo
                 right[j] = local[q]
                 price[j] = value
                 indptr[p + 1] += 1
-        for p in range(num_partial):
-            indptr[p + 1] += indptr[p]
-        count = indptr[num_partial]
-        indices, column, costs = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
-        fill = indptr[:-1].copy()
-        for j in range(num_columns):
-            if left[j] >= 0:
-                e = fill[left[j]]
-                fill[left[j]] += 1
-                indices[e] = right[j]
-                column[e] = j
-                costs[e] = price[j]
+        indices, column, costs = _by_left_end(indptr, left, right, price)
         _keep_cheapest(indptr, indices, column, costs, num_right)
         drop_needless_prices(left_alone, right_alone)
         row_edge = np.empty(num_partial, np.int64)
         u, v = np.empty(num_partial), np.empty(num_right)
         if match_sparse(indptr, indices, costs, left_alone, right_alone, row_edge, u, v) == np.inf:
             return False
-        if last:
-            taken = np.zeros(num_right, np.bool_)
-            for p in range(num_partial):
-                e = row_edge[p]
-                if e >= 0:
-                    taken[indices[e]] = True
-                j = column[e] if e >= 0 else left_column[p]
-                if j >= 0:
-                    own(cols, j, owner)
-            for i in range(num_right):
-                if not taken[i] and right_column[i] >= 0:
-                    own(cols, right_column[i], owner)
+        if level == num_sensors - 1:
+            choose_matched(cols, row_edge, (indices, column), (left_column, right_column), owner)
             return True
         partner = np.full(num_partial, -1, np.int64)
         for p in range(num_partial):

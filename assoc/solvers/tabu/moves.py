@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import now
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
+from assoc._types import Floats, Ints
 from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.kernels.copying import copy_to
@@ -119,6 +120,43 @@ class TabuSearch:
         return int(rng.choice(columns, p=likely / likely.sum()))
 
 
+@inner_njit
+def _best_insertion(
+    cols: Ints, owner: Ints, gain: Floats, until: Ints, clock: int, weights: tuple[float, float], held: int
+) -> int:
+    """The column of least gain that is not chosen, keeps the held one, and is not tabu (or a record); -1 if none is.
+
+    ``weights`` are those of the present solution and of the record, relative to the first.
+    """
+    current, record = weights
+    least, chosen = np.inf, -1
+    for j in range(gain.size):
+        if gain[j] < least and (until[j] < clock or current + gain[j] < record - 1e-9):
+            inside = owner[first_row(cols, j)] == j
+            for s in range(cols.shape[1]):
+                if held >= 0 and cols[j, s] >= 0 and owner[cols[j, s]] == held:
+                    inside = True
+            if not inside:
+                least, chosen = gain[j], j
+    return chosen
+
+
+@inner_njit
+def _owners_of(cols: Ints, owner: Ints, j: int, found: Ints) -> int:
+    """List the chosen columns that share a row with column j; returns their number."""
+    count = 0
+    for s in range(cols.shape[1]):
+        r = cols[j, s]
+        if r >= 0 and owner[r] >= 0:
+            seen = False
+            for i in range(count):
+                seen = seen or found[i] == owner[r]
+            if not seen:
+                found[count] = owner[r]
+                count += 1
+    return count
+
+
 @njit
 def _moves(
     packing: PackingArrays,
@@ -149,38 +187,16 @@ def _moves(
             break
         clock += 1
         held = forced if 3 * move < moves else -1
-        chosen = forced if move == 0 else -1
-        least = np.inf
-        for j in range(num if chosen < 0 else 0):
-            if gain[j] < least and (until[j] < clock or current + gain[j] < record - 1e-9):
-                inside = False
-                for s in range(num_sensors):
-                    if cols[j, s] >= 0:
-                        inside = owner[cols[j, s]] == j
-                        break
-                for s in range(num_sensors):
-                    if held >= 0 and cols[j, s] >= 0 and owner[cols[j, s]] == held:
-                        inside = True
-                if not inside:
-                    least = gain[j]
-                    chosen = j
+        chosen = forced
+        if move > 0 or forced < 0:
+            chosen = _best_insertion(cols, owner, gain, until, clock, (current, record), held)
         if chosen < 0:
             # everything is tabu: insert a random column
             chosen = rng.integers(0, num)
             if owner[first_row(cols, chosen)] == chosen or chosen == held:
                 continue
         current += gain[chosen]
-        count = 0
-        for s in range(num_sensors):
-            r = cols[chosen, s]
-            if r >= 0 and owner[r] >= 0:
-                seen = False
-                for i in range(count):
-                    seen = seen or ejected[i] == owner[r]
-                if not seen:
-                    ejected[count] = owner[r]
-                    count += 1
-        for i in range(count):
+        for i in range(_owners_of(cols, owner, chosen, ejected)):
             until[ejected[i]] = clock + tenure + rng.integers(0, tenure + 1)
         num_changed = insert(cols, owner, chosen, changed, 0)
         # cover rows left open by the best column that fits
