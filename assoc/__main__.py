@@ -44,8 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return import_module("assoc.check").main(rest)
     if name in PROGRAMS:
         start = import_module(f"assoc.{name}").start
-        code: int = start([*forwarded, *rest])
-        return code
+        return start([*forwarded, *rest])
     prepare_streams()
     if name == "completion":
         return run_program(lambda: _complete(rest), "assoc")

@@ -75,7 +75,7 @@ def _lines(found: Radars) -> list[str]:
     for recording, radar, turn in zip(found.recordings, found.radars, found.turns, strict=True):
         sigma = radar.covariance.diagonal() ** 0.5
         kept = (recording.decoded, recording.addresses > 0, recording.trusted_altitudes == recording.trusted_altitudes)
-        shares = [f"{100 * one.mean():.0f} % with {what}" for one, what in zip(kept, _KEPT, strict=True)]
+        shares = [f"{100 * part.mean():.0f} % with {what}" for part, what in zip(kept, _KEPT, strict=True)]
         parts = [
             f"{len(recording)} plots, {moment(recording.times[0])} to {moment(recording.times[-1])}",
             f"a turn {turn:.4g} s",
@@ -96,7 +96,7 @@ def suspicious(found: Radars) -> list[str]:
     from assoc.recordings import estimate_rotation
 
     lines = []
-    spans = [(one.times[0], one.times[-1]) for one in found.recordings]
+    spans = [(part.times[0], part.times[-1]) for part in found.recordings]
     if len(spans) > 1 and max(first for first, _ in spans) >= min(last for _, last in spans):
         lines.append("the recordings do not overlap in time: another day, or other clocks (time zones)?")
     places = np.array([radar.position for radar in found.radars])

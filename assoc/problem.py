@@ -459,8 +459,7 @@ def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: b
     if dummy and not found.all():
         row = int(np.argmin(found))
         raise InvalidInputError(f"tuples: row {row} is the all-dummy tuple: indices count from 1, 0 is the dummy")
-    alone: NDArray[np.bool_] = found == 1
-    return alone
+    return found == 1
 
 
 def _finite(costs: NDArray[np.float64]) -> bool:

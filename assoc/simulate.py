@@ -119,9 +119,9 @@ def _parser(scenario: str) -> Parser:
     if plots:
         parser.declare(_TRUTH)
     parser.declare(COMMON["seed"], *verbosity("all parameters, the defaults included"))
-    own = parameter_options(simulation.parameters(scenario))
-    parser.declare(*(option for option in own if option.positional))
-    parser.declare(*(option for option in own if not option.positional), group="scenario")
+    options = parameter_options(simulation.parameters(scenario))
+    parser.declare(*(option for option in options if option.positional))
+    parser.declare(*(option for option in options if not option.positional), group="scenario")
     return parser
 
 

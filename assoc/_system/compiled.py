@@ -149,8 +149,7 @@ class _Loads(event.Listener):
 
 def with_foreign_kernels() -> AbstractContextManager[None]:
     """Let `loaded` notice within the block what others' kernels load, such as those of a user's solver."""
-    found: AbstractContextManager[None] = _EVENT.install_listener("numba:compiler_lock", _Loads())
-    return found
+    return _EVENT.install_listener("numba:compiler_lock", _Loads())
 
 
 def _silent(function: Callable[..., Any]) -> Callable[..., Any]:

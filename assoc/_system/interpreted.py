@@ -76,7 +76,7 @@ def first_small(
     """
     function = stand_in or kernel.py_func
     spent = 0.0
-    looked = -_LOOK
+    checked = -_LOOK
 
     def interpreted(*arguments: Any) -> Any:
         nonlocal spent
@@ -91,12 +91,12 @@ def first_small(
             spent += time.thread_time() - started
 
     def choose(*arguments: Any) -> Any:
-        nonlocal looked
+        nonlocal checked
         if thread.interpreting:
             return function
         if thread.never or spent > PATIENCE or _elements(arguments) > small:
             return compiled(*arguments)
-        if time.monotonic() - looked < _LOOK:
+        if time.monotonic() - checked < _LOOK:
             return interpreted
         thread.may_interpret = True
         try:
@@ -104,7 +104,7 @@ def first_small(
         finally:
             thread.may_interpret = False
         if found is None:
-            looked = time.monotonic()
+            checked = time.monotonic()
             kinds = tuple(map(kernel.typeof_pyval, arguments))
             beside.ask(kernel.py_func.__module__, kernel.py_func.__qualname__, kinds)
             return interpreted

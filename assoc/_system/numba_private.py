@@ -150,8 +150,8 @@ class _KernelCache(_CACHING.FunctionCache):  # type: ignore[misc]
 
 
 class _Implementation(_CACHING.CompileResultCacheImpl):  # type: ignore[misc]
-    def __init__(self, place: _Place, function: Any) -> None:
-        self._locator_classes = [place]
+    def __init__(self, locator: _Place, function: Any) -> None:
+        self._locator_classes = [locator]
         super().__init__(function)
 
 

@@ -47,7 +47,7 @@ class Tile(NamedTuple):
     scan: Scan
     rows: tuple[Array, ...]
     """Numbers of its measurements in the whole scan, from 0."""
-    own: tuple[Array, ...]
+    belongs: tuple[Array, ...]
     """Which of them are its own."""
 
 
@@ -77,16 +77,16 @@ class SolveTile:
         problem = build_problem(self._scene, tile.scan, **self._plan.gating)
         found = problem.tuples
         whole = np.zeros_like(found)
-        own = np.ones(found.shape, dtype=bool)
-        for s, (rows, mine) in enumerate(zip(tile.rows, tile.own, strict=True)):
+        belongs = np.ones(found.shape, dtype=bool)
+        for s, (rows, mine) in enumerate(zip(tile.rows, tile.belongs, strict=True)):
             there = found[:, s] > 0
             whole[there, s] = rows[found[there, s] - 1] + 1
-            own[there, s] = mine[found[there, s] - 1]
+            belongs[there, s] = mine[found[there, s] - 1]
         complete = np.zeros(len(found), dtype=bool)
         for component in problem.components():
-            complete[component] = own[component].all()
+            complete[component] = belongs[component].all()
         # each tuple that is left comes from the tile of its first measurement
-        first = own[np.arange(len(found)), (found > 0).argmax(axis=1)]
+        first = belongs[np.arange(len(found)), (found > 0).argmax(axis=1)]
         left = ~complete & first
         certain = AssignmentProblem(found[complete], problem.costs[complete], problem.sizes)
         answer = _solved(self._plan, certain)
@@ -161,39 +161,39 @@ def solve_in_tiles(
 
 def tiles_of(scene: Scene, scan: Scan, count: int, probability: float) -> Iterator[Tile]:
     """Tiles with about equally many measurements of their own; none is in two, and none is left out."""
-    places, reach = [], []
+    of_sensors, reach = [], []
     limit = _MARGIN * math.sqrt(chi_square_quantiles(float(probability), _FREEDOM)[_FREEDOM])
     for s in range(len(scene.sensors)):
         positions, covariances = positions_of_scan(scene, scan, s)
-        places.append(positions[:, :2])
+        of_sensors.append(positions[:, :2])
         reach.append(limit * np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, -1]))
-    owner = np.repeat(np.arange(len(places)), scan.sizes)
-    place, far = np.concatenate(places), np.concatenate(reach)
+    owner = np.repeat(np.arange(len(of_sensors)), scan.sizes)
+    points, far = np.concatenate(of_sensors), np.concatenate(reach)
     number = np.concatenate([np.arange(size) for size in scan.sizes.tolist()])
-    for rows in _parts(place, np.arange(len(place)), count):
-        low, high = place[rows].min(axis=0), place[rows].max(axis=0)
-        off = np.maximum(np.maximum(low - place, place - high), 0.0)
+    for rows in _parts(points, np.arange(len(points)), count):
+        low, high = points[rows].min(axis=0), points[rows].max(axis=0)
+        off = np.maximum(np.maximum(low - points, points - high), 0.0)
         near = np.hypot(*off.T) <= far + far[rows].max()
-        mine = np.zeros(len(place), dtype=bool)
+        mine = np.zeros(len(points), dtype=bool)
         mine[rows] = True
-        chosen = [np.flatnonzero(near & (owner == s)) for s in range(len(places))]
-        numbers = tuple(number[one] for one in chosen)
-        parts = tuple(z[one] for z, one in zip(scan.measurements, numbers, strict=True))
+        chosen = [np.flatnonzero(near & (owner == s)) for s in range(len(of_sensors))]
+        numbers = tuple(number[which] for which in chosen)
+        parts = tuple(z[which] for z, which in zip(scan.measurements, numbers, strict=True))
         crowd = None if scan.clutter is None else tuple(
-            one[of] for one, of in zip(scan.clutter, numbers, strict=True)
+            density[of] for density, of in zip(scan.clutter, numbers, strict=True)
         )  # fmt: skip
         part = Scan(scan.index, scan.time, parts, sectors=scan.sectors, clutter=crowd)
-        yield Tile(part, numbers, tuple(mine[one] for one in chosen))
+        yield Tile(part, numbers, tuple(mine[which] for which in chosen))
 
 
-def _parts(place: Array, rows: Array, count: int) -> Iterator[Array]:
+def _parts(points: Array, rows: Array, count: int) -> Iterator[Array]:
     """Rows in `count` parts of about one size, halved along their longer side."""
     if count <= 1 or len(rows) < 2:
         if len(rows):
             yield rows
         return
-    axis = int(np.argmax(np.ptp(place[rows], axis=0)))
-    order = rows[np.argsort(place[rows, axis], kind="stable")]
+    axis = int(np.argmax(np.ptp(points[rows], axis=0)))
+    order = rows[np.argsort(points[rows, axis], kind="stable")]
     cut = len(order) * (count // 2) // count
-    yield from _parts(place, order[:cut], count // 2)
-    yield from _parts(place, order[cut:], count - count // 2)
+    yield from _parts(points, order[:cut], count // 2)
+    yield from _parts(points, order[cut:], count - count // 2)

@@ -47,8 +47,8 @@ def followed_targets(times: Array, ids: Array, positions: Array, scene: Scene) -
     pairs: dict[int, Counter[int]] = {}
     tracks = Trajectories(times, ids, positions)
     _, values = gospa_over_time(Trajectories.from_scene(scene), tracks, FOLLOWED_WITHIN)
-    for one in values:
-        for target, track in one.pairs.tolist():
+    for gospa in values:
+        for target, track in gospa.pairs.tolist():
             pairs.setdefault(int(track), Counter())[int(target)] += 1
     return {track: scene.truth.name_of(found.most_common(1)[0][0]) for track, found in pairs.items()}
 

@@ -71,8 +71,7 @@ class Update(Generic[S]):
         v, S = B * d, B * d + B * d * d
         parts["innovation"], parts["covariance"] = rest[:v].reshape(B, d), rest[v:S].reshape(B, d, d)
         parts["nis"], parts["log_likelihood"] = rest[S : S + B], rest[S + B :]
-        array: Array = parts[name]
-        return array
+        return parts[name]
 
     def __repr__(self) -> str:
         return f"Update({self.state!r})"
@@ -164,8 +163,7 @@ class Filter(ABC, Generic[S]):
             parts.append(self.predict(rows, float(step)) if step > 0 else rows)
         back = np.empty(len(order), dtype=np.int64)
         back[order] = np.arange(len(order))
-        joined: S = concatenate(parts)[back]
-        return joined
+        return concatenate(parts)[back]
 
     @abstractmethod
     def update(self, state: S, measured: Array, sensor: Measurement) -> Update[S]:

@@ -38,8 +38,7 @@ def nees(state: State, truth: Array) -> Array:
         raise InvalidInputError(
             f"state: covariance of target {int(np.argmax(flat))} is singular, as of an ensemble with few members"
         )
-    result: Array = np.einsum("bi,bi->b", error, np.linalg.solve(unit, error[..., None])[..., 0])
-    return result
+    return np.einsum("bi,bi->b", error, np.linalg.solve(unit, error[..., None])[..., 0])
 
 
 @door

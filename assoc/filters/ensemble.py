@@ -38,15 +38,13 @@ class Ensemble(Batch):
     @cached_property
     def mean(self) -> Array:
         """Sample means, (B, n)."""
-        mean: Array = self.members.mean(axis=1)
-        return mean
+        return self.members.mean(axis=1)
 
     @cached_property
     def covariance(self) -> Array:
         """Sample covariances, (B, n, n)."""
         deviation = self.members - self.mean[:, None]
-        covariance: Array = deviation.transpose(0, 2, 1) @ deviation / (self.members.shape[1] - 1)
-        return covariance
+        return deviation.transpose(0, 2, 1) @ deviation / (self.members.shape[1] - 1)
 
 
 def _ensemble(members: Array) -> Ensemble:

@@ -37,8 +37,7 @@ class Mixture(Batch):
     @cached_property
     def mean(self) -> Array:
         """Means of the mixtures, (B, n)."""
-        mean: Array = np.einsum("bm,bmi->bi", self.weights, self.means)
-        return mean
+        return np.einsum("bm,bmi->bi", self.weights, self.means)
 
     @cached_property
     def covariance(self) -> Array:
@@ -289,8 +288,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         each = [model.log_likelihood(state.component(j), measurements, sensor) for j, model in enumerate(self.filters)]
         with np.errstate(divide="ignore"):
             joint = np.stack(each, axis=1) + np.log(state.weights)[:, :, None]
-        result: Array = np.logaddexp.reduce(joint, axis=1)
-        return result
+        return np.logaddexp.reduce(joint, axis=1)
 
     def compare(self, state: Mixture, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:
         """`log_likelihood` and `distances`, these from the mixture as one Gaussian; (B, M) each."""

@@ -35,8 +35,7 @@ class LinearMeasurement:
 
     def measure(self, states: Array) -> Array:
         """Noise-free measurements (m, d) of states (m, n)."""
-        result: Array = states @ self.matrix.T
-        return result
+        return states @ self.matrix.T
 
 
 class FunctionMeasurement:

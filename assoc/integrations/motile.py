@@ -47,10 +47,10 @@ def problem_of(solver: Any) -> AssignmentProblem:
     _check_degrees(solver, edges)
     ends_of = np.array([(nodes[u], nodes[v]) for u, v in edges], dtype=np.int64).reshape(-1, 2)
     cost = sum(_costs(solver, kind, edges) for kind in _EDGES) + selected[ends_of[:, 0]]
-    own, none = np.arange(len(nodes)) + 1, np.zeros(len(nodes), dtype=np.int64)
-    tuples = [ends_of + 1, np.column_stack([own, own]), np.column_stack([own, none]), np.column_stack([none, own])]
+    node, none = np.arange(len(nodes)) + 1, np.zeros(len(nodes), dtype=np.int64)
+    alone = [np.column_stack(pair) for pair in ((node, node), (node, none), (none, node))]
     costs = [cost, np.zeros(len(nodes)), selected + ends, appears]
-    return AssignmentProblem(np.concatenate(tuples), np.concatenate(costs), (len(nodes), len(nodes)))
+    return AssignmentProblem(np.concatenate([ends_of + 1, *alone]), np.concatenate(costs), (len(nodes), len(nodes)))
 
 
 def solve(solver: Any, method: str = "exact", **options: Any) -> Any:
@@ -106,15 +106,15 @@ def values_of(solver: Any, solution: Solution) -> NDArray[np.float64]:
 def _costs(solver: Any, kind: str, keys: Any) -> Array:
     """Costs of a kind's variables by key; 0 where a problem has no such variables."""
     found = np.zeros(len(keys))
-    for own, indices in solver.variables.items():
-        if own.__name__ == kind:
+    for variable, indices in solver.variables.items():
+        if variable.__name__ == kind:
             found[:] = np.asarray(solver.costs, dtype=np.float64)[[int(indices[key]) for key in keys]]
     return found
 
 
 def _check_degrees(solver: Any, edges: Any) -> None:
     """Each node must have at most one parent and one child by a constraint, or by the graph."""
-    index = next(dict(one.items()) for kind, one in solver.variables.items() if kind.__name__ == "EdgeSelected")
+    index = next(dict(indices.items()) for kind, indices in solver.variables.items() if kind.__name__ == "EdgeSelected")
     limited = {frozenset(row) for row, relation, value in _rows(solver) if relation == "LessEqual" and value == 1.0}
     for end, words in ((0, "MaxChildren(1)"), (1, "MaxParents(1)")):
         groups: dict[Any, set[int]] = {}
@@ -127,8 +127,8 @@ def _check_degrees(solver: Any, edges: Any) -> None:
 
 def _rows(solver: Any) -> Any:
     """Constraints as coefficients by variable, relation and right side."""
-    for one in solver.constraints:
-        yield one.get_coefficients(), one.get_relation().name, one.get_value()
+    for bound in solver.constraints:
+        yield bound.get_coefficients(), bound.get_relation().name, bound.get_value()
 
 
 def _check_constraints(solver: Any, values: Array) -> None:

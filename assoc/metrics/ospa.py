@@ -100,8 +100,7 @@ def distances(x: Array, y: Array) -> Array:
     memory.require(
         40.0 * len(x) * len(y), f"all distances of {len(x)} and {len(y)} points", "compare fewer points at a time"
     )
-    between: Array = cdist(x, y)
-    return between
+    return cdist(x, y)
 
 
 def point_sets(truth: Array, estimates: Array) -> tuple[Array, Array]:

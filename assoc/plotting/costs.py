@@ -15,7 +15,7 @@ from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import BLACK, BLUE, GREY, VERMILION
-from assoc.plotting.places import scan_of
+from assoc.plotting.measured import scan_of
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
@@ -129,22 +129,22 @@ def plot_gates(
     return ax
 
 
-def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
+def _squares(scene: Scene, found: ScanAssociation) -> tuple[Array, Array]:
     """Normalised squared residuals of the targets, and their degrees of freedom (targets with 0 left out)."""
-    scan = scan_of(scene, one)
+    scan = scan_of(scene, found)
     if scan.times is not None:
         raise InvalidInputError(
             f"scene: scan {scan.index} has measurements with times of their own, whose gates are of predicted motion"
         )
-    total, freedom = np.zeros(len(one.targets)), np.zeros(len(one.targets))
-    heights = np.zeros(len(one.targets), dtype=np.bool_)
+    total, freedom = np.zeros(len(found.targets)), np.zeros(len(found.targets))
+    heights = np.zeros(len(found.targets), dtype=np.bool_)
     for s, sensor in enumerate(scene.sensors):
-        rows = np.flatnonzero(one.targets[:, s])
-        if not rows.size or one.positions is None:
+        rows = np.flatnonzero(found.targets[:, s])
+        if not rows.size or found.positions is None:
             continue
         sensor = sensor.position_part
-        measured = scan.measurements[s][one.targets[rows, s] - 1][:, : sensor.dim]
-        nu = sensor.residual(measured, sensor.measure(one.positions[rows]))
+        measured = scan.measurements[s][found.targets[rows, s] - 1][:, : sensor.dim]
+        nu = sensor.residual(measured, sensor.measure(found.positions[rows]))
         total[rows] += np.einsum("ni,ij,nj->n", nu, np.linalg.inv(sensor.covariance), nu)
         freedom[rows] += sensor.dim
         heights[rows] |= sensor.dim == 3

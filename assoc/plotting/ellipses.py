@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from assoc._types import Array
-from assoc.plotting.places import places
+from assoc.plotting.measured import positions_of
 from assoc.sensors import Sensor
 
 _CORNERS = 49
@@ -28,7 +28,7 @@ def ellipses(centres: Array, covariances: Array, probability: float) -> tuple[Ar
     return gaps[:, 0].ravel(), gaps[:, 1].ravel()
 
 
-def place_covariances(sensor: Sensor, measurements: Array, heights: Array | float) -> Array:
+def position_covariances(sensor: Sensor, measurements: Array, heights: Array | float) -> Array:
     """Covariances (n, 2, 2) of x and y of measured positions, to first order, m^2."""
     z = np.asarray(measurements, dtype=np.float64)
     sigma = np.sqrt(np.diagonal(sensor.covariance))
@@ -36,6 +36,6 @@ def place_covariances(sensor: Sensor, measurements: Array, heights: Array | floa
     for c in range(sensor.dim):
         step = np.zeros(sensor.dim)
         step[c] = 1e-3 * sigma[c]
-        ahead, behind = (places(sensor, z + sign * step, heights, 1.0)[:, :2] for sign in (1.0, -1.0))
+        ahead, behind = (positions_of(sensor, z + sign * step, heights, 1.0)[:, :2] for sign in (1.0, -1.0))
         slopes[:, :, c] = (ahead - behind) / (2.0 * step[c])
     return slopes @ sensor.covariance @ np.swapaxes(slopes, 1, 2)

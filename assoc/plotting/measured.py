@@ -23,7 +23,7 @@ def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
     return scan
 
 
-def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:
+def positions_of(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:
     """Positions (n, 3), metres, of measurements (n, d), given the coordinates that a sensor does not measure.
 
     These are heights above the plane z = 0 and, for a bearing alone, ground distances; each a number or (n,), metres.

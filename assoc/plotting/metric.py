@@ -43,8 +43,8 @@ def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None
     dated = at.size > 0 and bool(at.min() > UNIX)
     axis = (1e3 * at).round().astype("datetime64[ms]") if dated else at
     named = values.items() if isinstance(values, Mapping) else [("", values)]
-    for number, (label, one) in enumerate(named):
-        series = np.asarray(one, dtype=np.float64)
+    for number, (label, measured) in enumerate(named):
+        series = np.asarray(measured, dtype=np.float64)
         if series.shape != at.shape or at.ndim != 1:
             raise InvalidInputError(f"values: expected the shape of times, {at.shape}, got {series.shape}")
         ax.plot(

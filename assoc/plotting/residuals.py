@@ -54,8 +54,8 @@ def plot_residuals(registration: Registration, component: str = "range", *, ax: 
     ax = axes_or_new(ax, (7.0, 3.5))
     scale, unit = (float(np.degrees(1.0)), "deg") if component in ANGLES else (1.0, "m")
     for number, (s, i) in enumerate(columns):
-        own = registration.residuals[s]
-        for offset, values, colour in ((-0.18, own.before, ORANGE), (0.18, own.after, BLUE)):
+        residuals = registration.residuals[s]
+        for offset, values, colour in ((-0.18, residuals.before, ORANGE), (0.18, residuals.after, BLUE)):
             if len(values):
                 box = ax.boxplot(
                     scale * values[:, i], positions=[number + offset], widths=0.3, whis=(2.5, 97.5), showfliers=False,

@@ -12,8 +12,8 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
-from assoc.plotting.ellipses import ellipses, place_covariances
-from assoc.plotting.places import distances_to_border, places
+from assoc.plotting.ellipses import ellipses, position_covariances
+from assoc.plotting.measured import distances_to_border, positions_of
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
@@ -90,7 +90,7 @@ def _bears(sensor: Sensor) -> bool:
 def _ends(scene: Scene, sensor: Sensor, z: Array, height: float) -> Array:
     """Positions of measurements; for bearings, the points where their rays leave the region."""
     distance = distances_to_border(sensor, z[:, 0], scene.region) if _bears(sensor) else 0.0
-    return places(sensor, z, height, distance)
+    return positions_of(sensor, z, height, distance)
 
 
 def _rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
@@ -119,7 +119,7 @@ def _draw_gates(
             for side in (-half, half):
                 _rays(ax, factor * sensor.position, factor * _ends(scene, sensor, z + side, height), **style)
             continue
-        x, y = ellipses(places(sensor, z, height, 0.0), place_covariances(sensor, z, height), probability)
+        x, y = ellipses(positions_of(sensor, z, height, 0.0), position_covariances(sensor, z, height), probability)
         ax.plot(factor * x, factor * y, **style)
 
 

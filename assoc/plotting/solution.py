@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
 from assoc.plotting.ellipses import ellipses
-from assoc.plotting.places import distances_to_border, places, scan_of
+from assoc.plotting.measured import distances_to_border, positions_of, scan_of
 from assoc.plotting.scene import draw_sensors, draw_truth
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
@@ -55,7 +55,7 @@ def plot_solution(
     scan = scan_of(scene, association)
     ax = axes_or_new(ax)
     found = association.positions
-    drawn = measured_places(scene, association)
+    drawn = measured_positions(scene, association)
     standing = scene.at(scan.time).sensors
     sites = stacked(sensor.position for sensor in standing)
     truth = stacked([] if scan.truth_positions is None else [scan.truth_positions])
@@ -106,7 +106,7 @@ def _bearings(ax: Any, site: Array, ends: Array, label: Array) -> None:
         ax.plot(*lines.reshape(-1, 2).T, linewidth=0.6, zorder=1, **style)
 
 
-def measured_places(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:
+def measured_positions(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:
     """Where to draw the measurements of each sensor in an associated scan, (n, 3), metres, and their targets (n,).
 
     Coordinates that a sensor does not measure (height, distance along a bearing) are those of the associated target, a
@@ -125,5 +125,5 @@ def measured_places(scene: Scene, association: ScanAssociation) -> list[tuple[Ar
             owner = found[label[kept]]
             height[kept] = owner[:, 2]
             distance[kept] = np.hypot(*(owner[:, :2] - sensor.position[:2]).T)
-        result.append((places(sensor, z, height, distance), label))
+        result.append((positions_of(sensor, z, height, distance), label))
     return result

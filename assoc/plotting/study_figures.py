@@ -121,8 +121,8 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[str], figur
         spread = np.maximum(0.0, np.stack([middle - low, high - middle]))
         for ax, name in zip(row, names, strict=True):
             column = summary[name]
-            places = column if column.dtype.kind in "iuf" else column.astype(str)
-            ax.errorbar(places, middle, yerr=spread, fmt="o", markersize=4, linewidth=1, capsize=2)
+            across = column if column.dtype.kind in "iuf" else column.astype(str)
+            ax.errorbar(across, middle, yerr=spread, fmt="o", markersize=4, linewidth=1, capsize=2)
             ax.grid(alpha=0.3)
         row[0].set_ylabel(LABELS[measure])
     for ax, name in zip(axes[-1], names, strict=True):

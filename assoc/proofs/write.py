@@ -73,7 +73,7 @@ def write_proof(
     limit = checked_time_limit(time_limit)
     check_writable(path)
     exact = exact_problem(problem)
-    chosen = [tuple(one) for one in solution.tuples.tolist()]
+    chosen = [tuple(row) for row in solution.tuples.tolist()]
     try:
         cost = check.cost_of(exact, chosen)
     except check.RefusedError as error:

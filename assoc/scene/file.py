@@ -113,13 +113,13 @@ def _platform_arrays(sensors: Sequence[Sensor]) -> dict[str, Array | str | int]:
     if not found:
         return {}
     number = [-1 if sensor.platform is None else found.index(sensor.platform) for sensor in sensors]
-    headings = [np.zeros(len(one.times)) if one.headings is None else one.headings for one in found]
+    headings = [np.zeros(len(platform.times)) if platform.headings is None else platform.headings for platform in found]
     return {
         "sensor_platform": np.array(number, dtype=np.int64),
-        "platform_turns": np.array([one.headings is not None for one in found]),
-        "platform_offsets": np.cumsum([0, *(len(one.times) for one in found)], dtype=np.int64),
-        "platform_times": np.concatenate([one.times for one in found]),
-        "platform_positions": np.concatenate([one.positions for one in found]),
+        "platform_turns": np.array([platform.headings is not None for platform in found]),
+        "platform_offsets": np.cumsum([0, *(len(platform.times) for platform in found)], dtype=np.int64),
+        "platform_times": np.concatenate([platform.times for platform in found]),
+        "platform_positions": np.concatenate([platform.positions for platform in found]),
         "platform_headings": np.concatenate(headings),
     }
 

@@ -51,8 +51,7 @@ def east_north_up(latitude: Array, longitude: Array, height: Array, origin: Orig
     Latitudes and longitudes (n,) are geodetic, radians; heights metres above the ellipsoid.
     """
     away = earth_centered(latitude, longitude, height) - _place(origin)
-    result: Array = away @ _axes(origin).T
-    return result
+    return away @ _axes(origin).T
 
 
 def geodetic(positions: Array, origin: Origin) -> Array:

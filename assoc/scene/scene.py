@@ -194,9 +194,9 @@ class Scene:
         for s, sensor in enumerate(self.sensors):
             if sensor.platform is None:
                 continue
-            own = () if self.measurement_times is None else [scan[s] for scan in self.measurement_times]
+            stamps = () if self.measurement_times is None else [scan[s] for scan in self.measurement_times]
             try:
-                sensor.platform.poses(np.concatenate([self.times, *own]))
+                sensor.platform.poses(np.concatenate([self.times, *stamps]))
             except InvalidInputError as error:
                 raise InvalidInputError(f"{what}: {sensor.label(s)}: {error}") from None
 

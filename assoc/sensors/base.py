@@ -24,8 +24,7 @@ LARGEST_ANGLE_NOISE = 0.3
 
 def wrap_angle(angle: Array) -> Array:
     """Angles brought into (-pi, pi]."""
-    wrapped: Array = math.pi - np.mod(math.pi - angle, 2 * math.pi)
-    return wrapped
+    return math.pi - np.mod(math.pi - angle, 2 * math.pi)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -220,8 +219,8 @@ class Sensor(ABC):
         """
         if self.platform is None:
             return self
-        (place,) = self.platform.places(np.array([time]), self.position)
-        return self._standing(place, float(self.platform.poses(np.array([time]))[1][0]))
+        (position,) = self.platform.places(np.array([time]), self.position)
+        return self._standing(position, float(self.platform.poses(np.array([time]))[1][0]))
 
     def _standing(self, position: Array, heading: float) -> Sensor:
         """The sensor at a position (3,) of the frame, turned by a heading, radians."""

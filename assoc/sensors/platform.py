@@ -87,8 +87,7 @@ class Platform:
         if len(self.times) == 1:
             return np.zeros((len(times), 3))
         steps = np.diff(self.positions, axis=0) / np.diff(self.times)[:, None]
-        found: Array = steps[np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(steps) - 1)]
-        return found
+        return steps[np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(steps) - 1)]
 
     def places(self, times: Array, mounted: Array) -> Array:
         """Positions (n, 3) at times (n,) of what is mounted forward, left and up (3,) of the carrier's, metres."""

@@ -55,5 +55,5 @@ class PositionSensor(Sensor):
         """Positions (n, d) in the scene's frame; see `Sensor.aligned`."""
         if self.platform is None or not len(measurements):
             return measurements
-        place, headings = self.platform.places(times, self.position)[:, : self.dim], self.platform.poses(times)[1]
-        return turned(measurements - place, -headings) if back else turned(measurements, headings) + place
+        position, headings = self.platform.places(times, self.position)[:, : self.dim], self.platform.poses(times)[1]
+        return turned(measurements - position, -headings) if back else turned(measurements, headings) + position

@@ -83,8 +83,8 @@ class Radar3D(Sensor):
             return result
         azimuth, elevation = (measurements if back else result)[:, 1:3].T
         away = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=1) * np.cos(elevation)[:, None]
-        own = (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
-        result[:, 3] += -own if back else own
+        rate = (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
+        result[:, 3] += -rate if back else rate
         return result
 
     def _velocities(self, velocities: Array | None) -> Array:

@@ -103,5 +103,4 @@ def _on_curve(start: Array, end: Array, v: Array, w: Array, gap: Array, share: A
     length = np.linalg.norm(chord, axis=1)
     bent = np.maximum(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)) > length
     bulge[bent] = 0.0
-    found: Array = straight + bulge
-    return found
+    return straight + bulge

@@ -36,7 +36,7 @@ def test_components_cross_the_borders_of_tiles(crowd):
     owned = np.zeros((len(scan.sizes), max(scan.sizes)), dtype=int)
     of = np.full_like(owned, -1)
     for number, tile in enumerate(tiles):
-        for s, (rows, own) in enumerate(zip(tile.rows, tile.own, strict=True)):
+        for s, (rows, own) in enumerate(zip(tile.rows, tile.belongs, strict=True)):
             owned[s, rows[own]] += 1
             of[s, rows[own]] = number
     assert all((owned[s, :size] == 1).all() for s, size in enumerate(scan.sizes))

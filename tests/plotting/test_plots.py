@@ -11,9 +11,9 @@ from scipy import stats
 
 import assoc
 from assoc import plotting
-from assoc.plotting.ellipses import ellipses, place_covariances
+from assoc.plotting.ellipses import ellipses, position_covariances
 from assoc.plotting.heat_map import cells
-from assoc.plotting.places import distances_to_border, places
+from assoc.plotting.measured import distances_to_border, positions_of
 from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
@@ -64,14 +64,14 @@ def test_a_place_measures_like_its_measurement():
     where = np.random.default_rng(0).uniform([-5e3, -5e3, 100], [5e3, 5e3, 4e3], (50, 3))
     for sensor in sensors():
         ground = np.hypot(*(where[:, :2] - sensor.position[:2]).T)
-        assert places(sensor, sensor.measure(where), where[:, 2], ground) == pytest.approx(where)
+        assert positions_of(sensor, sensor.measure(where), where[:, 2], ground) == pytest.approx(where)
 
 
 def test_rays_end_on_the_border():
     region = np.array([[-1e3, 2e3], [-500.0, 700.0], [0.0, 10.0]])
     sensor = BearingSensor(position=(100, -50, 0), noise=1e-3)
     bearings = np.linspace(-np.pi, np.pi, 41)
-    ends = places(sensor, bearings[:, None], 0.0, distances_to_border(sensor, bearings, region))
+    ends = positions_of(sensor, bearings[:, None], 0.0, distances_to_border(sensor, bearings, region))
     off = np.abs(ends[:, :2, None] - region[None, :2]).min(axis=(1, 2))
     inside = ((ends[:, :2] >= region[:2, 0] - 1e-6) & (ends[:, :2] <= region[:2, 1] + 1e-6)).all()
     assert inside and off.max() < 1e-6
@@ -93,7 +93,7 @@ def test_covariances_of_places_are_those_of_the_jacobian():
     for sensor in (one for one in sensors() if one.dim == 3):
         inverse = np.linalg.inv(sensor.jacobian(where))
         expected = (inverse @ sensor.covariance @ np.swapaxes(inverse, 1, 2))[:, :2, :2]
-        found = place_covariances(sensor, sensor.measure(where), where[:, 2])
+        found = position_covariances(sensor, sensor.measure(where), where[:, 2])
         assert found == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 

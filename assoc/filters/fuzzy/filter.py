@@ -277,18 +277,15 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     def _level(self, alarm: Alarm, recent: Array, turns: Array, present: Gaussian) -> Array:
         """Return what an alarm watches, (B,)."""
         if alarm.watches == "turn rate":
-            rate: Array = present.mean[:, -1] ** 2 / present.covariance[:, -1, -1]
-            return rate
+            return present.mean[:, -1] ** 2 / present.covariance[:, -1, -1]
         late = recent[:, -alarm.window :]
         known = np.maximum((late != 0).any(axis=2).sum(axis=1), 1)
         if alarm.watches == "turn":
-            turn: Array = turns[:, -alarm.window :].sum(axis=1) ** 2 / known
-            return turn
+            return turns[:, -alarm.window :].sum(axis=1) ** 2 / known
         drift = late.sum(axis=1)
         if self.components is not None:
             drift = drift[:, self.components]
-        level: Array = (drift**2).mean(axis=1) / known
-        return level
+        return (drift**2).mean(axis=1) / known
 
     def _scale(self, rules: FuzzyRules | None, level: Array) -> Array:
         if rules is None:
@@ -304,8 +301,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
 def _scaled(q: Array, Q: Array) -> Array:
     """Process noise with each component's variance multiplied by its q (B, n)."""
     root = np.sqrt(q)
-    scaled: Array = root[:, :, None] * Q * root[:, None, :]
-    return scaled
+    return root[:, :, None] * Q * root[:, None, :]
 
 
 def _calmed(mean: Array, P: Array, variance: Array) -> tuple[Array, Array]:
@@ -323,8 +319,7 @@ def _turn(before: Adaptive, after: Gaussian) -> Array:
     gained = before.covariance[:, -1, -1] - after.covariance[:, -1, -1]
     corrected = gained > 1e-12 * before.covariance[:, -1, -1]
     change = after.mean[:, -1] - before.mean[:, -1]
-    turn: Array = np.where(corrected, change / np.sqrt(np.where(corrected, gained, 1.0)), 0.0)
-    return turn
+    return np.where(corrected, change / np.sqrt(np.where(corrected, gained, 1.0)), 0.0)
 
 
 class _NoiseFree(Motion):

@@ -121,8 +121,7 @@ class LinearMotion(Motion):
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""
-        moved: Array = states @ self.matrices(dt)[0][0].T
-        return moved
+        return states @ self.matrices(dt)[0][0].T
 
     def jacobian(self, states: Array, dt: float) -> Array:
         """Return the transition matrix, (1, n, n)."""

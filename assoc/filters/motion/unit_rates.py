@@ -48,13 +48,13 @@ class UnitRates(ForwardDifference):
     def slopes(self, states: Array) -> Array:
         """Derivatives of `rates` at states (m, 6): (m, 6, 6)."""
         x, y, z, r, s = _parts(states)
-        zero, one = np.zeros_like(x), np.ones_like(x)
+        zero, unit = np.zeros_like(x), np.ones_like(x)
         # derivatives of 1/r and 1/s by x, y, z
         dr = [-p / r**3 for p in (x, y, z)]
         ds = [-x / s**3, -y / s**3, zero]
         J = np.zeros((len(states), 6, 6))
         for i in range(3):
-            dx, dy, dz = (one if i == k else zero for k in range(3))
+            dx, dy, dz = (unit if i == k else zero for k in range(3))
             by_s = ds[i] * z + dz / s  # of z / s
             by_rs = dr[i] * z / s + by_s / r  # of z / (r s)
             both = (dx * x + dy * y) / s  # of s

@@ -48,8 +48,8 @@ class Frame:
     def measurements(self, parts: Sequence[Sequence[Any]]) -> tuple[Array, ...]:
         """Measurements of a scan as in a scene, one array (n, d) for each sensor."""
         return tuple(
-            np.array([one.measurement(d.state_vector) for d in part]).reshape(len(part), one.sensor.dim)
-            for one, part in zip(self.adapted, parts, strict=True)
+            np.array([item.measurement(d.state_vector) for d in part]).reshape(len(part), item.sensor.dim)
+            for item, part in zip(self.adapted, parts, strict=True)
         )
 
 
@@ -61,12 +61,12 @@ def make_frame(adapted: Sequence[AdaptedSensor]) -> Frame:
     """
     if not adapted:
         raise InvalidInputError("sensors: expected at least one")
-    for s, one in enumerate(adapted):
-        if not isinstance(one, AdaptedSensor):
-            raise InvalidInputError(f"sensors: number {s} is a {type(one).__name__}, expected adapt(sensor, ...)")
+    for s, item in enumerate(adapted):
+        if not isinstance(item, AdaptedSensor):
+            raise InvalidInputError(f"sensors: number {s} is a {type(item).__name__}, expected adapt(sensor, ...)")
         for other in adapted[:s]:
-            alike = model_key(one.model) == model_key(other.model)
-            if alike and (not one.sensor.name or one.sensor.name == other.sensor.name):
+            alike = model_key(item.model) == model_key(other.model)
+            if alike and (not item.sensor.name or item.sensor.name == other.sensor.name):
                 raise InvalidInputError(
                     f"sensors: number {s} has the same measurement model as another; give each a name of its own "
                     'and set it as metadata["sensor"] of the detections'

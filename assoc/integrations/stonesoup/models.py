@@ -41,8 +41,8 @@ class CartesianToSlantRangeBearing(NonLinearGaussianMeasurement):  # type: ignor
         """Bearing and range of a state, with the model's noise if asked for."""
         if isinstance(noise, bool) or noise is None:
             noise = self.rvs(num_samples=state.state_vector.shape[1], **kwargs) if noise else 0
-        places = np.asarray(state.state_vector[list(self.mapping), :], dtype=np.float64)
-        d = self.rotation_matrix @ (places - np.asarray(self.translation_offset, dtype=np.float64))
+        points = np.asarray(state.state_vector[list(self.mapping), :], dtype=np.float64)
+        d = self.rotation_matrix @ (points - np.asarray(self.translation_offset, dtype=np.float64))
         slant = np.sqrt((d**2).sum(axis=0))
         return np.array([[Bearing(0.0)], [0.0]]) + StateVectors([np.arctan2(d[1], d[0]), slant]) + noise
 

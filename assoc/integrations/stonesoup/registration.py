@@ -59,9 +59,9 @@ class RegistrationFeeder(DetectionFeeder):  # type: ignore[misc]
             self.registration = self.registration.after((time - zero).total_seconds(), measured)
             changes = [new - old for new, old in zip(self.registration.correct(measured), measured, strict=True)]
             corrected: dict[int, Any] = {}
-            for one, part, change in zip(self._frame.adapted, parts, changes, strict=True):
+            for adapted, part, change in zip(self._frame.adapted, parts, changes, strict=True):
                 for detection, row in zip(part, change, strict=True):
-                    corrected[id(detection)] = _changed(detection, one, row)
+                    corrected[id(detection)] = _changed(detection, adapted, row)
             for found in sets:
                 yield time, {corrected[id(detection)] for detection in found}
 

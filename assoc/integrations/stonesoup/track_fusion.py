@@ -69,8 +69,8 @@ class TrackFusionTracker(Tracker):  # type: ignore[misc]
         last: dict[int, tuple[datetime, SystemTracks]] = {}
         names: list[dict[int, str]] = [{} for _ in self.trackers]
         zero: datetime | None = None
-        all_steps = merge(*map(self._yielded, range(len(self.trackers))), key=lambda one: one[0])
-        for time, group in groupby(all_steps, key=lambda one: one[0]):
+        all_steps = merge(*map(self._yielded, range(len(self.trackers))), key=lambda step: step[0])
+        for time, group in groupby(all_steps, key=lambda step: step[0]):
             zero = zero or time
             for _, s, states, ids in group:
                 last[s], names[s] = (time, states), ids

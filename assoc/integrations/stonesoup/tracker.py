@@ -82,7 +82,7 @@ class AssocTracker(Tracker):  # type: ignore[misc]
             if self.detector is None:
                 raise InvalidInputError("detector: expected one to iterate over, got None")
             joined = in_sets(self.detector)
-            self._steps = (self.update_tracker(time, [d for one in sets for d in one]) for time, sets in joined)
+            self._steps = (self.update_tracker(time, [d for part in sets for d in part]) for time, sets in joined)
         return next(self._steps)
 
     def update_tracker(self, time: datetime, detections: Any) -> tuple[datetime, set[Track]]:
@@ -111,7 +111,7 @@ class AssocTracker(Tracker):  # type: ignore[misc]
         seconds = (now - zero).total_seconds()
         before = -np.inf if self._now is None else (self._now - zero).total_seconds()
         if self.horizon is None and (
-            time < now or min((one.min() for one in stamps if len(one)), default=now) < before
+            time < now or min((part.min() for part in stamps if len(part)), default=now) < before
         ):
             raise InvalidInputError(
                 f"detector: detections come after those of {self._now}, expected a horizon in seconds"
@@ -120,7 +120,7 @@ class AssocTracker(Tracker):  # type: ignore[misc]
         step = self.tracker.step(
             seconds,
             self._frame.measurements(parts),
-            None if all((one == seconds).all() for one in stamps) else stamps,
+            None if all((part == seconds).all() for part in stamps) else stamps,
             None if looked.all() else np.where(looked[:, None], [-np.pi, np.pi], 0.0),
         )
         self._now = now

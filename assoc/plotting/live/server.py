@@ -115,7 +115,7 @@ class LivePage:
             "tracks": tracks,
             "plots": plots,
             "sensors": picture.sensors.tolist(),
-            "heard": [[one.name, one.last if math.isfinite(one.last) else None, *one[2:5]] for one in heard],
+            "heard": [[row.name, row.last if math.isfinite(row.last) else None, *row[2:5]] for row in heard],
             "counts": dict(counts or {}),
         }
         self._push(_event("picture", content | {"ended": picture.ended}))
@@ -134,7 +134,7 @@ class LivePage:
         quality = None
         if agreement is not None:
             nis = round(agreement.nis, _DIGITS) if math.isfinite(agreement.nis) else None
-            hits = [sum(agreement.hits[part] for part in one.parts) for one in heard]
+            hits = [sum(agreement.hits[part] for part in row.parts) for row in heard]
             quality = nis, agreement.consistent, hits
         life = track.hits, round(track.started, 3), track.status, quality
         return [track.track_id, *plane[:2], known, *plane[2:], *life, *(round(angle, 6) for angle in earth)]

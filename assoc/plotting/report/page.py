@@ -53,8 +53,8 @@ class Page:
 
     def html(self) -> str:
         """Return the whole page."""
-        own = "\n".join(["'use strict';", *(_static(name) for name in ("core.js", *self.scripts))])
-        script = f"{plotly_script()}\n;(() => {{\n{own}\n}})();"
+        code = "\n".join(["'use strict';", *(_static(name) for name in ("core.js", *self.scripts))])
+        script = f"{plotly_script()}\n;(() => {{\n{code}\n}})();"
         unpack = _static("unpack.js")
         body = [
             f'<section id="{escape(name)}"><h2>{escape(title)}</h2>\n{content}\n</section>'

@@ -25,8 +25,8 @@ def add_pheromone(views: Sequence[dict[str, Any]], scans: Sequence[ScanAssociati
     while most > 2 and sum(len(json.dumps(view, separators=(",", ":"))) for view in shown) > _BUDGET:
         most //= 2
         shown = [_view(scan.pheromone, most) for scan in scans]
-    for view, one in zip(views, shown, strict=True):
-        view["ants"] = one
+    for view, history in zip(views, shown, strict=True):
+        view["ants"] = history
 
 
 def _view(history: PheromoneHistory | None, most: int) -> dict[str, Any] | None:

@@ -16,10 +16,10 @@ _MOST = 30_000
 def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
     """Plots of each window, each aircraft's own plots as its truth, and the rates, as plain numbers."""
     recording = shown.recording
-    places, aircraft = recording.positions, recording.aircraft
+    positions, aircraft = recording.positions, recording.aircraft
     few = len(recording) <= _MOST
     measured = [
-        {"t": round(float(end), 4), "at": plain_numbers(places[window.rows], decimals)}
+        {"t": round(float(end), 4), "at": plain_numbers(positions[window.rows], decimals)}
         for end, window in zip(shown.ends, shown.windows, strict=True)
         if few
     ]
@@ -29,7 +29,7 @@ def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
         for name in np.unique(aircraft[aircraft >= 0]).tolist():
             rows = np.flatnonzero(aircraft == name)
             rows = rows[:: max(1, len(recording) // _MOST)]
-            columns = zip("xyz", (*places[rows].T, height[rows]), strict=True)
+            columns = zip("xyz", (*positions[rows].T, height[rows]), strict=True)
             path = {axis: plain_numbers(values, decimals) for axis, values in columns}
             truth.append({"id": name, "t": plain_numbers(recording.times[rows], 4), **path})
     # positions of plots are relative to their radar

@@ -95,14 +95,14 @@ def _boxes(registration: Registration, component: str) -> dict[str, Any]:
     scale, unit = (float(np.degrees(1.0)), "deg") if component in ANGLES else (1.0, "m")
     sensors = []
     for s, i in residual_columns(registration, component):
-        own = registration.residuals[s]
-        step = max(1, len(own.before) // _MOST_SHOWN)
+        residuals = registration.residuals[s]
+        step = max(1, len(residuals.before) // _MOST_SHOWN)
         sensors.append(
             {
                 "name": label_of(registration.sensors, s),
                 "limit": 1.96 * scale * float(np.sqrt(registration.sensors[s].covariance[i, i])),
-                "before": plain_numbers(scale * own.before[::step, i], 5),
-                "after": plain_numbers(scale * own.after[::step, i], 5),
+                "before": plain_numbers(scale * residuals.before[::step, i], 5),
+                "after": plain_numbers(scale * residuals.after[::step, i], 5),
             }
         )
     return {"component": component, "unit": unit, "sensors": sensors}

@@ -13,8 +13,8 @@ from assoc._types import Array
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.costs import tuple_costs
-from assoc.plotting.places import measures_height
-from assoc.plotting.solution import measured_places
+from assoc.plotting.measured import measures_height
+from assoc.plotting.solution import measured_positions
 from assoc.problem import AssignmentProblem
 from assoc.scene.geodesy import geodetic
 from assoc.scene.scene import Scene
@@ -37,8 +37,7 @@ def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
         ]
     if decimals <= 0 and array.size and np.abs(array).max() < 2**53:
         array = array.astype(np.int64)
-    content: list[Any] = array.tolist()
-    return content
+    return array.tolist()
 
 
 def number(value: float | None) -> float | None:
@@ -93,53 +92,55 @@ def _trace(association: ScanAssociation) -> list[list[float | None]]:
     return [[line.iteration, number(line.seconds), number(line.cost), number(line.lower_bound)] for line in kept]
 
 
-def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:
+def scan_view(source: Source, number_of_source: int, associated: ScanAssociation) -> dict[str, Any]:
     """Figures of a scan, its targets and its history; `scene_view` adds what is drawn."""
-    solution = one.solution
-    tuples = one.targets
+    solution = associated.solution
+    tuples = associated.targets
     costs: Array
-    if one.costs is not None:
-        costs = one.costs
+    if associated.costs is not None:
+        costs = associated.costs
     elif isinstance(source, AssignmentProblem):
         rows = map(tuple, solution.tuples.tolist())
         known = dict(zip(rows, source.costs[solution.indices].tolist(), strict=True))
         costs = np.array([known[tuple(row)] for row in tuples.tolist()])
     else:
-        costs = tuple_costs(source, one.scan, tuples)
+        costs = tuple_costs(source, associated.scan, tuples)
     return {
         "source": number_of_source,
-        "scan": one.scan,
-        "time": number(one.time),
-        "sizes": list(one.sizes),
+        "scan": associated.scan,
+        "time": number(associated.time),
+        "sizes": list(associated.sizes),
         "targets": len(tuples),
-        "falseAlarms": one.false_alarms,
+        "falseAlarms": associated.false_alarms,
         "cost": number(solution.cost),
         "bound": number(solution.lower_bound),
-        "gap": closed_gap(one),
+        "gap": closed_gap(associated),
         "status": solution.status,
         "ms": 1e3 * solution.runtime,
-        "trueTuples": one.true_tuples,
-        "correct": one.correct_tuples,
-        "ranked": [number(other.solution.cost) for other in one.ranked],
+        "trueTuples": associated.true_tuples,
+        "correct": associated.correct_tuples,
+        "ranked": [number(other.solution.cost) for other in associated.ranked],
         "tuples": tuples.tolist(),
         "costs": plain_numbers(costs, 4),
-        "probabilities": None if one.probabilities is None else [plain_numbers(row, 4) for row in one.probabilities],
-        "trace": _trace(one),
+        "probabilities": None
+        if associated.probabilities is None
+        else [plain_numbers(row, 4) for row in associated.probabilities],
+        "trace": _trace(associated),
         "view": None,
     }
 
 
-def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, Any]:
+def scene_view(scene: Scene, associated: ScanAssociation, decimals: int) -> dict[str, Any]:
     """Return the drawing of a scan: truth, measurements, targets with residuals and covariances.
 
     Measurements with times of their own have no residuals: the target has moved since.
     """
-    scan = scene.scan(one.scan).aligned(scene.sensors)
+    scan = scene.scan(associated.scan).aligned(scene.sensors)
     standing = scene.at(scan.time)
-    positions = np.zeros((0, 3)) if one.positions is None else one.positions
-    spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
+    positions = np.zeros((0, 3)) if associated.positions is None else associated.positions
+    spreads = np.zeros((0, 3, 3)) if associated.covariances is None else associated.covariances
     measured, residuals = [], []
-    for s, (at, label) in enumerate(measured_places(scene, one)):
+    for s, (at, label) in enumerate(measured_positions(scene, associated)):
         sensor = standing.sensors[s].position_part
         z = scan.measurements[s][:, : sensor.dim]
         entry: dict[str, Any] = {"at": plain_numbers(at, decimals), "target": label.tolist()}
@@ -147,8 +148,8 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
             entry["source"] = scan.sources[s].tolist()
         measured.append(entry)
         # one row for each target that this sensor detected, in the order of the targets
-        seen = np.flatnonzero(one.targets[:, s])
-        found = z[one.targets[seen, s] - 1]
+        seen = np.flatnonzero(associated.targets[:, s])
+        found = z[associated.targets[seen, s] - 1]
         difference = sensor.residual(found, sensor.measure(positions[seen])) if len(seen) else found
         residuals.append(_significant(difference))
     truth = []
@@ -174,8 +175,7 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
 
 def _significant(values: Array) -> list[Any]:
     """Nested lists of numbers with four digits."""
-    content: list[Any] = [[float(f"{value:.4g}") for value in row] for row in values.tolist()]
-    return content
+    return [[float(f"{value:.4g}") for value in row] for row in values.tolist()]
 
 
 def thin(views: Iterable[dict[str, Any]], wanted: Sequence[dict[str, Any]], budget: int = BUDGET) -> int:

@@ -135,8 +135,8 @@ def path(start: Pose, goal: Pose, radius: float, word: str) -> Path | None:
 
 def paths(start: Pose, goal: Pose, radius: float) -> list[Path]:
     """Return the paths of all words that have one, shortest first."""
-    found = [one for word in WORDS if (one := path(start, goal, radius, word)) is not None]
-    return sorted(found, key=lambda one: one.length)
+    found = [known for word in WORDS if (known := path(start, goal, radius, word)) is not None]
+    return sorted(found, key=lambda known: known.length)
 
 
 def shortest(start: Pose, goal: Pose, radius: float) -> Path:

@@ -171,8 +171,8 @@ def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Arr
     heights = positions[:, 2:]
     if p.latitude is not None and p.longitude is not None:
         latitude, longitude, _ = geodetic(positions * [1, 1, 0], TRAFFIC).T
-        place = math.radians(p.latitude), math.radians(p.longitude), 0.0
-        positions = east_north_up(latitude, longitude, heights[:, 0], place)
+        site = math.radians(p.latitude), math.radians(p.longitude), 0.0
+        positions = east_north_up(latitude, longitude, heights[:, 0], site)
         velocities = np.gradient(positions, STEP, axis=0)
     when = dwells(times, positions, p.rotation)
     when = when[when <= p.duration]
