@@ -17,6 +17,8 @@ os.environ["ASSOC_INTERPRET"] = "0"
 def _solvers() -> None:
     import assoc
 
+    # first what trackers ask of it: the other process would compile that as well
+    assoc.warm_up(["exact"])
     assoc.warm_up()
 
 

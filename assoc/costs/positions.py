@@ -104,7 +104,9 @@ def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, A
     # bearings were sorted: from 1-based index to row
     row_of = np.empty(len(index) + 1, dtype=np.int32)
     row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
-    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
+    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1)
+    # the kernel is compiled for one layout
+    rows = np.ascontiguousarray(rows, dtype=np.int32)
     return (rows, *fit(sensors, measured, rows, False))
 
 

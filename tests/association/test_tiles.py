@@ -7,6 +7,7 @@ import assoc
 from assoc.association.plan import Plan
 from assoc.association.tiles import tiles_of
 from assoc.simulation import simulate
+from tests.sizes import sample
 
 
 @pytest.fixture(scope="module")
@@ -14,7 +15,7 @@ def crowd():
     return simulate("crowd", 3, targets=400, scans=1, constant_density=True)
 
 
-@pytest.mark.parametrize(("scenario", "tiles", "jobs"), [("crowd", 2, 1), ("crowd", 20, 2), ("three-radar", 3, 1)])
+@sample("scenario, tiles, jobs", [("crowd", 20, 1), ("crowd", 20, 2), ("crowd", 2, 1), ("three-radar", 3, 1)], every=3)
 def test_tiles_change_neither_targets_nor_cost(crowd, scenario, tiles, jobs):
     scene = crowd if scenario == "crowd" else simulate(scenario, 1, scans=1)
     (one,) = assoc.associate(scene).scans

@@ -48,7 +48,7 @@ def found_candidates(problem):
     }
 
 
-@pytest.mark.parametrize("brute", [True, False])
+@sample("brute", [False, True], every=2)
 @sample("probability", [0.9, 0.999, 1.0], every=3)
 @pytest.mark.parametrize(
     "kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb", "hhr", "hb"]

@@ -22,7 +22,7 @@ from tests.sizes import sample
 MIXES = ["RRR", "PPP", "ppp", "bbb", "rrr", "RrP", "RPb", "PbP", "pRb", "bbbb", "rrrb", "hhh", "hrb"]
 
 
-@pytest.mark.parametrize("kinds", MIXES)
+@sample("kinds", MIXES, every=2)
 @sample("seed", range(3), every=3)
 def test_costs_are_equation_5_at_the_position_scipy_finds(kinds, seed):
     scene, truth = make_scene(kinds, seed)

@@ -14,6 +14,7 @@ import pytest
 from assoc._system import door
 from assoc.errors import AssocError, InvalidInputError
 from tests.doors.examples import examples, scene
+from tests.sizes import sample
 
 ROOMS = [
     "assoc", "assoc.costs", "assoc.filters", "assoc.metrics", "assoc.plotting", "assoc.plotting.report", "assoc.proofs",
@@ -80,7 +81,7 @@ def test_wrong_everywhere(name, tmp_path, monkeypatch):
             assert complaint(function, **{one.name: value for one in needed}), (name, value)
 
 
-@pytest.mark.parametrize(("name", "argument"), [(name, one) for name, given in examples().items() for one in given])
+@sample("name, argument", [(name, one) for name, given in examples().items() for one in given], every=4)
 def test_one_wrong_argument(name, argument, tmp_path, monkeypatch):
     """What does not fit is refused, and the line names the argument or says of what kind it is."""
     monkeypatch.chdir(tmp_path)

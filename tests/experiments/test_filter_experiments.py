@@ -161,6 +161,7 @@ def test_consistency_of_the_exact_filters(tmp_path, monkeypatch):
     assert low < nis.mean() < high
 
 
+@pytest.mark.slow
 def test_benchmark_times_all_three():
     for kind in benchmark.KINDS:
         assert benchmark.ours(kind, 3, 2) > 0

@@ -23,6 +23,7 @@ from experiments.trackers import (
 )
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
+from tests.sizes import sample
 
 
 @pytest.mark.slow
@@ -108,8 +109,8 @@ def test_the_table_of_sensors_as_they_are(capsys):
         as_they_are.program(["--only", "nothing"])
 
 
-@pytest.mark.parametrize(
-    ("label", "part"),
+@sample(
+    "label, part",
     [
         ("ships, radar and AIS", "views"),
         ("three 2-D radars", "heights"),
@@ -117,6 +118,7 @@ def test_the_table_of_sensors_as_they_are(capsys):
         ("wind farm", "map"),
         ("dark band of 4 km", "life"),
     ],
+    every=5,
 )
 def test_what_is_left_out_is_missed(label, part):
     """Without a part, trackers are worse on a scene that needs it."""

@@ -29,6 +29,7 @@ from assoc.filters.kernels import gaussian, points
 from experiments.filters.endurance import endure
 from experiments.filters.endurance import filters as of_each_kind
 from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
+from tests.sizes import sample
 
 MIXED = [
     ExtendedKalmanFilter(Padded(ConstantVelocity(0.5), 0.1)),
@@ -89,6 +90,7 @@ def results():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", every_filter())
 @pytest.mark.parametrize("dt", [1.0, [1.0, 0.5, 2.0, 1.0]])
 def test_a_run_is_its_steps(name, dt):
@@ -110,6 +112,7 @@ def test_a_run_is_its_steps(name, dt):
     assert np.array_equal(whole.state.mean, state.mean) and type(whole.state) is type(state)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", every_filter())
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_step_is_a_prediction_and_an_update(name, count):
@@ -128,6 +131,7 @@ def test_a_step_is_a_prediction_and_an_update(name, count):
     assert quick.nis.shape == quick.log_likelihood.shape == (count,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sensor",
     [BEARING, LinearMeasurement(np.eye(2, 6, 3), np.eye(2)), FunctionMeasurement(lambda x: x[:, :1], np.eye(1))],
@@ -144,6 +148,7 @@ def test_a_step_with_other_sensors(sensor):
         assert ekf.step(state, dt, RADAR.measure(state.mean[:, :3]), RADAR).innovation.shape == (1, 3)
 
 
+@pytest.mark.slow
 def test_refusals_of_a_step():
     ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
     z = RADAR.measure(start.mean[:, :3])
@@ -169,6 +174,7 @@ def test_refusals_of_a_step():
         _ = ekf.step(random_state(1, np.random.default_rng(0)), 1.0, z, RADAR).gain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [np.int64(1), np.float32(1), np.array(1.0), np.ones(2), (1, 1)])
 def test_a_run_takes_any_number_for_its_step(dt):
     ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
@@ -176,6 +182,7 @@ def test_a_run_takes_any_number_for_its_step(dt):
     assert np.array_equal(ekf.run(start, z, RADAR, dt).mean, ekf.run(start, z, RADAR, 1.0).mean)
 
 
+@pytest.mark.slow
 def test_refusals_of_a_run():
     ekf, start = ExtendedKalmanFilter(MOTION), random_state(2, np.random.default_rng(0))
     z = np.stack([RADAR.measure(start.mean[:, :3])] * 3)
@@ -199,7 +206,7 @@ def test_refusals_of_a_run():
 
 
 @pytest.mark.parametrize("dt", [-1.0, np.nan, np.inf, "1"])
-@pytest.mark.parametrize("name", every_filter())
+@sample("name", every_filter(), every=5)
 def test_time_does_not_run_backwards(name, dt):
     one, sensor = every_filter()[name]
     turning = ("turn", "unscented", "ensemble", "fuzzy")

@@ -1,5 +1,8 @@
-"""Programs are run as programs: in a process of their own."""
+"""Programs, each run in this process, or as what it is, in a process of its own: that costs a second to import."""
 
+import contextlib
+import importlib
+import io
 import subprocess
 import sys
 from collections.abc import Callable
@@ -7,8 +10,20 @@ from collections.abc import Callable
 import pytest
 
 from assoc.simulation import simulate
+from tests.told import told
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def here(name: str, *words: object, cwd: object = ".") -> subprocess.CompletedProcess[str]:
+    """Run ``python -m name words`` in this process, but for what signals do."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.chdir(cwd), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = importlib.import_module(name).main([*map(str, words)])
+        except SystemExit as ended:
+            code = ended.code
+    return subprocess.CompletedProcess([name, *words], code, out.getvalue(), told(err.getvalue()))
 
 
 def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[str]:
@@ -19,6 +34,11 @@ def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[s
 
 @pytest.fixture(scope="session")
 def run() -> Run:
+    return here
+
+
+@pytest.fixture(scope="session")
+def run_program() -> Run:
     return program
 
 

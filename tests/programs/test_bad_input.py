@@ -12,7 +12,6 @@ import assoc
 from assoc._cli.program import run_program
 from assoc.simulation import simulate
 from assoc.solve import main
-from tests.sizes import sample
 
 
 class Trap:
@@ -101,7 +100,7 @@ def solve(run, folder, *words):
     return run("assoc.solve", *words, "--solver", "greedy", "--json", "o.json", "--csv", "o.csv", cwd=folder), before
 
 
-@sample("case", [*SCENES], every=3)
+@pytest.mark.parametrize("case", SCENES)
 def test_bad_scenes(run, tmp_path, scene_fields, case):
     spoil, message = SCENES[case]
     np.savez(tmp_path / "bad.npz", **spoil(scene_fields))
@@ -110,7 +109,7 @@ def test_bad_scenes(run, tmp_path, scene_fields, case):
     assert "bad.npz" in done.stderr
 
 
-@sample("case", [*PROBLEMS], every=3)
+@pytest.mark.parametrize("case", PROBLEMS)
 def test_bad_problems(run, tmp_path, case):
     changed, message = PROBLEMS[case]
     np.savez(tmp_path / "bad.npz", **{**PROBLEM, **changed})
@@ -143,7 +142,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
     check(done, tmp_path, name, before)
 
 
-@sample(
+@pytest.mark.parametrize(
     "words,message",
     [
         ([], "FILE"),
@@ -173,7 +172,6 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
         (["s.npz", "--config", "solver.toml"], "[bees] is no solver"),
     ],
-    every=3,
 )
 def test_bad_options(run, tmp_path, scene_fields, words, message):
     np.savez(tmp_path / "s.npz", **scene_fields)

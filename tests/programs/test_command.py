@@ -71,20 +71,20 @@ def test_the_command_is_installed():
 
 
 @pytest.mark.slow
-def test_subcommands_are_the_programs(run, here):
-    done = run("assoc", "solve", "s.npz", "--solver", "greedy", "--json", "-")
+def test_subcommands_are_the_programs(run_program, here):
+    done = run_program("assoc", "solve", "s.npz", "--solver", "greedy", "--json", "-")
     assert done.returncode == 0 and len(json.loads(done.stdout)["scans"]) == 6
-    direct = run("assoc.solve", "s.npz", "--solver", "greedy", "--json", "-")
+    direct = run_program("assoc.solve", "s.npz", "--solver", "greedy", "--json", "-")
     costs = [[scan["cost"] for scan in json.loads(one.stdout)["scans"]] for one in (done, direct)]
     assert costs[0] == costs[1]
-    done = run("assoc", "--version")
+    done = run_program("assoc", "--version")
     assert (done.returncode, done.stdout, done.stderr) == (0, f"assoc {assoc.__version__}\n", "")
     for words in ([], ["--help"]):
-        done = run("assoc", *words)
+        done = run_program("assoc", *words)
         assert done.returncode == 0 and all(name in done.stdout for name in ("simulate", "solve", "track", "sweep"))
-    done = run("assoc", "slove", "s.npz")
+    done = run_program("assoc", "slove", "s.npz")
     assert (done.returncode, done.stdout) == (2, "") and "unknown command 'slove'; did you mean solve" in done.stderr
-    assert run("assoc", "--nothing").returncode == 2
+    assert run_program("assoc", "--nothing").returncode == 2
 
 
 def test_the_command_shows_itself_in_usage(here, monkeypatch, capsys):
@@ -99,27 +99,27 @@ def test_the_command_shows_itself_in_usage(here, monkeypatch, capsys):
 
 @pytest.mark.slow
 @sample("option", ["--json", "--csv"], every=2)
-def test_data_alone_go_to_stdout(run, here, option):
-    done = run("assoc.solve", "s.npz", option, "-")
+def test_data_alone_go_to_stdout(run_program, here, option):
+    done = run_program("assoc.solve", "s.npz", option, "-")
     assert done.returncode == 0 and "scans certified optimal" in done.stderr
     if option == "--json":
         assert json.loads(done.stdout)["solver"] == "exact"
     else:
         assert len(pd.read_csv(io.StringIO(done.stdout))) == 6
-    quiet = run("assoc", "-q", "solve", "s.npz", option, "-")
+    quiet = run_program("assoc", "-q", "solve", "s.npz", option, "-")
     assert quiet.returncode == 0 and quiet.stderr == "" and len(quiet.stdout) > 100
     # both at once are not one stream
-    done = run("assoc.solve", "s.npz", "--json", "-", "--csv", "-")
+    done = run_program("assoc.solve", "s.npz", "--json", "-", "--csv", "-")
     assert done.returncode == 2 and done.stdout == "" and "given twice" in done.stderr
     assert not (here / "-").exists()
 
 
 @pytest.mark.slow
-def test_tracks_scenes_and_plots_go_to_stdout(run, here):
-    done = run("assoc.track", "s.npz", "-o", "-")
+def test_tracks_scenes_and_plots_go_to_stdout(run_program, here):
+    done = run_program("assoc.track", "s.npz", "-o", "-")
     assert done.returncode == 0 and pd.read_csv(io.StringIO(done.stdout)).track_id.nunique() == 3
     assert "3 confirmed tracks" in done.stderr
-    done = run("assoc", "simulate", "-q", "rotating-radar", "--duration", "60", "-o", "-")
+    done = run_program("assoc", "simulate", "-q", "rotating-radar", "--duration", "60", "-o", "-")
     assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("time,")
 
 
@@ -218,18 +218,18 @@ def test_a_table_is_told_where_it_can_go(here, capsys):
 
 
 @pytest.mark.slow
-def test_solvers_of_the_users_own(run, here):
+def test_solvers_of_the_users_own(run_program, here):
     words = ["s.npz", "--import", "mine", "--solver", "first", "--tries", "7", "--csv", "-"]
-    one, two = (pd.read_csv(io.StringIO(run("assoc", "solve", *words, "--jobs", n).stdout)) for n in (1, 2))
+    one, two = (pd.read_csv(io.StringIO(run_program("assoc", "solve", *words, "--jobs", n).stdout)) for n in (1, 2))
     assert one.iterations.tolist() == [7] * 6 and one.cost.tolist() == two.cost.tolist()
     for jobs in ("1", "2"):
-        done = run("assoc.solve", "s.npz", "--import", "mine", "--solver", "nothing", "--jobs", jobs)
+        done = run_program("assoc.solve", "s.npz", "--import", "mine", "--solver", "nothing", "--jobs", jobs)
         assert done.returncode == 2 and done.stderr.count("\n") == 1
         assert "solver 'nothing': expected it to return an Outcome, got NoneType" in done.stderr
     grid = ["--grid", "tries=1,2", "--scans", "0:2", "--jobs", "2", "-o", "study"]
-    done = run("assoc.sweep", "s.npz", "--import", "mine", "--solver", "first", *grid)
+    done = run_program("assoc.sweep", "s.npz", "--import", "mine", "--solver", "first", *grid)
     assert done.returncode == 0 and "4 runs in study: 4 new" in done.stdout
-    done = run("assoc.track", "s.npz", "--import", "mine", "--solver", "first", "-o", "t.csv")
+    done = run_program("assoc.track", "s.npz", "--import", "mine", "--solver", "first", "-o", "t.csv")
     assert done.returncode == 0 and "multi-sensor, first" in done.stdout
 
 
@@ -279,9 +279,9 @@ COMPLETED = [
 
 
 @pytest.mark.slow
-def test_bash_completes(run, tmp_path):
+def test_bash_completes(run_program, tmp_path):
     bash = shutil.which("bash") or pytest.skip("bash is not installed")
-    script = run("assoc", "completion", "bash").stdout
+    script = run_program("assoc", "completion", "bash").stdout
     for words, expected in COMPLETED:
         line = " ".join(["assoc", *words])
         ask = f"COMP_WORDS=({line}); COMP_CWORD={len(words)}; _shtab_assoc; printf '%s\\n' \"${{COMPREPLY[@]}}\""
@@ -290,9 +290,9 @@ def test_bash_completes(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_fish_completes(run, tmp_path):
+def test_fish_completes(run_program, tmp_path):
     fish = shutil.which("fish") or pytest.skip("fish is not installed")
-    script = run("assoc", "completion", "fish").stdout
+    script = run_program("assoc", "completion", "fish").stdout
     for words, expected in COMPLETED:
         ask = f"complete -C 'assoc {' '.join(words)}'"
         done = subprocess.run([fish, "-N", "-c", script + ask], capture_output=True, text=True, cwd=tmp_path)
@@ -301,13 +301,13 @@ def test_fish_completes(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_other_shells(run, tmp_path):
-    done = run("assoc", "completion", "zsh")
+def test_other_shells(run_program, tmp_path):
+    done = run_program("assoc", "completion", "zsh")
     assert done.returncode == 0 and "_shtab_assoc" in done.stdout
     if zsh := shutil.which("zsh"):
         (tmp_path / "s").write_text(done.stdout)
         assert subprocess.run([zsh, "-n", str(tmp_path / "s")]).returncode == 0
-    done = run("assoc", "completion", "tcsh")
+    done = run_program("assoc", "completion", "tcsh")
     assert done.returncode == 2 and "expected one of bash, zsh, fish, got 'tcsh'" in done.stderr
 
 

@@ -16,6 +16,7 @@ from assoc._cli.solver_log import SolverLog
 from assoc.association.plan import Plan
 from assoc.packing.run import Run
 from assoc.simulation import simulate
+from tests.sizes import sample
 from tests.told import told
 
 ASLEEP = """
@@ -64,7 +65,7 @@ def work(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
-@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+@sample("number, word", [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")], every=2)
 def test_what_is_finished_is_written(work, number, word):
     words = ["solve", "scene.npz", "--import", "asleep", "--solver", "asleep", "--json", "o.json", "--csv", "o.csv"]
     code, out, errors = interrupted(words, work, "scan 3", number)

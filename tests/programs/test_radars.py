@@ -98,6 +98,7 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_reference_trajectory_from_radar_files(tmp_path, capsys):
     """One command: biases and gains taken off, tracks smoothed, accuracies, in both formats."""
     asterix = pytest.importorskip("assoc.integrations.asterix")

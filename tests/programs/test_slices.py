@@ -13,6 +13,7 @@ from assoc._cli.track.slices import Slices
 from assoc.recordings import write_plots
 from assoc.simulation import simulate, simulate_recording
 from assoc.tracking.slices import Stitching, TrackSlice, _same
+from tests.sizes import sample
 
 WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
 
@@ -50,7 +51,7 @@ def check_same(one, other):
     assert (pairs.score - pairs.score_other).abs().max() < 0.01
 
 
-@pytest.mark.parametrize("tracker", ["nearest-neighbour", "mht"])
+@sample("tracker", ["nearest-neighbour", "mht"], every=2)
 def test_slices_make_the_tracks_of_one_process(here, capsys, tracker):
     code, one, _ = run(["all.csv", "--tracker", tracker], "one.csv", capsys)
     assert code == 0

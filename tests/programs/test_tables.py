@@ -11,7 +11,6 @@ from assoc._cli.sweep.tables import without_the_same
 from assoc._cli.table import fitted_lines
 from assoc.simulation import simulate
 from tests.programs.terminal import shown, shown_at
-from tests.sizes import sample
 
 WIDTHS = (60, 80, 120, 200)
 HEADERS = ["solver", "alpha", "runs", "mean cost", "95 %", "mean gap", "95 %", "optimal %", "95 %", "ms", "95 %"]
@@ -58,10 +57,10 @@ def test_a_narrow_terminal_gets_lists():
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [60, 80, 120, 200])
-def test_solve_shows_twenty_scans(run, tmp_path, width):
+def test_solve_shows_twenty_scans(run_program, tmp_path, width):
     simulate("three-radar", 1, scans=23).save(tmp_path / "s.npz")
     words = ["assoc.solve", "s.npz", "--solver", "greedy"]
-    piped = run(*words, cwd=tmp_path).stdout.splitlines()
+    piped = run_program(*words, cwd=tmp_path).stdout.splitlines()
     assert [line.split()[0] for line in piped[1:24]] == [str(k) for k in range(23)] and piped[24] == ""
     headers = "scan measurements targets false alarms cost lower bound gap status ms correct".split()
     assert piped[0].split() == headers
@@ -86,10 +85,10 @@ def places(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def study(run, places):
+def study(run_program, places):
     """A study in that folder."""
     grid = ["--grid", "alpha=1,1.5,2", "rho=0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.9"]
-    done = run("assoc.sweep", "s.npz", "--solver", "aco", *grid, "--scans", "0:2", "-o", "study", cwd=places)
+    done = run_program("assoc.sweep", "s.npz", "--solver", "aco", *grid, "--scans", "0:2", "-o", "study", cwd=places)
     assert done.returncode == 0, done.stderr
 
 
@@ -103,12 +102,13 @@ PROGRAMS = {
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
-@sample("name", PROGRAMS, every=6)
-def test_every_program_fits_every_terminal(run, places, name, request):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_every_program_fits_every_terminal(run_program, places, name, request):
     """No line is longer than the terminal, and every number that a pipe gets is there, or dropped as a whole."""
     if name == "study":
         request.getfixturevalue("study")
-    piped = run(*PROGRAMS[name], cwd=places)
+    piped = run_program(*PROGRAMS[name], cwd=places)
     words = {word for line in piped.stdout.splitlines() for word in line.split()}
     for width, text in shown_at(WIDTHS, PROGRAMS[name], cwd=places).items():
         lines = [line.rpartition("\r")[2] for line in text.splitlines()]
@@ -125,8 +125,8 @@ def test_every_program_fits_every_terminal(run, places, name, request):
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 @pytest.mark.usefixtures("study")
-def test_a_study_shows_twenty_settings_and_once_what_is_the_same(run, places):
-    piped = run("assoc.sweep", "--summary", "study", cwd=places).stdout
+def test_a_study_shows_twenty_settings_and_once_what_is_the_same(run_program, places):
+    piped = run_program("assoc.sweep", "--summary", "study", cwd=places).stdout
     assert len([line for line in piped.splitlines() if line.strip().startswith("aco ")]) == 24
     text = shown_at([80], ["assoc.sweep", "--summary", "study"], cwd=places)[80]
     assert len(re.findall(r"^ *aco ", text, re.M)) == 20 and "... and 4 more settings (--all shows them)" in text

@@ -143,6 +143,7 @@ def test_textbook():
     assert found[0].tuples.tolist() == [[1, 1, 1], [2, 2, 2]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("budget", [0, 5])
 @few_or_all("count", 30, 120)
 def test_branching_instead_of_enumeration(count, budget):
@@ -201,6 +202,7 @@ def _solutions_of(piece):
     return sorted(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2001, 2033, 2037])
 def test_scenes_full_of_ghosts_in_parts_and_without(seed):
     packing = prepare(build_problem(scenes.ghost(20, seed), 0)).packing.component(0)
@@ -218,6 +220,7 @@ def test_scenes_full_of_ghosts_in_parts_and_without(seed):
     assert sure >= 8 and {frozenset(s) for s in first[:sure]} == {frozenset(s) for s in second[:sure]}
 
 
+@pytest.mark.slow
 def test_components_that_need_branching_within_a_problem(monkeypatch):
     monkeypatch.setattr(iterative_deepening, "FIRST_BUDGET", -3)
     rng = np.random.default_rng(4)
@@ -275,6 +278,7 @@ def test_scale_of_costs(scale):
         assert [s.cost / scale for s in kbest(scaled, 20)] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_large_two_sensors():
     """Against the method for more sensors, which shares only the final sorting with Murty's."""
     problem = planar_random(40, seed=9)

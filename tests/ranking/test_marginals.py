@@ -78,6 +78,7 @@ def test_estimates_are_calibrated():
     assert abs(np.mean(np.concatenate(likely))) < 0.01
 
 
+@pytest.mark.slow
 def test_estimates_leave_intervals_alone():
     problem = axial_problem(np.random.default_rng(4), (16, 16, 16), 0.2, "mixed")
     certified, auto = marginals(problem, 3, method="certified"), marginals(problem, 3)

@@ -12,6 +12,9 @@ from assoc.ranking import component_ranking
 from assoc.ranking.component_ranking import ComponentRanking
 from tests.packing.test_counts import random_packing, solutions
 
+# their kernel compiles for a quarter of a minute
+pytestmark = pytest.mark.slow
+
 # every split that raises the bound, at once
 ALWAYS = Splitting(after=1, pays=np.inf)
 

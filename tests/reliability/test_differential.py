@@ -9,14 +9,14 @@ from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
 from tests.reliability.exact import exact_marginals, exact_optimum, exact_ranks, marginals_of_part, ranks_of_part
 from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, make, many_parts
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 # the structures and tempers there were when the faults below were found: the same numbers then draw the same problems
 FIRST, SECOND = (list(STRUCTURES)[:14], list(TEMPERS)[:21]), (list(STRUCTURES)[:18], list(TEMPERS)[:21])
 QUICK = [name for name in (*WAYS, *LISTED) if not name.startswith("milp")]
 
 
-@pytest.mark.parametrize("structure", STRUCTURES)
+@sample("structure", STRUCTURES, every=3)
 @few_or_all("tempers", ("normal",), ("normal", "ties", "wide"))
 def test_every_structure(tempers, structure):
     for number, temper in enumerate(tempers):
@@ -33,7 +33,7 @@ def test_every_temper(structures, temper):
 
 
 @pytest.mark.parametrize(("structure", "temper"), [("odd cycle", "large gap"), ("axial square", "18 decades")])
-@few_or_all("count", 8, 30)
+@few_or_all("count", 4, 30)
 def test_intervals_hold_where_the_bound_is_far_from_the_optimum(count, structure, temper):
     for number in range(count):
         problem = make(np.random.default_rng([44, number]), structure, temper)

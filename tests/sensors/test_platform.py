@@ -13,6 +13,7 @@ from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Rada
 from assoc.simulation import observe
 from assoc.tracking import TRACKERS, smoothed
 from assoc.tracking.filter_choice import two_speeds
+from tests.sizes import sample
 
 TURN = [-math.pi, math.pi]
 # a ship on a circle, its bow along the circle
@@ -106,7 +107,7 @@ def scene_of(names, *, own_times=False, platform=SHIP, seed=0):
     return Scene(on_board, times, measurements, region, measurement_times=stamps if own_times else None)
 
 
-@pytest.mark.parametrize("own_times", [False, True])
+@sample("own_times", [False, True], every=2)
 @pytest.mark.parametrize("kind", TRACKERS)
 def test_tracks_of_a_turning_ship(kind, own_times):
     scene = scene_of(["radar2d", "bearing"], own_times=own_times)

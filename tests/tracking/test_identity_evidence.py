@@ -93,8 +93,7 @@ def taken(done, aircraft):
 
 
 @few_or_all("seeds", 2, 10)
-@pytest.mark.parametrize("address", [False, True], ids=["codes", "addresses"])
-@sample("name", NAMES, every=3)
+@sample("name, address", [(name, address) for name in NAMES for address in (False, True)], every=5)
 def test_codes_keep_crossing_aircraft_apart(name, address, seeds):
     switched = {"use": 0, "ignore": 0}
     for seed in range(seeds):
@@ -108,7 +107,7 @@ def test_codes_keep_crossing_aircraft_apart(name, address, seeds):
     assert switched["use"] == 0 and switched["ignore"] > 0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sample("name", NAMES, every=3)
 def test_one_wrong_code_does_not_break_a_track(name):
     done = followed(name, crossing(3, wrong=(12, 30)), IdentityParameters())
     tracks = taken(done, 0)
@@ -118,7 +117,7 @@ def test_one_wrong_code_does_not_break_a_track(name):
     assert len(np.unique(tracks[usual])) == 1 and tracks[usual][0] in own
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sample("name", NAMES, every=3)
 def test_wrong_ids_of_ships_break_no_track(name):
     """A radar, and reports of position (AIS) of which some have the other ship's id, or a stranger's."""
     rng, view = np.random.default_rng(5), [[-2e4, 2e4], [-2e4, 2e4]]

@@ -330,8 +330,8 @@ def pictured(pictures):
     ]
 
 
-@pytest.mark.parametrize("name", ["nearest-neighbour", "multi-sensor", "mht"])
-@sample("again", [0, 15], every=2)
+@sample("name", ["mht", "nearest-neighbour", "multi-sensor"], every=3)
+@sample("again", [15, 0], every=2)
 def test_a_saved_tracker_goes_on_as_if_nothing_had_happened(scene, tmp_path, name, again):
     """Whether the source goes on where it was, or repeats its last plots, which are known; plots come late, too."""
     identity = IdentityParameters() if name == "mht" else None

@@ -7,6 +7,7 @@ from assoc import filters
 from assoc.filters import Gaussian
 from assoc.tracking import TRACKERS
 from assoc.tracking.stages.doubles import Doubles
+from tests.sizes import sample
 from tests.tracking import plain
 
 START = np.array([500.0, 500.0, 250.0, 5.0, 0.0, 0.0])
@@ -48,7 +49,7 @@ def test_two_tracks_of_one_target_become_the_older_one(kind, tmp_path):
     assert np.concatenate([step.merged for step in again]).tolist() == merged.tolist()
 
 
-@pytest.mark.parametrize("P", [0.6, 0.9])
+@sample("P", [0.6, 0.9], every=2)
 @pytest.mark.parametrize("kind", TRACKERS.values())
 def test_two_targets_side_by_side_stay_two(kind, P):
     both = np.stack([START, START + [0.0, 20.0, 0.0, 0.0, 0.0, 0.0]])

@@ -115,7 +115,7 @@ def test_scans_in_which_nobody_looked_do_not_count(kind):
     assert [track.confirmed for track in tracker.tracks if track.hits == 2] == [True]
 
 
-@sample("kind", KINDS, every=3)
+@sample("kind", KINDS, every=6)
 def test_the_patience_counts_looks_not_scans(kind):
     """Ten scans for a turn: a track lives on though it is seen in one of them only."""
     tracker = make(kind, SENSORS[:1], life_cycle=LifeCycle(false_probability=1e-3))

@@ -59,7 +59,7 @@ KINDS = [
 ]  # fmt: skip
 
 
-@sample("kind, name, options, codes", KINDS, every=2)
+@sample("kind, name, options, codes", KINDS, every=4)
 def test_a_step_that_is_thrown_away_never_was(kind, name, options, codes):
     one = scene(name)
     plain, other = (TRACKERS[kind].for_scene(one, **options()) for _ in range(2))
@@ -75,7 +75,7 @@ def test_a_step_that_is_thrown_away_never_was(kind, name, options, codes):
     assert [said_of.scan for said_of in plain.flush()] == [said_of.scan for said_of in other.flush()]
 
 
-@sample("kind, name, options, codes", KINDS, every=2)
+@sample("kind, name, options, codes", KINDS, every=4)
 def test_a_tracker_saved_in_the_middle_of_a_scene_goes_on(kind, name, options, codes, tmp_path):
     one = scene(name)
     plain, other = (TRACKERS[kind].for_scene(one, **options()) for _ in range(2))

@@ -73,7 +73,7 @@ def test_targets_are_found_and_decisions_are_complete(kind):
     assert right >= 0.97 * total
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@sample("kind", KINDS, every=2)
 def test_the_order_of_the_measurements_does_not_matter(kind):
     one, rng = scene(), np.random.default_rng(5)
     plain, shuffled = kind.for_scene(one), kind.for_scene(one)
@@ -89,7 +89,7 @@ def test_the_order_of_the_measurements_does_not_matter(kind):
         np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@sample("kind", KINDS, every=3)
 def test_the_order_of_the_sensors_matters_little(kind):
     """Filters linearise at one sensor after the other: positions move by far less than they are uncertain."""
     one = scene()

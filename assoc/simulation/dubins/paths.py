@@ -31,7 +31,10 @@ class Pose:
     heading: float
 
     def __post_init__(self) -> None:
-        finite_array([self.x, self.y, self.heading], "pose", (3,))
+        values = finite_array([self.x, self.y, self.heading], "pose", (3,))
+        # whole numbers would have kernels compiled of their own
+        for name, value in zip(("x", "y", "heading"), values.tolist(), strict=True):
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
