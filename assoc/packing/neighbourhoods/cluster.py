@@ -112,14 +112,14 @@ class ClusterSearch:
 @njit
 def _by_row(cols: Ints, row_ptr: Ints, order: Ints) -> Any:
     """The columns of each row, in the order given."""
-    place = row_ptr[:-1].copy()
+    end = row_ptr[:-1].copy()
     result = np.empty(row_ptr[-1], np.int32)
     for j in order:
         for s in range(cols.shape[1]):
             r = cols[j, s]
             if r >= 0:
-                result[place[r]] = j
-                place[r] += 1
+                result[end[r]] = j
+                end[r] += 1
     return result
 
 
@@ -195,7 +195,7 @@ def _search_clusters(
     found = ClusterColumns(
         np.empty((_CAPACITY, num_sensors), np.int32), np.empty(_CAPACITY), np.empty(_CAPACITY, np.int32)
     )
-    place, cost, origin = found
+    members, cost, origin = found
     sweep = Sweep(
         np.empty(num_rows + 1, np.int64),
         np.empty(_CAPACITY * num_sensors, np.int32),
@@ -237,9 +237,9 @@ def _search_clusters(
                     if k >= 0:
                         current[e] = owner[first_row(cols, k)] == k
                     else:
-                        current[e] = owner[rows[max(place[e])]] < 0
+                        current[e] = owner[rows[max(members[e])]] < 0
                 limits = Limits(budget - base, excess - base, step, node_limit)
-                total, num_best, nodes = depth_first(place, cost, current, num, limits, lists, best)
+                total, num_best, nodes = depth_first(members, cost, current, num, limits, lists, best)
                 if nodes > node_limit:
                     cut += 1
                 if total < np.inf:

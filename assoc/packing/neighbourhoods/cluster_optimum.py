@@ -1,6 +1,6 @@
 """The exact part of cluster search: the columns that a cluster's multipliers leave, and the best choice of them.
 
-See cluster.py for the method. A column is described by ``place``: the cluster's row for each sensor, or
+See cluster.py for the method. A column is described by ``members``: the cluster's row for each sensor, or
 -1; a row with slack that stays uncovered is a column with that one row and ``origin`` -1.
 """
 
@@ -22,18 +22,18 @@ _SWEEPS = 8
 
 
 class ClusterColumns(NamedTuple):
-    """Buffers for the columns of a cluster: places, costs, and columns of the packing (-1: stays uncovered)."""
+    """Buffers for the columns of a cluster: rows, costs, and columns of the packing (-1: stays uncovered)."""
 
-    place: Ints
+    members: Ints
     cost: Floats
     origin: Ints
 
 
 class Sweep(NamedTuple):
-    """Buffers for the ascent on a cluster: its columns by place, its multipliers, smoothed primal values."""
+    """Buffers for the ascent on a cluster: its columns by row, its multipliers, smoothed primal values."""
 
     pointer: Ints
-    by_place: Ints
+    by_member: Ints
     duals: Floats
     primal: Floats
 
@@ -54,7 +54,7 @@ def collect(
     """List the columns within the cluster of reduced cost up to ``limit``; -1 if they are too many."""
     cols, slack, row_ptr = packing.cols, packing.slack, packing.row_ptr
     reduced, duals = prices
-    place, cost, origin = found
+    members, cost, origin = found
     num_sensors = cols.shape[1]
     count = 0
     for i in range(rows.size):
@@ -65,8 +65,8 @@ def collect(
             cost[count] = -duals[r]
             origin[count] = -1
             for s in range(num_sensors):
-                place[count, s] = -1
-            place[count, _sensor_of(cols, row_ptr, by_row, r)] = i
+                members[count, s] = -1
+            members[count, _sensor_of(cols, row_ptr, by_row, r)] = i
             count += 1
         for k in range(row_ptr[r], row_ptr[r + 1]):
             j = by_row[k]
@@ -91,7 +91,7 @@ def collect(
                 return -1
             for s in range(num_sensors):
                 q = cols[j, s]
-                place[count, s] = local[q] if q >= 0 else -1
+                members[count, s] = local[q] if q >= 0 else -1
             cost[count] = reduced[j]
             origin[count] = j
             count += 1
@@ -99,22 +99,22 @@ def collect(
 
 
 @inner_njit
-def _index(place: Ints, count: int, num: int, pointer: Ints, by_place: Ints) -> None:
+def _index(members: Ints, count: int, num: int, pointer: Ints, by_member: Ints) -> None:
     """Index the columns by the cluster's rows."""
-    num_sensors = place.shape[1]
+    num_sensors = members.shape[1]
     for i in range(num + 1):
         pointer[i] = 0
     for e in range(count):
         for s in range(num_sensors):
-            if place[e, s] >= 0:
-                pointer[place[e, s] + 1] += 1
+            if members[e, s] >= 0:
+                pointer[members[e, s] + 1] += 1
     for i in range(num):
         pointer[i + 1] += pointer[i]
     for e in range(count):
         for s in range(num_sensors):
-            if place[e, s] >= 0:
-                by_place[pointer[place[e, s]]] = e
-                pointer[place[e, s]] += 1
+            if members[e, s] >= 0:
+                by_member[pointer[members[e, s]]] = e
+                pointer[members[e, s]] += 1
     for i in range(num, 0, -1):
         pointer[i] = pointer[i - 1]
     pointer[0] = 0
@@ -126,12 +126,12 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
 
     Returns the number of columns left and the bound; none are left if the bound exceeds the budget.
     """
-    place, cost, origin = found
-    pointer, by_place, u, primal = sweep
-    num_sensors = place.shape[1]
+    members, cost, origin = found
+    pointer, by_member, u, primal = sweep
+    num_sensors = members.shape[1]
     base = 0.0
     for _ in range(_LEVELS):
-        _index(place, count, num, pointer, by_place)
+        _index(members, count, num, pointer, by_member)
         for i in range(num):
             u[i] = 0.0
         for e in range(count):
@@ -140,27 +140,27 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
             for i in range(num):
                 total = 0.0
                 for k in range(pointer[i], pointer[i + 1]):
-                    total += primal[by_place[k]]
+                    total += primal[by_member[k]]
                 if not 1e-200 < total < 1e200:
                     continue
                 u[i] -= temperature * math.log(total)
                 factor = 1.0 / total
                 for k in range(pointer[i], pointer[i + 1]):
-                    primal[by_place[k]] *= factor
+                    primal[by_member[k]] *= factor
         for e in range(count):
             for s in range(num_sensors):
-                if place[e, s] >= 0:
-                    cost[e] -= u[place[e, s]]
+                if members[e, s] >= 0:
+                    cost[e] -= u[members[e, s]]
         for i in range(num):
             least = np.inf
             for k in range(pointer[i], pointer[i + 1]):
-                least = min(least, cost[by_place[k]])
+                least = min(least, cost[by_member[k]])
             if least == np.inf:
                 return 0, np.inf
             base += u[i] + least
             if least != 0.0:
                 for k in range(pointer[i], pointer[i + 1]):
-                    cost[by_place[k]] -= least
+                    cost[by_member[k]] -= least
         if base > budget:
             return 0, base
         left = 0
@@ -169,42 +169,102 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
                 cost[left] = max(cost[e], 0.0)
                 origin[left] = origin[e]
                 for s in range(num_sensors):
-                    place[left, s] = place[e, s]
+                    members[left, s] = members[e, s]
                 left += 1
         count = left
         temperature *= 0.5
     return count, base
 
 
+class _Buffers(NamedTuple):
+    """For one node: columns of each row and the least cost of these, and sums of them by sensor."""
+
+    number: Ints
+    least: Floats
+    per_sensor: Floats
+
+
+@inner_njit
+def _to_branch_on(
+    listed: Ints, members: Ints, cost: Floats, covered: NDArray[np.bool_], sensor: Ints, buffers: _Buffers
+) -> Any:
+    """The open row with the fewest columns among those listed, and a bound on what covering all open rows costs."""
+    number, least, per_sensor = buffers
+    num = covered.size
+    for i in range(num):
+        number[i] = 0
+        least[i] = np.inf
+    for t in range(1, listed[0] + 1):
+        e = listed[t]
+        for s in range(members.shape[1]):
+            i = members[e, s]
+            if i >= 0:
+                number[i] += 1
+                least[i] = min(least[i], cost[e])
+    for s in range(members.shape[1]):
+        per_sensor[s] = 0.0
+    fewest, row = 1 << 60, 0
+    for i in range(num):
+        if not covered[i]:
+            per_sensor[sensor[i]] += least[i]
+            if number[i] < fewest:
+                fewest, row = number[i], i
+    worst = 0.0
+    for s in range(members.shape[1]):
+        worst = max(worst, per_sensor[s])
+    return row, worst
+
+
+@inner_njit
+def _list_compatible(listed: Ints, longer: Ints, members: Ints, cost: Floats, chosen: int, room: float) -> None:
+    """List, of the columns in ``longer``, those that share no row with the chosen one and cost at most ``room``."""
+    count = 0
+    for t in range(1, longer[0] + 1):
+        f = longer[t]
+        if cost[f] > room:
+            break
+        apart = True
+        for s in range(members.shape[1]):
+            if members[f, s] >= 0 and members[f, s] == members[chosen, s]:
+                apart = False
+        if apart:
+            count += 1
+            listed[count] = f
+    listed[0] = count
+
+
+@inner_njit
+def _cover(members: Ints, e: int, covered: NDArray[np.bool_], value: bool) -> int:
+    """Mark the rows of a column; returns their number."""
+    count = 0
+    for s in range(members.shape[1]):
+        if members[e, s] >= 0:
+            covered[members[e, s]] = value
+            count += 1
+    return count
+
+
 @inner_njit
 def depth_first(
-    place: Ints, cost: Floats, current: NDArray[np.bool_], num: int, limits: Limits, lists: Ints, best: Ints
+    members: Ints, cost: Floats, current: NDArray[np.bool_], num: int, limits: Limits, lists: Ints, best: Ints
 ) -> Any:
-    """Choose columns that cover each of ``num`` places once, of total cost up to ``budget``.
+    """Choose columns that cover each of ``num`` rows once, of total cost up to ``budget``.
 
-    ``lists[0]`` has the columns in order of cost. A choice equal to the present one is skipped; after
-    any other only those better than the present by ``step`` count. Returns the cost (``inf``: none), the
-    number of columns in ``best``, and the nodes used (more than the limit: not searched to the end).
+    ``lists[0]`` has the number of columns, and these in order of cost. A choice equal to the present one is skipped;
+    after any other only those better than the present by ``step`` count. Returns the cost (``inf``: none), the number
+    of columns in ``best``, and the nodes used (more than the limit: not searched to the end).
     """
     budget, present, step, node_limit = limits
-    num_sensors = place.shape[1]
     depths = num + 1
-    size = np.zeros(depths, np.int64)
-    size[0] = lists[0, 0]
-    branch_place = np.zeros(depths, np.int64)
-    at = np.zeros(depths, np.int64)
-    spent = np.zeros(depths)
-    pick = np.zeros(depths, np.int64)
-    covered = np.zeros(num, np.bool_)
-    num_covered = 0
-    number = np.empty(num, np.int64)
-    least = np.empty(num)
+    branch_row, at = np.zeros(depths, np.int64), np.zeros(depths, np.int64)
+    spent, pick = np.zeros(depths), np.zeros(depths, np.int64)
+    covered, num_covered = np.zeros(num, np.bool_), 0
     sensor = np.zeros(num, np.int64)
-    per_sensor = np.zeros(num_sensors)
-    for t in range(1, size[0] + 1):
-        for s in range(num_sensors):
-            if place[lists[0, t], s] >= 0:
-                sensor[place[lists[0, t], s]] = s
+    buffers = _Buffers(np.empty(num, np.int64), np.empty(num), np.empty(members.shape[1]))
+    for t in range(1, lists[0, 0] + 1):
+        for s in range(members.shape[1]):
+            if members[lists[0, t], s] >= 0:
+                sensor[members[lists[0, t], s]] = s
     found, num_best, nodes = np.inf, 0, 0
     depth = 0
     fresh = True
@@ -221,73 +281,33 @@ def depth_first(
                     for d in range(depth):
                         best[d] = pick[d]
                     budget = min(found, present) - step
-                at[depth] = size[depth] + 1
+                at[depth] = lists[depth, 0] + 1
             else:
                 nodes += 1
                 if nodes > node_limit:
                     break
-                for i in range(num):
-                    number[i] = 0
-                    least[i] = np.inf
-                for t in range(1, size[depth] + 1):
-                    e = lists[depth, t]
-                    for s in range(num_sensors):
-                        i = place[e, s]
-                        if i >= 0:
-                            number[i] += 1
-                            least[i] = min(least[i], cost[e])
-                for s in range(num_sensors):
-                    per_sensor[s] = 0.0
-                fewest = 1 << 60
-                for i in range(num):
-                    if not covered[i]:
-                        per_sensor[sensor[i]] += least[i]
-                        if number[i] < fewest:
-                            fewest = number[i]
-                            branch_place[depth] = i
-                worst = 0.0
-                for s in range(num_sensors):
-                    worst = max(worst, per_sensor[s])
-                at[depth] = 1 if spent[depth] + worst <= budget else size[depth] + 1
-        # the next column that covers the place branched on
+                branch_row[depth], worst = _to_branch_on(lists[depth], members, cost, covered, sensor, buffers)
+                at[depth] = 1 if spent[depth] + worst <= budget else lists[depth, 0] + 1
+        # the next column that covers the row branched on
         e = -1
-        while at[depth] <= size[depth]:
+        while at[depth] <= lists[depth, 0]:
             f = lists[depth, at[depth]]
             at[depth] += 1
-            for s in range(num_sensors):
-                if place[f, s] == branch_place[depth]:
+            for s in range(members.shape[1]):
+                if members[f, s] == branch_row[depth]:
                     e = f
             if e >= 0:
                 break
         if e < 0 or spent[depth] + cost[e] > budget:
             depth -= 1
             if depth >= 0:
-                for s in range(num_sensors):
-                    if place[pick[depth], s] >= 0:
-                        covered[place[pick[depth], s]] = False
-                        num_covered -= 1
+                num_covered -= _cover(members, pick[depth], covered, False)
             continue
-        room = budget - spent[depth] - cost[e]
         pick[depth] = e
-        count = 0
-        for t in range(1, size[depth] + 1):
-            f = lists[depth, t]
-            if cost[f] > room:
-                break
-            apart = True
-            for s in range(num_sensors):
-                if place[f, s] >= 0 and place[f, s] == place[e, s]:
-                    apart = False
-            if apart:
-                count += 1
-                lists[depth + 1, count] = f
-        for s in range(num_sensors):
-            if place[e, s] >= 0:
-                covered[place[e, s]] = True
-                num_covered += 1
+        _list_compatible(lists[depth + 1], lists[depth], members, cost, e, budget - spent[depth] - cost[e])
+        num_covered += _cover(members, e, covered, True)
         spent[depth + 1] = spent[depth] + cost[e]
         depth += 1
-        size[depth] = count
         fresh = True
     return found, num_best, nodes
 
