@@ -19,13 +19,13 @@ from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
+from assoc.ranking.block_prices import LIGHTEST, ROUNDING
 from assoc.ranking.clusters import clusters_of, distinct, numbered
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
 from assoc.ranking.sampler import estimates
-from assoc.ranking.tuple_bounds import LIGHTEST, ROUNDING
 from assoc.ranking.tuple_sums import WIDEST, sums_and_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
@@ -139,9 +139,9 @@ def marginals(
     the least bound over several a.
 
     Two other ways do not weaken as scenes grow: clusters in which few measurements are open at a time are summed
-    (``ranking/sweep.py``, ``ranking/tuple_sums.py``); with dummies ``ranking/tuple_bounds.py`` bounds each tuple by a
-    recursion over the measurements near it, and with two sensors ``ranking/pairs/windows.py`` by sums around it. The
-    narrowest bound counts, and where these leave no width to speak of, nothing is listed.
+    (``ranking/sweep.py``, ``ranking/tuple_sums.py``); with dummies ``ranking/block_prices.py`` bounds each tuple by
+    sums over blocks of measurements whose surroundings are priced, and with two sensors ``ranking/pairs/windows.py``
+    by sums around it. The narrowest bound counts, and where these leave no width to speak of, nothing is listed.
     """
     checked_k(k)
     if method not in METHODS:
@@ -197,15 +197,15 @@ def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: i
 
 
 def _without_listing(
-    problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run, widest: int, recursion: bool
+    problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run, widest: int, bounds: bool
 ) -> Floats | None:
-    """Estimate and bounds of each distinct tuple, (3, T), by sums, windows or the recursion; None without time."""
+    """Estimate and bounds of each distinct tuple, (3, T), by sums, windows or blocks; None without time."""
     if run.should_stop():
         return None
     share = run.part(0, None if run.time_limit is None else 0.4 * run.time_limit)
     columns = price_all_columns(problem, share)
     two = len(problem.sizes) == 2 and problem.dummy
-    found = _of_two_lists(columns, problem.sizes, share) if two else sums_and_bounds(columns, share, widest, recursion)
+    found = _of_two_lists(columns, problem.sizes, share) if two else sums_and_bounds(columns, share, widest, bounds)
     # logarithms of weights are differences of costs, which may cancel
     counts = -columns.weights > LIGHTEST
     used = columns.rows[counts]

@@ -6,7 +6,7 @@ independent of all else, hence
 
     | P(t) - P(t among the tuples that remain) |  <=  P(any of D)  <=  sum over D of bounds on their probabilities,
 
-with the bounds of `assoc.ranking.tuple_bounds`.
+with the bounds of `assoc.ranking.block_prices`.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ import numpy as np
 
 from assoc._types import Array, Floats
 from assoc.packing.run import Run
+from assoc.ranking.block_prices import ROUNDING, block_bounds
 from assoc.ranking.columns import AllColumns
 from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
 from assoc.ranking.sweep import Graph
-from assoc.ranking.tuple_bounds import ROUNDING, tuple_bounds
 
 WIDEST = 22
 """Measurements that may be open at a time."""
 
 
-def sums_and_bounds(columns: AllColumns, run: Run, widest: int, recursion: bool) -> tuple[Floats, Floats, Floats]:
+def sums_and_bounds(columns: AllColumns, run: Run, widest: int, bounded: bool) -> tuple[Floats, Floats, Floats]:
     """Estimate and bound the probabilities of the N columns, and that of the R rows to be in none of them.
 
-    ``widest`` is the most measurements open at a time; where clusters are wider the ``recursion`` is used, or bounds
-    are 0 and 1.
+    ``widest`` is the most measurements open at a time; where clusters are wider they are ``bounded``, or bounds are 0
+    and 1.
     """
     num = len(columns.weights)
     graph = _graph(columns)
@@ -43,12 +43,11 @@ def sums_and_bounds(columns: AllColumns, run: Run, widest: int, recursion: bool)
     estimate, lower, upper = _summed(graph, plan, weights, free, run)
     wide = np.isnan(estimate)
     if wide.any():
-        found = tuple_bounds(columns, run) if recursion else None
-        if found is None:
+        if not bounded or not columns.slack.all():
             estimate[wide], lower[wide], upper[wide] = 0.5, 0.0, 1.0
             return estimate, lower, upper
-        estimate[wide] = found[0][wide]
-        lower[wide], upper[wide] = found[1][wide], found[2][wide]
+        found = block_bounds(columns, np.flatnonzero(wide[:num]), widest, run)
+        estimate[wide], lower[wide], upper[wide] = found[0][wide], found[1][wide], found[2][wide]
         if not run.should_stop():
             with np.errstate(divide="ignore"):
                 plan = plan_clusters(graph, np.log(upper[:num]), widest, True)
