@@ -41,7 +41,7 @@ def scheduler(tmp_path):
         "scheduler.log",
     )
     try:
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 300
         while not (tmp_path / "s.json").exists():
             assert process.poll() is None and time.monotonic() < deadline, (tmp_path / "scheduler.log").read_text()
             time.sleep(0.05)

@@ -176,7 +176,7 @@ def test_a_browser_that_reads_no_more_does_not_hold_up_the_end(scene, film):
     assert reader.full()
     end = threading.Thread(target=page.close, daemon=True)
     end.start()
-    end.join(20.0)
+    end.join(200.0)
     assert not end.is_alive()
     last = [reader.get_nowait() for _ in range(reader.qsize())][-2:]
     assert last[0].startswith("event: end") and last[1] is None
@@ -194,7 +194,7 @@ def test_only_this_machine_is_served(scene):
             ("/../server.py", "127.0.0.1", 404),
             ("/server.py", "127.0.0.1", 404),
         ]:
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
             connection.putrequest("GET", path, skip_host=True)
             connection.putheader("Host", host)
             connection.endheaders()
@@ -216,7 +216,7 @@ def test_connections_are_few_and_idle_ones_end(scene, monkeypatch):
     page = LivePage(scene)
     port = int(page.address.rsplit(":", 1)[1].strip("/"))
     try:
-        all_of_them = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(12)]
+        all_of_them = [socket.create_connection(("127.0.0.1", port), timeout=300) for _ in range(12)]
         assert [one.recv(1) for one in all_of_them[8:]] == [b""] * 4
         for one in all_of_them[:8]:
             one.setblocking(False)
@@ -230,9 +230,9 @@ def test_connections_are_few_and_idle_ones_end(scene, monkeypatch):
     page = LivePage(scene)
     port = int(page.address.rsplit(":", 1)[1].strip("/"))
     try:
-        with socket.create_connection(("127.0.0.1", port), timeout=30) as one:
+        with socket.create_connection(("127.0.0.1", port), timeout=300) as one:
             assert one.recv(1) == b""
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
         connection.request("GET", "/")
         assert connection.getresponse().status == 200
         connection.close()
@@ -251,7 +251,9 @@ def test_no_spinning_where_no_connection_is_to_be_had(scene, monkeypatch):
     page = LivePage(scene)
     try:
         with socket.create_connection(("127.0.0.1", int(page.address.rsplit(":", 1)[1].strip("/")))):
+            assert in_time(lambda: asked)
             time.sleep(1.0)
-        assert 0 < len(asked) < 10
+        # it rests a fifth of a second each time, on a busy machine longer
+        assert np.diff(asked[:10]).min(initial=1.0) > 0.15
     finally:
         page.close()

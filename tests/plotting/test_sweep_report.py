@@ -11,6 +11,7 @@ from assoc.sweeps import Study, grid, load, summarize
 from assoc.sweeps.sources import StudySource
 from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
+from tests.told import told
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def test_studies_without_maps_and_without_runs(tmp_path):
 def test_the_program_writes_it(folder, tmp_path):
     command = [sys.executable, "-W", "error", "-m", "assoc.sweep", "--summary", str(folder), "--report", "s.html"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
     assert len(data_of(tmp_path / "s.html")["settings"]) == 6
     command[-1] = str(tmp_path / "none" / "s.html")
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

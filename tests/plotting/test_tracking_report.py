@@ -13,6 +13,7 @@ from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
 from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
+from tests.told import told
 
 
 def tracks_of(scene):
@@ -112,7 +113,7 @@ def test_the_program_writes_it(tmp_path):
     words = ["scene.npz", "-o", "tracks.csv", "--report", "tracks.html"]
     command = [sys.executable, "-W", "error", "-m", "assoc.track", *words]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, told(done.stderr)) == (0, "")
     frame = pd.read_csv(tmp_path / "tracks.csv")
     data = data_of(tmp_path / "tracks.html")
     assert {one["id"] for one in data["tracks"]} == {*frame["track_id"]} and len(data["instants"]) == 6

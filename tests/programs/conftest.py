@@ -29,7 +29,9 @@ def here(name: str, *words: object, cwd: object = ".") -> subprocess.CompletedPr
 def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[str]:
     """Run ``python -W error -m words``."""
     command = [sys.executable, "-W", "error", "-m", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=cwd)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=cwd)
+    done.stderr = told(done.stderr)
+    return done
 
 
 @pytest.fixture(scope="session")

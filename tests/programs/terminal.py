@@ -26,7 +26,7 @@ def shown(
     )
     os.close(side)
     seen = _read(main)
-    status = process.wait(60)
+    status = process.wait(600)
     assert status == 0
     return seen
 
@@ -39,7 +39,7 @@ def shown_until(text: str, then: Callable[[], object], words: Sequence[object], 
     process = subprocess.Popen(command, stdout=side, stderr=side, env=environment, **options)
     os.close(side)
     seen = _read(main, text, then)
-    status = process.wait(60)
+    status = process.wait(600)
     assert status == 0, seen
     return seen
 

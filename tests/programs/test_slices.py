@@ -179,7 +179,7 @@ def test_a_real_cluster_gives_the_same_and_survives_losses(here, capsys, monkeyp
     with monkeypatch.context() as patch:
         at_first(patch, workers[0].kill)
         code, many, _ = run([*SLICED, "--scheduler", str(scheduler)], "many.csv", capsys)
-    assert code == 0 and workers[0].wait(10) == -signal.SIGKILL
+    assert code == 0 and workers[0].wait(100) == -signal.SIGKILL
     pd.testing.assert_frame_equal(many, one)
     scene = simulate("crowd", 1, targets=60, scans=40)
     scene.save("scene.npz")

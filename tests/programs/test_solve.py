@@ -244,7 +244,7 @@ class WaitingParameters(Parameters):
 def solve(packing, parameters, run):
     global scans
     scans += 1
-    until = time.monotonic() + 60
+    until = time.monotonic() + 600
     while scans > 2 and not Path("first-rows-seen").exists():
         assert time.monotonic() < until, "nobody saw the first rows"
         time.sleep(0.05)

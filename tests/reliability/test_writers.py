@@ -108,7 +108,7 @@ def test_links_pipes_and_modes(every, tmp_path):
         reader = threading.Thread(target=lambda got=got: got.append((tmp_path / "pipe").read_bytes()))
         reader.start()
         writer(tmp_path / "pipe")
-        reader.join(10)
+        reader.join(100)
         assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode), name
         assert len(got[0]) == len(written), name
     assert sorted(os.listdir(tmp_path)) == ["link", "pipe", "private"]

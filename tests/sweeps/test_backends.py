@@ -114,7 +114,7 @@ def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
             # once for the scatter, whatever the number of batches (one more where it is measured first)
             seen["packed"] = len(packed)
             workers[0].kill()
-            workers[0].wait(10)
+            workers[0].wait(100)
             seen["one lost"] = counts.new
         elif counts.new >= 80 and "all lost" not in seen:
             seen["left"] = workers[1].poll()
