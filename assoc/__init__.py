@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from assoc.scene.scene import Scene
     from assoc.solution import Solution
     from assoc.solvers.assign import assign
-    from assoc.solvers.warm_up import warm_up
+    from assoc.tracking.warm_up import warm_up
 
 __all__ = [
     "AssignmentProblem",
@@ -97,6 +97,6 @@ __getattr__, __dir__ = lazy_names(
         "solvers": "solvers",
         "sweeps": "sweeps",
         "tracking": "tracking",
-        "warm_up": "solvers.warm_up",
+        "warm_up": "tracking.warm_up",
     },
 )

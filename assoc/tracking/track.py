@@ -189,7 +189,7 @@ class Step(Decision):
         `assoc.tracking.LatePlots`.
     gap : float
         How far the score of the association may be from the best one's, relative, in the worst assignment problem of
-        the step; 0: all were proved to be best. First scans of thousands of targets are left with up to 0.001.
+        the step; 0: all were proved to be best. First scans of thousands of targets are left with about 0.001.
     """
 
     final: tuple[Decision, ...] = ()

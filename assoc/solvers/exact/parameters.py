@@ -21,8 +21,9 @@ class ExactParameters(Parameters):
         turns, and less often, down to every 30 turns, if they bring nothing. Smaller components are branched on
         alone for a hundred turns.
     gap : float
-        Relative gap, of a component's weight, at which the search of an open component of 2,000 measurements and more
-        ends, mostly before its linear program, whose work grows with the square of the measurements; 0: with the proof.
+        Relative gap, of a component's weight, at which open components of 2,000 measurements and more end. They get no
+        linear program, whose memory grows with the square of the measurements, and may be left with a wider gap. 0:
+        components are searched to the proof, whatever their size.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "largest number of nodes of branch and bound"})

@@ -15,7 +15,8 @@ from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_component
 from assoc.packing.components.turns import Turns
-from assoc.packing.neighbourhoods.cover import chosen_columns
+from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
+from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
@@ -56,10 +57,14 @@ class _Searches(Turns):
     def nodes_left(self) -> int:
         return self.node_limit - self.iterations
 
+    def may_keep_gap(self, component: Component) -> bool:
+        """Whether a component is so large that it gets no linear program where a gap is allowed."""
+        return self.gap > 0.0 and component.packing.num_rows >= _VAST and component.best is not None
+
     def good_enough(self, component: Component) -> bool:
-        """Whether a large component may keep its gap."""
+        """Whether a large component keeps its gap."""
         left = component.weight - max(component.bound, component.proven)
-        enough = component.packing.num_rows >= _VAST and left <= self.gap * abs(component.weight)
+        enough = self.may_keep_gap(component) and left <= self.gap * abs(component.weight)
         self.within_gap |= enough
         return enough
 
@@ -80,7 +85,7 @@ class _Task:
     def turn(self) -> bool:
         """One iteration of a metaheuristic, or some nodes of branch and bound and sometimes an iteration."""
         component = self.component
-        if self.all.good_enough(component):
+        if self.all.good_enough(component) or self.all.may_keep_gap(component):
             return True
         if not self.all.run.should_stop() and self.all.nodes_left > 0:
             if self._improves:
@@ -223,9 +228,16 @@ def _match(component: Component) -> bool:
 def _sharpen(component: Component, searches: _Searches) -> list[Component]:
     """Repeat the dual ascent, with enough time at every temperature, on a component that the reduction left open."""
     run = searches.run
-    if run.should_stop() or searches.good_enough(component):
+    if run.should_stop():
         # one pass over a million columns takes longer than a short time limit
         return [component]
+    if searches.may_keep_gap(component):
+        # mostly enough, and far quicker than a better bound
+        cover = Cover.of(component.packing, component.best_columns())
+        improve_dimensionwise(component.packing, cover.owner, run.deadline())
+        component.offer(cover.owner, cover.weight)
+        if searches.good_enough(component):
+            return [component]
     component.take_over(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():
         packing = component.packing
@@ -241,14 +253,14 @@ def _sharpen(component: Component, searches: _Searches) -> list[Component]:
 def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
     """Search a packing of small components, each for a moment."""
     run, nodes = searches.run, min(_SHORT * packing.num_components, searches.nodes_left)
-    found = search_to_the_end(packing, nodes, 0, run.part(run.rng, run.time_limit))
+    found = search_to_the_end(packing, nodes, 0, run.part(run.rng, run.time_limit), searches.gap)
     searches.iterations += found.iterations
     return found
 
 
 def _with_program(component: Component, searches: _Searches) -> list[Component]:
     """Adopt the multipliers of the linear program; the components that are left, or the component itself."""
-    if searches.good_enough(component):
+    if searches.may_keep_gap(component):
         return [component]
     if not component.closed and not searches.run.should_stop():
         component.sharpen(searches.run)

@@ -1,0 +1,77 @@
+"""Compile all kernels before the first scan: those of solvers, and those of trackers with their usual settings."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from assoc._system.door import door
+from assoc._system.interpreted import compiled_only
+from assoc.errors import AssocWarning
+from assoc.scene.scene import Scene
+from assoc.simulation import simulate
+from assoc.solvers import warm_up as of_solvers
+from assoc.tracking import TRACKERS
+from assoc.tracking.tracker import Tracker
+
+# many targets, and trackers that have kernels for these alone
+_CROWDS = {60: ("mht", "joint-probabilistic"), 250: ("multi-sensor",)}
+
+
+@door
+def warm_up(solvers: Iterable[str] | None = None) -> float:
+    """Compile the kernels of solvers and trackers, or load them, so that no later call has to.
+
+    Call it once after installation, when it takes a minute or two and uses two processes. Afterwards it takes some
+    seconds, and can be called at the start of a program with time limits. On a terminal it shows progress on stderr.
+
+    Parameters
+    ----------
+    solvers : iterable of str, optional
+        Names of solvers, for these alone; by default all but ``milp``, which compiles little itself, and trackers with
+        their usual settings.
+
+    Returns
+    -------
+    float
+        Seconds that the call took.
+
+    Raises
+    ------
+    InvalidInputError
+        A name is not that of a solver.
+    """
+    started = time.perf_counter()
+    of_solvers.warm_up(solvers)
+    if solvers is None:
+        with compiled_only(), warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssocWarning)
+            for scene in _scenes():
+                for kind in TRACKERS.values():
+                    for own_times in (False, True):
+                        follow(kind.for_scene(scene), scene, own_times)
+            for targets, names in _CROWDS.items():
+                scene = simulate("crowd", 5, targets=targets, scans=3, width=50.0 * targets)
+                for name in names:
+                    follow(TRACKERS[name].for_scene(scene), scene, False)
+    return time.perf_counter() - started
+
+
+def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:
+    """Give a tracker the scans of a scene, as of one instant or with times of their own."""
+    for when, z in zip(scene.times, scene.measurements, strict=True):
+        tracker.step(float(when), z, [np.full(len(one), when) for one in z] if own_times else None)
+
+
+def _scenes() -> list[Scene]:
+    """Few targets close together, seen by each kind of sensor; bearings alone, which begin tracks where they cross."""
+    few: dict[str, Any] = {"targets": 6, "scans": 5, "interval": 4.0, "width": 3_000.0}
+    return [
+        *(simulate("crowd", 1, sensor=sensor, **few) for sensor in ("position", "radar")),
+        simulate("three-radar", 1, scans=4),
+        simulate("bearing-only", 1, targets=4, scans=4),
+    ]
