@@ -12,24 +12,13 @@ from assoc.costs import positions_and_covariances, tuple_costs
 from assoc.costs.own_times import UNREST
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
-from assoc.sensors import BearingSensor, PositionSensor
+from assoc.sensors import BearingSensor
 from assoc.simulation import simulate
+from tests.tracking.plain import sensor
 
 SPEED, WIDE = 40.0, 1e5
 VIEW = np.array([[0.0, 5e3], [0.0, 5e3], [0.0, 5e3]])
-
-
-def position_sensor(sigma, P=0.8, rate=2.0):
-    return PositionSensor(
-        position=np.zeros(3),
-        noise=np.full(3, sigma),
-        detection_probability=P,
-        false_alarm_rate=rate,
-        field_of_view=VIEW,
-    )
-
-
-SENSORS = [position_sensor(20.0), position_sensor(30.0, 0.9, 1.0), position_sensor(10.0, 0.7)]
+SENSORS = [sensor(P, rate, sigma, VIEW) for P, rate, sigma in ((0.8, 2.0, 20.0), (0.9, 1.0, 30.0), (0.7, 2.0, 10.0))]
 
 
 def timed(seed):

@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -16,7 +15,7 @@ from assoc.plotting.report.views import thin
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from assoc.simulation import simulate
-from tests.told import told
+from tests.running import here
 
 EVIL = "<script>alert(1)</script>"
 
@@ -193,10 +192,8 @@ def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association,
     with pytest.raises(ImportError, match=r"python -m pip install 'assoc\[report\]'"):
         write_association_report(tmp_path / "out.html", association, scene)
     scene.save(tmp_path / "scene.npz")
-    code = "import sys; sys.modules['plotly'] = None\nfrom assoc import solve\nsys.exit(solve.main(sys.argv[1:]))"
-    words = [tmp_path / "scene.npz", "--report", tmp_path / "out.html", "--csv", tmp_path / "out.csv"]
-    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "") and told(done.stderr).count("\n") == 1
+    done = here("assoc.solve", "scene.npz", "--report", "out.html", "--csv", "out.csv", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
     assert "pip install 'assoc[report]'" in done.stderr
     assert not (tmp_path / "out.html").exists() and not (tmp_path / "out.csv").exists()
 
@@ -205,9 +202,8 @@ def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association,
 def test_the_program_writes_it(tmp_path, scene):
     scene.save(tmp_path / "scene.npz")
     words = ["scene.npz", "--solver", "greedy", "--scans", "2:5", "--report", "out.html"]
-    command = [sys.executable, "-W", "error", "-m", "assoc.solve", *words]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, told(done.stderr)) == (0, "")
+    done = here("assoc.solve", *words, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
     assert [scan["scan"] for scan in data_of(tmp_path / "out.html")["scans"]] == [2, 3, 4]
     assert "python -m assoc.solve " + " ".join(words) in " ".join(parsed(tmp_path / "out.html").text)
 

@@ -1,8 +1,5 @@
 """The report of a study: the figures are those of the runs, and it works in a browser."""
 
-import subprocess
-import sys
-
 import pytest
 
 from assoc.plotting.report import write_sweep_report
@@ -11,7 +8,7 @@ from assoc.sweeps import Study, grid, load, summarize
 from assoc.sweeps.sources import StudySource
 from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
-from tests.told import told
+from tests.running import here
 
 
 @pytest.fixture(scope="module")
@@ -75,12 +72,10 @@ def test_studies_without_maps_and_without_runs(tmp_path):
 
 @pytest.mark.slow
 def test_the_program_writes_it(folder, tmp_path):
-    command = [sys.executable, "-W", "error", "-m", "assoc.sweep", "--summary", str(folder), "--report", "s.html"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, told(done.stderr)) == (0, "")
+    done = here("assoc.sweep", "--summary", folder, "--report", "s.html", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
     assert len(data_of(tmp_path / "s.html")["settings"]) == 6
-    command[-1] = str(tmp_path / "none" / "s.html")
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    done = here("assoc.sweep", "--summary", folder, "--report", tmp_path / "none" / "s.html")
     assert (done.returncode, done.stdout) == (2, "") and "does not exist" in done.stderr
 
 

@@ -1,8 +1,5 @@
 """The report of a tracker: figures against plain readings of the table, and the page in a browser."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +10,7 @@ from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
 from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
-from tests.told import told
+from tests.running import here
 
 
 def tracks_of(scene):
@@ -111,9 +108,8 @@ def test_long_recordings_are_thinned(tmp_path):
 def test_the_program_writes_it(tmp_path):
     simulate("three-radar", 2, scans=6).save(tmp_path / "scene.npz")
     words = ["scene.npz", "-o", "tracks.csv", "--report", "tracks.html"]
-    command = [sys.executable, "-W", "error", "-m", "assoc.track", *words]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    assert (done.returncode, told(done.stderr)) == (0, "")
+    done = here("assoc.track", *words, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
     frame = pd.read_csv(tmp_path / "tracks.csv")
     data = data_of(tmp_path / "tracks.html")
     assert {one["id"] for one in data["tracks"]} == {*frame["track_id"]} and len(data["instants"]) == 6

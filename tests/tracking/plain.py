@@ -11,13 +11,13 @@ Q_SIGMA, SPEED, BIRTH = 2.0, 30.0, 0.3
 REGION = np.array([[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]])
 
 
-def sensor(P=0.8, rate=2.0, sigma=10.0):
+def sensor(P=0.8, rate=2.0, sigma=10.0, view=REGION):
     return PositionSensor(
         position=np.zeros(3),
         noise=np.full(3, sigma),
         detection_probability=P,
         false_alarm_rate=rate,
-        field_of_view=REGION,
+        field_of_view=view,
     )
 
 
