@@ -92,6 +92,7 @@ def test_planar_states():
         np.testing.assert_allclose(done.state.mean[b], mean, rtol=1e-9, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_runs_are_steps():
     rng = np.random.default_rng(4)
     state, ekf = random_state(3, rng), ExtendedKalmanFilter(MOTION)
