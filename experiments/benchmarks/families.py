@@ -112,13 +112,24 @@ def _planted(sensors: int) -> Callable[[int], Iterator[Instance]]:
     return lambda seed: iter([Instance(*synthetic.planted(sensors, seed))])
 
 
+def _wide_gates(targets: int) -> Callable[[int], Iterator[Instance]]:
+    return lambda seed: iter([Instance(synthetic.wide_gates(targets, seed))])
+
+
 def _entries(names: tuple[str, ...], limit: float) -> tuple[Entry, ...]:
     return tuple(Entry(name, limit) for name in names)
 
 
 def cases() -> list[Case]:
     """Return all cases, in the order of the report."""
-    return [*_paper_cases(), *_gated_cases(), *_ghost_cases(), *_wide_gap_cases(), *_synthetic_cases()]
+    return [
+        *_paper_cases(),
+        *_gated_cases(),
+        *_ghost_cases(),
+        *_wide_gap_cases(),
+        *_wide_gate_cases(),
+        *_synthetic_cases(),
+    ]
 
 
 def _paper_cases() -> Iterator[Case]:
@@ -169,6 +180,14 @@ def _wide_gap_cases() -> Iterator[Case]:
     for targets, seeds in WIDE_GAPS.items():
         brief = 5 if targets == 20 else 2
         yield Case("wide gap", str(targets), _ghost(targets), ours, peers, len(seeds), seeds, brief)
+
+
+def _wide_gate_cases() -> Iterator[Case]:
+    ours = (Entry("exact", 60.0), Entry("lagrangian", 10.0, stop_gap=1e-3), Entry("greedy", 10.0))
+    for targets in (1000, 2000, 3000):
+        yield Case(
+            "wide gates", str(targets), _wide_gates(targets), ours, _entries(("highs", "scip_1"), 120.0), brief=1
+        )
 
 
 def _synthetic_cases() -> Iterator[Case]:

@@ -93,7 +93,9 @@ def judge(rows: Iterable[Row]) -> list[Verdict]:
     """Return the verdict on every goal whose rows were measured."""
     results = Results(rows)
     verdicts: list[Verdict] = []
-    for rule in (_paper, _gated, _ghost, _wide_gap, _known_optimum, _random_axial, _planted, _scale, _kbest):
+    for rule in (
+        _paper, _gated, _ghost, _wide_gap, _wide_gates, _known_optimum, _random_axial, _planted, _scale, _kbest,
+    ):  # fmt: skip
         verdicts += rule(results)
     return verdicts
 
@@ -273,6 +275,16 @@ def _wide_gap(results: Results) -> list[Verdict]:
         text = f"proves {sum(row.status == 'optimal' for row in exact)} of {len(exact)}, {text}"
         verdicts.append(Verdict("wide gap", size, "exact: faster than SCIP and HiGHS", False, text, least > 1))
         verdicts.append(Verdict("wide gap", size, "exact: 10 times (median)", True, text, times >= 10))
+    return verdicts
+
+
+def _wide_gates(results: Results) -> list[Verdict]:
+    verdicts = []
+    for size in results.sizes("wide gates"):
+        exact = results.of("wide gates", size, "exact")
+        text, times, least = _ahead(results, exact, ("highs",))
+        goal = "exact: 3 times as fast as HiGHS, 5 in the median"
+        verdicts.append(Verdict("wide gates", size, goal, False, text, least >= 3 and times >= 5))
     return verdicts
 
 

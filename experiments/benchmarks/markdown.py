@@ -20,6 +20,8 @@ ABOUT = {
     "places without a target; number of targets.",
     "wide gap": "Scenes of family ghost whose linear program is about 1 % below the optimum (0.7 % or more): the first "
     "five such seeds from 2000 on.",
+    "wide gates": "Points in the plane seen by three sensors, with gates so wide that one component has nearly all "
+    "tuples; number of targets.",
     "known optimum": "Axial n x n x n with a known unique optimum (Grundel & Pardalos).",
     "random axial": "Axial n x n x n, integer costs uniform in 0..99.",
     "planted": "With dummies and a planted optimum, by number of sensors.",

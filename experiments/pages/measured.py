@@ -246,6 +246,15 @@ def scale_trackers() -> str:
     return table(["tracker, targets", "worst scan, s", "which", "median, s", "peak, MB", "tracked, %"], rows)
 
 
+def large_components() -> str:
+    """Problems that are one large component, beside HiGHS or scipy; bold where a goal is missed."""
+    r = Results("large_components")
+    kinds = dict.fromkeys(c.quantity.rpartition(": ")[0] for c in r.claims)
+    what = ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio")
+    rows = [[kind, *(_judged(r[q]) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
+    return table(["problems", *what], rows)
+
+
 def first_call() -> str:
     """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
     if not result_file("cold_start").exists():
@@ -427,6 +436,7 @@ TABLES = {
     "first-call": first_call,
     "linear-programs": linear_programs,
     "scan-time": scan_time,
+    "large-components": large_components,
     "scale-scans": scale_scans,
     "scale-trackers": scale_trackers,
     "ghost-rankings": ghost_rankings,

@@ -167,6 +167,9 @@ def _synthetic() -> list[Instance]:
         for seed in (1, 2):
             planted = lambda sensors=sensors, seed=seed: synthetic.planted(sensors, seed)[0]  # noqa: E731
             found.append(Instance(f"planted-{sensors}-{seed}", "planted", planted))
+    for targets, seed in ((100, 1), (100, 2), (300, 1), (300, 2), (1000, 1)):
+        wide = lambda targets=targets, seed=seed: synthetic.wide_gates(targets, seed)  # noqa: E731
+        found.append(Instance(f"wide-gates-{targets}-{seed}", "wide gates", wide))
     for seed in (1, 2, 3):
         found.append(Instance(f"near-ties-{seed}", "near ties", lambda seed=seed: near_ties(seed)))
     return found

@@ -100,6 +100,10 @@ def test_goals_of_wide_gaps_and_axial_problems() -> None:
     found = goals.judge([wide, scip, replace(scip, solver="cp_sat", seconds=0.1)])
     assert verdict(found, "exact: faster than SCIP").met and not verdict(found, "exact: 10 times").met
     assert not verdict(goals.judge([wide, replace(scip, seconds=0.4)]), "exact: faster than SCIP").met
+    gates = replace(wide, family="wide gates", size="1000")
+    for seconds, met in ((2.6, True), (2.4, False)):
+        found = goals.judge([gates, replace(gates, solver="highs", peer=True, seconds=seconds, cpu=seconds)])
+        assert verdict(found, "exact: 3 times as fast").met == met
     known = replace(ROW, family="known optimum", size="n=50")
     assert verdict(goals.judge([known]), "exact: proof in 20 s").met
     assert not verdict(goals.judge([known, replace(known, seed=1001, status="feasible")]), "exact: proof").met
