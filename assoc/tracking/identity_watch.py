@@ -119,7 +119,9 @@ class IdentityWatch:
 
     def _hear(self, track: int, sensor: str, time: float, column: int, number: int) -> None:
         voices = self._voices.setdefault((track, column), {})
-        voice = voices.setdefault(sensor, _Voice())
+        voice = voices.get(sensor)
+        if voice is None:
+            voice = voices[sensor] = _Voice()
         voice.run = voice.run + 1 if voice.said == number else 1
         voice.said = number
         if voice.settled != number:
@@ -131,6 +133,11 @@ class IdentityWatch:
             if old != UNKNOWN and column != _CODE:
                 text = f"track {track}: {self._named(column, old)} became {self._digits(column, number)} ({sensor})"
                 self._add(time, (track, old, number), text)
+        owners = self._owners.get((column, number), ())
+        if len(voices) == 1 and len(owners) == 1 and track in owners:
+            # nearly all: nobody else says it, or anything of this track
+            voice.before, voice.last = voice.last, time
+            return
         name = self._named(column, number)
         # codes whose last two octal digits are 0 are not of one aircraft
         shared = column == _CODE and number % self._base**2 == 0

@@ -83,13 +83,15 @@ class Qualities:
 
     def _rows(self, ids: Array) -> Array:
         """Rows of tracks (n,), which need not be known."""
-        if not np.isin(ids, self._ids).all():
+        rows = np.searchsorted(self._ids, ids)
+        if len(ids) and not (np.append(self._ids, -1)[rows] == ids).all():
             known = np.union1d(self._ids, ids)
-            rows = np.searchsorted(known, self._ids)
+            before = np.searchsorted(known, self._ids)
             hits, sums = np.zeros((len(known), self._hits.shape[1]), np.int64), np.zeros((len(known), 3))
-            hits[rows], sums[rows] = self._hits, self._sums
+            hits[before], sums[before] = self._hits, self._sums
             self._ids, self._hits, self._sums = known, hits, sums
-        return np.searchsorted(self._ids, ids)
+            rows = np.searchsorted(known, ids)
+        return np.asarray(rows)
 
     def keep(self, track_ids: Iterable[int]) -> None:
         """Forget all tracks but these."""
@@ -157,14 +159,17 @@ class Qualities:
         for own, name in (names or {}).items():
             named[known.track_id == own] = name
         order = np.argsort(named, kind="stable")
+        in_order = np.append(named[order], -1)
         found: list[tuple[Array, Array, Array]] = []
         stamps = scan.own_times()
         for s, (z, ids, sensor) in enumerate(zip(scan.measurements, step.assigned, settings.sensors, strict=True)):
-            number = np.flatnonzero(np.isin(ids, named))
+            # of two under one id the last; -1 stands before the first
+            place = np.searchsorted(in_order[:-1], ids, side="right") - 1
+            number = np.flatnonzero(in_order[place] == ids)
             # from a platform that moved since the scan began: the prediction would be seen from elsewhere
             if not len(number) or before.time is None or (scan.paths and scan.paths[s] is not None):
                 continue
-            rows = order[np.searchsorted(named, ids[number], side="right", sorter=order) - 1]
+            rows = order[place[number]]
             states = predict_each(settings.filter, known.states[rows], stamps[s][number] - before.time)
             expected = settings.filter.expected(states, sensor)
             off = sensor.residual(z[number], expected.mean)

@@ -126,15 +126,18 @@ class TrackColumns(NamedTuple):
     @property
     def status(self) -> Array:
         """`Track.status` of each, str (T,)."""
-        known = (self.missed > 0) & (self.missed < _LOST_AFTER) & (self.hits >= _KNOWN_AFTER)
-        lost = (self.existence < 0.5) & ~known
         unseen = (self.missed > 0) | (self.hidden != 0.0)
-        return np.select([~self.confirmed, lost, unseen], ["tentative", "lost", "coasting"], "confirmed")
+        return np.select([~self.confirmed, self._lost, unseen], ["tentative", "lost", "coasting"], "confirmed")
+
+    @property
+    def _lost(self) -> Array:
+        known = (self.missed > 0) & (self.missed < _LOST_AFTER) & (self.hits >= _KNOWN_AFTER)
+        return (self.existence < 0.5) & ~known
 
     @property
     def reported(self) -> Array:
         """`Track.reported` of each, bool (T,)."""
-        return np.isin(self.status, ("confirmed", "coasting"))
+        return self.confirmed & ~self._lost
 
     def rows(self, chosen: Array) -> TrackColumns:
         """Some of the tracks."""

@@ -186,6 +186,8 @@ class ConstantVelocity(LinearMotion):
         if kind not in ("discrete", "continuous"):
             raise InvalidInputError(f"kind must be 'discrete' or 'continuous', got {kind!r}")
         axes, unit, order = dimensions_of(dimensions), np.eye(dimensions), self.order
+        # coefficients of the powers of a time step
+        self._units = polynomial(order, 1.0), polynomial_noise(order, 1.0, self.sigma, kind)
         super().__init__(
             lambda dt: np.kron(polynomial(order, dt), unit),
             lambda dt: np.kron(polynomial_noise(order, dt, self.sigma, kind), unit),
@@ -203,8 +205,7 @@ class ConstantVelocity(LinearMotion):
         both = np.zeros((2, len(dt), order + 1, axes, order + 1, axes))
         # the diagonal of each block, which has a place for each axis
         F, Q = np.einsum("mkiaja->mkija", both)
-        # coefficients of the powers of the time step
-        unit_F, unit_Q = polynomial(order, 1.0), polynomial_noise(order, 1.0, self.sigma, self.kind)
+        unit_F, unit_Q = self._units
         for i in range(order + 1):
             for j in range(order + 1):
                 if self.kind == "discrete":
