@@ -3,10 +3,11 @@
 What a step does is counted, not timed.
 """
 
+import numpy as np
 import pytest
 
 from assoc import simulation
-from assoc.costs.tracks import tuples
+from assoc.costs.tracks import gating, tuples
 from assoc.filters import InteractingMultipleModel
 from assoc.tracking import TRACKERS
 
@@ -44,3 +45,31 @@ def test_states_are_corrected_for_what_is_kept(name, share, crowd, counted):
         tracker.step(crowd.times[k], crowd.measurements[k])
     assert counted["pairs"] > 500
     assert counted["corrected"] < share * counted["pairs"], counted
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pairs_near_each_other_are_those_of_all(seed):
+    """Gates of any width, angles among the components, tracks far outside."""
+    rng = np.random.default_rng(seed)
+    turning = np.array([seed % 4 == 1, seed % 4 > 1, seed % 4 == 3])
+    h, z = rng.uniform(-3.0, 3.0, (40, 3)) * rng.choice([0.1, 1.0, 1.5]), rng.uniform(-3.0, 3.0, (60, 3))
+    widths = rng.choice([1e-3, 0.3, 2.0, 1e6], (40, 3))
+    covariance = widths[:, :, None] ** 2 * np.eye(3)
+    off = np.abs(z - h[:, None])
+    off = np.where(turning, np.minimum(off % (2 * np.pi), 2 * np.pi - off % (2 * np.pi)), off)
+    near = np.argwhere((off <= 3.0 * widths[:, None]).all(axis=2))
+    tracks, found, _ = gating._sweep(h, covariance, z, turning, 9.0, 10**6)
+    np.testing.assert_array_equal(np.column_stack([tracks, found]), near)
+
+
+def test_few_pairs_are_looked_at_however_wide_the_area():
+    """Windows along one axis hold a share of all measurements that falls with the side, not with the area."""
+    looked = []
+    for count in (1_000, 16_000):
+        rng = np.random.default_rng(count)
+        places = rng.uniform(0.0, np.sqrt(count), (2, count, 2))
+        covariance = np.broadcast_to(np.eye(2), (count, 2, 2)).copy()
+        tracks, _, seen = gating._sweep(*places[:1], covariance, places[1], np.zeros(2, dtype=np.bool_), 4.0, 10**7)
+        assert len(tracks) > 10 * count
+        looked.append(seen / len(tracks))
+    assert looked[1] < 1.2 * looked[0] < 3.0

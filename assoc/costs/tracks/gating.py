@@ -1,4 +1,4 @@
-"""Coarse gates of tracks and measurements: sorted by one component, then boxes."""
+"""Coarse gates of tracks and measurements: strips of one component, sorted by another, then boxes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     # not compiled once more for arrays that are read only, as those of scenes are, or a part of larger ones
     covariance, z = (np.require(one, requirements=("C", "W")) for one in (expected.covariance, z))
-    tracks, found = _sweep(h, covariance, z, _turning(angular), gate, MOST_PAIRS)
+    tracks, found, _ = _sweep(h, covariance, z, _turning(angular), gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
         # ordered by track: extrapolated to those left
         expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
@@ -48,50 +48,103 @@ def _turning(angular: tuple[bool, ...]) -> Array:
 
 
 @njit
-def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, most: int) -> tuple[Array, Array]:
-    """Pairs whose components are all within reach, sorted by track; at most one more than ``most``."""
+def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, most: int) -> tuple[Array, Array, int]:
+    """Pairs whose components are all within reach, sorted by track; at most one more than ``most``.
+
+    The last number says how many pairs were looked at.
+    """
     num = h.shape[0]
     reach = _reach(covariance, gate)
-    axis = _axis(reach, z, turning)
-    low, high = np.zeros(num, np.int64), np.full(num, z.shape[0], np.int64)
-    most_within = num * z.shape[0]
-    order = np.arange(z.shape[0])
-    if axis >= 0:
-        order = np.argsort(z[:, axis], kind="mergesort")
-        along = z[order, axis]
-        most_within = 0
-        for t in range(num):
-            low[t] = np.searchsorted(along, h[t, axis] - reach[t, axis], side="left")
-            high[t] = np.searchsorted(along, h[t, axis] + reach[t, axis], side="right")
-            most_within += high[t] - low[t]
-    # in a wide gate there are many more than are within reach
-    tracks = np.empty(min(most_within, 64 + 8 * num), np.int64)
+    axis = _axis(reach, z, turning, -1)
+    across = _axis(reach, z, turning, axis) if axis >= 0 else -1
+    # strips across one axis, in each of them sorted along the other: along a single one, windows of a growing area
+    # hold ever more that is out of reach
+    begin, width, strips = _strips(reach, z, across)
+    order, first = _in_strips(z, axis, across, begin, width, strips)
+    along = z[order, max(axis, 0)]
+    tracks = np.empty(64 + 8 * num, np.int64)
     found = np.empty(tracks.size, np.int64)
-    count = 0
+    count = looked = 0
     for t in range(num):
-        first = count
-        for k in range(low[t], high[t]):
-            if _inside(h[t], z[order[k]], reach[t], turning):
-                if count == tracks.size:
-                    tracks, found = _doubled(tracks), _doubled(found)
-                tracks[count] = t
-                found[count] = order[k]
-                count += 1
-                if count > most:
-                    return tracks[:count].copy(), found[:count].copy()
+        before = count
+        low, high = 0, 0
+        if across >= 0:
+            low = _strip(h[t, across] - reach[t, across], begin, width, strips)
+            high = _strip(h[t, across] + reach[t, across], begin, width, strips)
+        for strip in range(low, high + 1):
+            start, end = first[strip], first[strip + 1]
+            if axis >= 0:
+                part = along[start:end]
+                end = start + np.searchsorted(part, h[t, axis] + reach[t, axis], side="right")
+                start += np.searchsorted(part, h[t, axis] - reach[t, axis], side="left")
+            looked += max(end - start, 0)
+            for k in range(start, end):
+                if _inside(h[t], z[order[k]], reach[t], turning):
+                    if count == tracks.size:
+                        tracks, found = _doubled(tracks), _doubled(found)
+                    tracks[count] = t
+                    found[count] = order[k]
+                    count += 1
+                    if count > most:
+                        return tracks[:count].copy(), found[:count].copy(), looked
         # number by number: assigning the slice would compile an error message about lengths
-        ordered = np.sort(found[first:count])
+        ordered = np.sort(found[before:count])
         for k in range(ordered.size):
-            found[first + k] = ordered[k]
-    return tracks[:count].copy(), found[:count].copy()
+            found[before + k] = ordered[k]
+    return tracks[:count].copy(), found[:count].copy(), looked
 
 
 @inner_njit
-def _axis(reach: Array, z: Array, turning: Array) -> int:
-    """The component in which a gate is the smallest share of all measurements; -1: all are angles, without order."""
+def _strips(reach: Array, z: Array, across: int) -> tuple[float, float, int]:
+    """Where strips begin, how wide they are (a usual gate), and how many there are."""
+    if across < 0:
+        return 0.0, 1.0, 1
+    begin, end = z[:, across].min(), z[:, across].max()
+    total = 0.0
+    for t in range(len(reach)):
+        total += reach[t, across]
+    # gates wider than usual pass through many strips: no more of them than there are measurements
+    width = max(2.0 * total / len(reach), (end - begin) / len(z), 1e-300)
+    return begin, width, max(1, min(len(z), int((end - begin) / width) + 1))
+
+
+@inner_njit
+def _strip(x: float, begin: float, width: float, strips: int) -> int:
+    """The strip of a place, or the nearest one."""
+    at = (x - begin) / width
+    if not at > 0.0:
+        return 0
+    return int(at) if at < strips - 1 else strips - 1
+
+
+@inner_njit
+def _in_strips(z: Array, axis: int, across: int, begin: float, width: float, strips: int) -> tuple[Array, Array]:
+    """Measurements strip by strip, each sorted along the axis, and where strips begin in this order."""
+    order = np.arange(z.shape[0])
+    if axis >= 0:
+        order = np.argsort(z[:, axis], kind="mergesort")
+    first = np.zeros(strips + 1, np.int64)
+    if across < 0:
+        first[1] = order.size
+        return order, first
+    for m in range(order.size):
+        first[_strip(z[m, across], begin, width, strips) + 1] += 1
+    for strip in range(strips):
+        first[strip + 1] += first[strip]
+    place, sorted_order = first.copy(), np.empty(order.size, np.int64)
+    for k in range(order.size):
+        strip = _strip(z[order[k], across], begin, width, strips)
+        sorted_order[place[strip]] = order[k]
+        place[strip] += 1
+    return sorted_order, first
+
+
+@inner_njit
+def _axis(reach: Array, z: Array, turning: Array, other: int) -> int:
+    """The component, not the other, in which a gate is the smallest share of all measurements; -1: all are angles."""
     axis, widest = -1, 0.0
     for i in range(z.shape[1]):
-        if not turning[i]:
+        if not turning[i] and i != other:
             total = 0.0
             for t in range(len(reach)):
                 total += reach[t, i]
@@ -167,7 +220,7 @@ def _near_both(
     rows = np.empty(64 + 2 * track.size, np.int64)
     found = np.empty(rows.size, np.int64)
     count = 0
-    axis = _axis(reach, z, turning) if track.size and len(z) else -1
+    axis = _axis(reach, z, turning, -1) if track.size and len(z) else -1
     order, along = near, np.empty(0)
     if axis >= 0:
         # those near a track in their order along the axis: the gate of a tuple is far narrower than the track's
