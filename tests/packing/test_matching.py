@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 import assoc
 from assoc.errors import InfeasibleError
@@ -160,3 +162,19 @@ def test_lists_that_cannot_be_matched():
     problem = assoc.AssignmentProblem([[1, 1], [2, 1], [3, 2], [3, 3]], [1.0, 1.0, 1.0, 1.0], (3, 3), dummy=False)
     with pytest.raises(InfeasibleError, match="no choice of tuples"):
         assoc.assign(problem)
+
+
+def test_many_rows_of_few_edges_like_scipy():
+    rng = np.random.default_rng(8)
+    count = 2500
+    other = np.concatenate([rng.integers(0, count, (count, 9)), rng.permutation(count)[:, None]], axis=1)
+    row, column = np.unique(np.stack([np.repeat(np.arange(count), 10), other.ravel()], axis=1), axis=0).T
+    costs = 0.1 + rng.random(row.size)
+    indptr = np.searchsorted(row, np.arange(count + 1))
+    assert row.size > 20_000
+    found = match(indptr, column, costs, np.full(count, np.inf), np.full(count, np.inf))
+    matrix = csr_array((costs, (row, column)), shape=(count, count))
+    chosen = min_weight_full_bipartite_matching(matrix)
+    assert found.cost == pytest.approx(matrix[chosen].sum(), rel=1e-12)
+    assert found.row_duals.sum() + found.column_duals.sum() == pytest.approx(found.cost, rel=1e-9)
+    assert (costs - found.row_duals[row] - found.column_duals[column]).min() > -1e-9

@@ -31,6 +31,8 @@ from assoc.packing.kernels.heap import doubled, pop, push
 
 # edges from which a dense problem is searched without a heap
 _MANY = 20_000
+# most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
+_STEPS, _CHEAP = 4, 256
 
 
 class Matching(NamedTuple):
@@ -149,9 +151,10 @@ def match_sparse(
                 num_pending += 1
     problem = _Costs(indptr, indices, costs, row_slack, base)
     state = _State(row_edge, u, v, owner, pending)
-    num_pending = _reduce_rows(problem, state, num_pending)
+    many = indices.size > _MANY
+    dense = many and 4 * indices.size > n * m
+    num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
     if num_pending > 0:
-        dense = indices.size > _MANY and 4 * indices.size > n * m
         if not (_augment_dense(problem, state, num_pending) if dense else _augment_all(problem, state, num_pending)):
             return np.inf
     total = 0.0
@@ -165,14 +168,14 @@ def match_sparse(
 
 
 @inner_njit
-def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
-    """Augmenting row reduction: each row takes its best column at the price of its second best.
+def _reduce_rows(problem: _Costs, state: _State, num_pending: int, most: int) -> int:
+    """Augmenting row reduction, with ``most`` steps a row: each row takes its best column at the second best's price.
 
     Returns how many rows are still pending.
     """
     indptr, indices, costs, row_slack, base = problem
     row_edge, u, v, owner, pending = state
-    steps = 4 * num_pending + 8
+    steps = most * num_pending + 8
     left = 0
     at = 0
     while at < num_pending:
