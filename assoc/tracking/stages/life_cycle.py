@@ -43,7 +43,7 @@ class LifeCycle:
         measurements are grouped), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
     deletion_time : float, optional
         Seconds. Default: the time for which an existing target is missed without a break with probability 1e-4,
-        at the usual pace of the scans, and at least three scans.
+        at the usual pace of the scans, and at least three scans; outside of the region none if it is probably gone.
     deletion_count : int
     deletion_drop : float
     lifetime : float

@@ -45,13 +45,13 @@ def count_out_of_view(progress: Progress) -> Progress:
     hidden = ~in_view(progress, states).any(axis=1)
     if not hidden.any():
         return progress
-    hidden &= _inside(settings, states)
+    hidden &= _inside(settings, states, 3)
     return progress.with_state(tracks=tracks.hidden_for(np.where(hidden, dt, 0.0)))
 
 
-def _inside(settings: TrackerSettings, states: Any) -> Array:
-    """Which tracks are inside the region, bool (T,)."""
-    region, axes = settings.place.region, len(settings.filter.motion.position)
+def _inside(settings: TrackerSettings, states: Any, most: int) -> Array:
+    """Which tracks are inside the region along the first axes, at most so many, bool (T,)."""
+    region, axes = settings.place.region, min(most, len(settings.filter.motion.position))
     where = places_of(settings.filter, states)[0][:, :axes]
     return np.asarray(((where >= region[:axes, 0]) & (where <= region[:axes, 1])).all(axis=1))
 
@@ -118,10 +118,15 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
         dark = np.flatnonzero(~share.any(axis=1))
         if len(dark):
             # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
-            share[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark]))[:, None]
+            share[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark], 3))[:, None]
         miss = log_missed(settings.terms.miss, share) * (state.turns / most)
         patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
     gone = tracks.to_delete(settings.life_cycle, time, patience)
+    if settings.life_cycle.deletion == "time" and settings.life_cycle.deletion_time is None:
+        # a missed target that has probably left the region is not waited for, nor shown; heights may be unknown
+        left = np.flatnonzero(tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0))
+        if len(left):
+            gone[left] |= ~_inside(settings, tracks.states[left], 2)
     # out of view for so long that nobody knows where it is
     hidden = np.flatnonzero(tracks.hidden > 0.0)
     if len(hidden):
