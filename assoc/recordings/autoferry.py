@@ -47,7 +47,7 @@ def read_autoferry(
     *,
     sensors: Mapping[str, Mapping[str, Any]] | tuple[str, ...] = tuple(SENSORS),
     extent: float = 25.0,
-    camera_interval: float = 1.0,
+    interval: float = 1.0,
 ) -> Scene:
     """Read a scenario as a scene: x east, y north, seconds from the first frame, sensors on the moving ferry.
 
@@ -59,11 +59,12 @@ def read_autoferry(
     detections, truth : path-like
         ``scenarioN_detections.json`` and ``scenarioN_groundTruth.json``.
     sensors : sequence of str, or mapping of str to mapping
-        Which of `SENSORS`; with values, what to change of their parameters.
+        Which of `SENSORS`; with values, what to change of their parameters. False alarms are as dense at another
+        reach, unless told.
     extent : float
         Detections at most so far apart, directly or through others, are one, metres: bow and stern of a ship.
-    camera_interval : float
-        Seconds from one frame of a camera to its next that is taken: errors and misses of frames in quick succession
+    interval : float
+        Seconds from one frame of a sensor to its next that is taken: errors and misses of frames in quick succession
         are the same ones over and over, and a tracker takes them for new evidence.
 
     Raises
@@ -76,6 +77,7 @@ def read_autoferry(
         if name not in SENSORS:
             raise InvalidInputError(f"sensors: unknown name {name!r}; known: {', '.join(SENSORS)}")
     positive(extent, "extent")
+    positive(interval, "interval", zero=True)
     frames = [_frame(detections, k, frame) for k, frame in enumerate(_listed(detections))]
     boats = None if truth is None else _listed(truth)
     if boats is not None and len(boats) != len(frames):
@@ -86,13 +88,13 @@ def read_autoferry(
     start, own = frames[order[0]][0], {frames[k][0]: frames[k][2] for k in order}
     platform = Platform(np.array([*own]) - start, np.array([*own.values()]))
     number = {SENSORS[name][0]: s for s, name in enumerate(given)}
-    placed = [_sensor(name, {**SENSORS[name][1], **changes}, platform) for name, changes in given.items()]
+    placed = [_sensor(name, changes, platform) for name, changes in given.items()]
     last = np.full(len(placed), -math.inf)
     times, scans, sectors, ids, places = [], [], [], [], []
     for k in order:
         time, code, _, z = frames[k]
         s = number.get(code)
-        if s is None or (placed[s].dim == 1 and time - last[s] < camera_interval):
+        if s is None or time - last[s] < interval:
             continue
         last[s] = time
         found = z if placed[s].dim == 1 else merged(z[placed[s].in_view(z)], extent)
@@ -153,10 +155,14 @@ def _boat(path: Any, k: int, boat: Any) -> tuple[int, list[float]]:
         ) from None
 
 
-def _sensor(name: str, parameters: dict[str, Any], platform: Platform) -> Sensor:
+def _sensor(name: str, changes: Mapping[str, Any], platform: Platform) -> Sensor:
+    usual = SENSORS[name][1]
+    parameters = {**usual, **changes}
     reach = parameters.pop("reach", None)
     if reach is None:
         return BearingSensor(name=name, position=np.zeros(3), platform=platform, **parameters)
+    if "false_alarm_rate" not in changes:
+        parameters["false_alarm_rate"] *= (reach / usual["reach"]) ** 2
     view = np.array([[-reach, reach], [-reach, reach]])
     return PositionSensor(name=name, position=np.zeros(3), field_of_view=view, platform=platform, **parameters)
 

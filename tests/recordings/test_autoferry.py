@@ -88,6 +88,14 @@ def test_bad_files_name_the_frame(tmp_path, content, message):
         read_autoferry(path)
 
 
+def test_false_alarms_are_as_dense_at_another_reach(tmp_path):
+    far, near = (
+        read_autoferry(*write(tmp_path), sensors={"radar": {"reach": reach}}).sensors[0] for reach in (600.0, 300.0)
+    )
+    assert far.false_alarm_rate / far.volume == pytest.approx(near.false_alarm_rate / near.volume)
+    assert far.volume == pytest.approx(4 * near.volume)
+
+
 def test_truth_of_other_frames_and_unknown_sensors(tmp_path):
     paths = write(tmp_path, boats=BOATS * 2)
     with pytest.raises(InvalidInputError, match="has 2 frames, the detections 6"):
