@@ -27,7 +27,7 @@ TARGETS = {
     "nearest-neighbour": (1_000, 3_000, 10_000),
     "multi-sensor": (1_000, 3_000, 10_000),
     "joint-probabilistic": (1_000, 3_000, 10_000),
-    "mht": (1_000, 3_000),
+    "mht": (1_000, 3_000, 10_000),
 }
 SCANS, LONG = 12, 10_000
 """Scans of a tracker; fewer of them where there are so many targets."""
