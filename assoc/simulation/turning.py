@@ -37,10 +37,10 @@ class Path(NamedTuple):
         return found[:, :3], found[:, 3:]
 
 
-def parse_turns(text: str, radars: int | None = None) -> list[float]:
-    """Seconds for a turn of each radar, from a text with commas; refused if not as many as there are radars."""
+def parse_turns(text: str | float, radars: int | None = None) -> list[float]:
+    """Seconds for a turn of each radar, from a text with commas or one number; as many as there are radars."""
     try:
-        turns = [float(part) for part in text.split(",")]
+        turns = [float(part) for part in str(text).split(",")]
     except ValueError:
         turns = []
     if not turns or not all(0.0 < turn < math.inf for turn in turns):

@@ -73,6 +73,15 @@ def test_false_alarms_are_as_many_a_turn_as_the_sensor_says(scene, s):
     assert scene.sensors[s].in_view(z[sources < 0]).all()
 
 
+def test_one_radar_may_be_given_its_turn_as_a_number():
+    made, same = (simulate("rotating-radars", 1, turns=turns, duration=20.0) for turns in (4, "4"))
+    assert len(made.sensors) == 1
+    for one, other in zip(made.measurements, same.measurements, strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+    with pytest.raises(InvalidInputError, match="turns: expected seconds for a turn of each radar"):
+        simulate("rotating-radars", 1, turns=[4, 5])
+
+
 def test_recorded_traffic_under_turning_radars(tmp_path):
     file = tmp_path / "tracks.csv"
     rows = [f"{1.6e9 + t},a,48.{t:03d},2.5,9000" for t in range(0, 100, 5)]

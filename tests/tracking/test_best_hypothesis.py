@@ -56,9 +56,11 @@ def test_prices_that_say_nothing_change_nothing_but_the_work(seed):
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 
 
-def test_when_the_work_is_too_much_a_hypothesis_is_found_and_its_branches_are_named():
-    tree, score, history = branches(1, trees=12, measurements=9)
-    chosen, doubtful, _ = choose(score, history, priced(tree, score, history), 20)
+@pytest.mark.parametrize("visits", [20, 92])
+def test_when_the_work_is_too_much_a_hypothesis_is_found_and_its_branches_are_named(visits):
+    """Below 12 * 11 / 2 visits there is one descent; above, the search is broken off."""
+    tree, score, history = branches(3, trees=12, measurements=9)
+    chosen, doubtful, _ = choose(score, history, priced(tree, score, history), visits)
     assert chosen.any()
     assert doubtful.any()
     assert (score[doubtful] > 0).all()
