@@ -22,11 +22,11 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
+from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
-from assoc.tracking.identity_watch import IdentityWatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_time
 from assoc.tracking.stages.identity_evidence import IdentityParameters, checked_identities

@@ -10,7 +10,7 @@ from assoc import live
 from assoc.scene import Scene
 from assoc.sensors import PositionSensor
 from assoc.tracking import TRACKERS
-from assoc.tracking.identity_watch import MOST, IdentityWatch
+from assoc.tracking.adapting.identity_watch import MOST, IdentityWatch
 
 A, B, C = 0x3C6444, 0x4B1A22, 0x400001
 

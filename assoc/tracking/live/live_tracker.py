@@ -21,7 +21,7 @@ from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.arrays import LARGEST
-from assoc.tracking.identity_watch import IdentityWatch
+from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
