@@ -66,7 +66,8 @@ KINDS: dict[str, tuple[Callable[[int], AssignmentProblem], float, float]] = {
 """What makes a problem from a seed, the mean width that is the goal, and the seconds."""
 
 
-def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+def timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    """Answer and processor time of this thread."""
     begin = time.thread_time()
     answer = call()
     return answer, time.thread_time() - begin
@@ -77,12 +78,12 @@ def widths(name: str, seeds: Sequence[int]) -> list[Claim]:
     make, goal, limit = KINDS[name]
     mean, seconds, taken, apart, furthest = [], [], [], [], []
     for seed in seeds:
-        found, spent = _timed(lambda seed=seed: assoc.marginals(make(seed), method="certified", time_limit=_CLOCK))
+        found, spent = timed(lambda seed=seed: assoc.marginals(make(seed), method="certified", time_limit=_CLOCK))
         mean.append(float((found.upper - found.lower).mean()))
         seconds.append(spent)
         if name.startswith("two"):
             continue
-        found, spent = _timed(lambda seed=seed: assoc.marginals(make(seed), method="estimate"))
+        found, spent = timed(lambda seed=seed: assoc.marginals(make(seed), method="estimate"))
         taken.append(spent)
         if seed == seeds[0]:
             away = np.abs(found.probability - _long(make(seed), found))

@@ -199,6 +199,17 @@ def probabilities() -> str:
     return table(["", *what], rows)
 
 
+def probabilities_beside() -> str:
+    """Errors and times of ways to probabilities, beside exact sums."""
+    r = Results("probabilities_beside")
+    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": problems summed exactly")]
+    ways = [c.quantity.split(": ")[0].split(", ", 1) for c in r.claims if c.quantity.endswith(": mean error")]
+    what = ("mean error", "largest error", "seconds")
+    rows = [[kind, way, *(number(r[f"{kind}, {way}: {one}"].ours, 2) for one in what)]
+            for kind in kinds for of, way in ways if of == kind]  # fmt: skip
+    return table(["", "", *what], rows)
+
+
 def linear_programs() -> str:
     """Times of our simplex method, and ratios of HiGHS's to them."""
     r = Results("linear_programs")
@@ -441,6 +452,7 @@ TABLES = {
     "scale-trackers": scale_trackers,
     "ghost-rankings": ghost_rankings,
     "probabilities": probabilities,
+    "probabilities-beside": probabilities_beside,
     "sizes": sizes,
     "extras": extras,
     "prior": prior,

@@ -1,8 +1,10 @@
 """What the page on probabilities shows, and that sampled ones are compared with exact sums."""
 
+import numpy as np
 import pytest
 
-from experiments import probabilities
+import assoc
+from experiments import probabilities, probabilities_beside
 from experiments.common.results import Results
 from experiments.pages.measured import probabilities as table
 
@@ -21,3 +23,17 @@ def test_small_crowds_are_summed_exactly():
     claims = {claim.quantity: claim.ours for claim in probabilities.calibration(3)}
     assert claims["small crowds: summed exactly"] >= 1
     assert claims["small crowds: sampled, mean error"] < 0.01
+
+
+@pytest.mark.slow
+def test_all_ways_are_near_the_exact_sums_of_a_small_problem():
+    # 209 solutions, all of them among the best
+    pairs = np.array(list(np.ndindex(4, 4))) + 1
+    problem = assoc.AssignmentProblem(pairs, np.random.default_rng(1).normal(-0.5, 1.0, 16), (4, 4))
+    truth = dict(zip(map(tuple, (found := assoc.marginals(problem)).tuples.tolist()), found.probability, strict=True))
+    assert found.unseen < 1e-9
+    for way, call in probabilities_beside.WAYS.items():
+        answer = call(problem, 0)
+        errors = [abs(answer.get(key, 0.0) - p) for key, p in truth.items() if all(key)]
+        # belief propagation is exact on trees alone
+        assert max(errors) < (0.2 if way == "loopy belief propagation" else 0.01), way
