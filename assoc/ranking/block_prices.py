@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.run import Run
@@ -104,14 +105,14 @@ def block_bounds(columns: AllColumns, which: Ints, widest: int, run: Run) -> tup
     share, free = _mean_field(cols, np.exp(np.maximum(log_weight, LIGHTEST)), rows)
     estimate[where] = np.append(share, free[touched])
     least, most = np.zeros(len(which) + rows), np.ones(len(which) + rows)
-    _bound_alone(graph, most)
+    _bound_alone(graph, _LARGEST[-1], run.deadline(), most)
     for largest in sorted({min(size, widest) for size in _LARGEST} - {0}):
         if run.should_stop():
             break
         label = _split(cols, share, rows, largest)[touched]
         order = touched[np.argsort(label, kind="stable")]
         ptr = np.append(0, np.cumsum(np.unique(label, return_counts=True)[1]))
-        _bound_blocks(graph, order, ptr, np.maximum(-columns.duals, 0.0), least, most)
+        _bound_blocks(graph, order, ptr, np.maximum(-columns.duals, 0.0), run.deadline(), least, most)
     known = np.append(np.arange(len(which)), len(which) + touched)
     lower[where], upper[where] = np.maximum(least[known] - ROUNDING, 0.0), np.minimum(most[known] + ROUNDING, 1.0)
     return np.clip(estimate, lower, upper), lower, upper
@@ -170,28 +171,37 @@ def _split(cols: NDArray[np.int32], share: Floats, rows: int, largest: int) -> I
 
 
 @njit
-def _bound_alone(graph: _Graph, upper: Floats) -> None:
-    """Narrow the upper bound of each column by the sum over its own rows."""
-    most = 0
+def _bound_alone(graph: _Graph, widest: int, deadline: float, upper: Floats) -> None:
+    """Narrow the upper bound of each column of at most so many rows by the sum over these rows."""
+    most = rows = 0
     for j in range(graph.log_weight.size):
-        count = 0
+        count = size = 0
         for r in graph.cols[j]:
-            count += graph.row_ptr[r + 1] - graph.row_ptr[r] if r >= 0 else 0
-        most = max(most, count)
-    tables = _new_tables(graph.cols.shape[1], most)
+            if r >= 0:
+                count += graph.row_ptr[r + 1] - graph.row_ptr[r]
+                size += 1
+        if size <= widest:
+            most, rows = max(most, count), max(rows, size)
+    tables = _new_tables(rows, most)
     own, prices = np.empty(graph.cols.shape[1], np.int64), np.full(graph.place.size, np.inf)
     for j in range(graph.log_weight.size):
+        if is_over(deadline):
+            return
         count = 0
         for r in graph.cols[j]:
             if r >= 0:
                 own[count] = r
                 count += 1
+        if count > widest:
+            continue
         _summed(graph, own[:count], prices, tables)
         upper[j] = min(upper[j], np.exp(graph.log_weight[j]) / tables.inside[(1 << count) - 1])
 
 
 @njit
-def _bound_blocks(graph: _Graph, rows: Ints, ptr: Ints, prices: Floats, lower: Floats, upper: Floats) -> bool:
+def _bound_blocks(
+    graph: _Graph, rows: Ints, ptr: Ints, prices: Floats, deadline: float, lower: Floats, upper: Floats
+) -> bool:
     """Make prices valid for these blocks and narrow the bounds with them; False where they do not become so."""
     widest = entries = 0
     for b in range(ptr.size - 1):
@@ -206,6 +216,8 @@ def _bound_blocks(graph: _Graph, rows: Ints, ptr: Ints, prices: Floats, lower: F
         # a pass without a change has seen all blocks at these prices
         valid = True
         for b in range(ptr.size - 1):
+            if is_over(deadline):
+                return False
             own = rows[ptr[b] : ptr[b + 1]]
             _summed(graph, own, prices, tables)
             _limited(own.size, tables)
@@ -252,10 +264,11 @@ def _summed(graph: _Graph, own: Ints, prices: Floats, tables: _Tables) -> None:
                 elif r >= 0:
                     outside += prices[r]
                     crosses = True
-            if first:
+            weight = np.exp(graph.log_weight[j] - outside)
+            # one that underflows adds nothing that counts, and would make no number of a sum that has overflowed
+            if first and weight > 0.0:
                 tables.column[count], tables.bits[count] = j, bits
-                tables.weight[count] = np.exp(graph.log_weight[j] - outside)
-                tables.own[count] = 0.0 if crosses else tables.weight[count]
+                tables.weight[count], tables.own[count] = weight, 0.0 if crosses else weight
                 count += 1
     tables.ptr[own.size] = count
     for r in own:
@@ -341,7 +354,7 @@ def _narrowed(graph: _Graph, own: Ints, tables: _Tables, lower: Floats, upper: F
     """Narrow the bounds of the columns and rows of a block by (3)."""
     full = (1 << own.size) - 1
     inside, relaxed = tables.inside[full], tables.relaxed[full]
-    if relaxed == np.inf:
+    if not relaxed < np.inf:
         return
     for x in range(own.size + tables.ptr[own.size]):
         if x < own.size:

@@ -69,3 +69,37 @@ def test_weights_beyond_floats_leave_everything_open(cost):
     columns = price_all_columns(problem, Run(0))
     _, lower, upper = block_bounds(columns, np.arange(3), 14, Run(0))
     assert (lower <= upper).all() and (cost > 0.0 or (upper[:3] == 1.0).all())
+
+
+@pytest.mark.parametrize("n", [6, 10])
+def test_weights_that_vanish_beside_sums_that_overflow(n):
+    """All triples weigh as much as each other, so each is true with probability 1 / n^2; the pairs weigh nothing."""
+    triples = np.array(list(np.ndindex(n, n, n))) + 1
+    pairs = np.unique(triples * [1, 1, 0], axis=0)
+    costs = np.repeat([-89.0, 2_000.0], [len(triples), len(pairs)])
+    columns = price_all_columns(AssignmentProblem(np.concatenate([triples, pairs]), costs, (n, n, n)), Run(0))
+    num = len(costs)
+    _, lower, upper = block_bounds(columns, np.arange(num), 14, Run(0))
+    truth = np.where(columns.weights < 0.0, n**-2.0, 0.0)
+    assert (lower[:num] <= truth + 1e-9).all() and (truth <= upper[:num] + 1e-9).all()
+    # no measurement is a false alarm
+    assert (lower[num:] <= 1e-9).all()
+
+
+def test_tuples_of_many_sensors_need_no_tables_of_all_sensors():
+    rng = np.random.default_rng(0)
+    tuples = np.zeros((60, 40), dtype=int)
+    for row in tuples:
+        row[rng.choice(40, 3, replace=False)] = rng.integers(1, 5, 3)
+    tuples[0] = 1
+    columns = price_all_columns(AssignmentProblem(tuples, rng.normal(-6.0, 1.0, 60), [4] * 40), Run(0))
+    _, lower, upper = block_bounds(columns, np.arange(len(columns.weights)), 14, Run(0))
+    assert (lower <= upper).all() and (upper[: len(columns.weights)] < 1.0).any()
+
+
+def test_without_time_left_nothing_is_narrowed():
+    problem = assoc.build_problem(scenes.gated(4, 60, 5), 0)
+    columns = price_all_columns(problem, Run(0))
+    run = Run(0, time_limit=1e-9)
+    _, lower, upper = block_bounds(columns, np.arange(len(columns.weights)), 14, run)
+    assert (lower == 0.0).all() and (upper == 1.0).all()
