@@ -57,17 +57,19 @@ def close_by_regions(component: Component, solve: Solve) -> NDArray[np.bool_] | 
     """
     packing, searched = component.packing, None
     inside = _costly(component, component.weight - component.bound)
+    before = -1
     for _ in range(_ROUNDS):
         _complete(component, inside)
-        if np.count_nonzero(inside) > _MOST * packing.num_rows:
+        rows = np.count_nonzero(inside)
+        if rows > _MOST * packing.num_rows or rows == before:
             break
-        weight = component.weight
+        before, weight = rows, component.weight
         searched = _search(component, inside, solve)
         component.proven = max(component.proven, min(searched.bound, weight))
         if component.closed or searched.hard:
             break
         if not searched.reaching.size:
-            inside |= _costly(component, weight - searched.bound)
+            inside |= _costly(component, component.weight - searched.bound)
         inside[packing.cols[searched.reaching]] = True
     if searched is None:
         return None

@@ -51,7 +51,8 @@ class _Searches(Turns):
     patience: int
     gap: float = 0.0
     out_of_memory: bool = False
-    within_gap: bool = False
+    with_gap: bool = False
+    """Whether a component was left open because it may keep a gap."""
 
     @property
     def nodes_left(self) -> int:
@@ -65,7 +66,7 @@ class _Searches(Turns):
         """Whether a large component keeps its gap."""
         left = component.weight - max(component.bound, component.proven)
         enough = self.may_keep_gap(component) and left <= self.gap * abs(component.weight)
-        self.within_gap |= enough
+        self.with_gap |= enough and not component.closed
         return enough
 
 
@@ -85,7 +86,8 @@ class _Task:
     def turn(self) -> bool:
         """One iteration of a metaheuristic, or some nodes of branch and bound and sometimes an iteration."""
         component = self.component
-        if self.all.good_enough(component) or self.all.may_keep_gap(component):
+        if self.all.may_keep_gap(component):
+            self.all.with_gap |= not component.closed
             return True
         if not self.all.run.should_stop() and self.all.nodes_left > 0:
             if self._improves:
@@ -117,7 +119,9 @@ class _Task:
     def branch_shortly(self) -> bool:
         """Branch at once; returns whether that closed it: small components mostly close before a better bound would."""
         component, nodes = self.component, min(_SHORT, self.all.nodes_left)
-        if _match(component) or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
+        if _match(component) or component.packing.num_columns > _SMALL or self.all.may_keep_gap(component):
+            return component.closed
+        if nodes <= 0 or self.all.run.should_stop():
             return component.closed
         self.branching = Branching(component, self.all.run, to_the_end=False)
         return self._branch(self.branching, nodes) or component.closed
@@ -196,7 +200,7 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     cut_off = searches.out_of_memory or searches.nodes_left <= 0
     if cut_off and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if searches.out_of_memory else "iterations"
-    if searches.within_gap and not run.stopped_by:
+    if searches.with_gap and not run.stopped_by:
         run.stopped_by = "gap"
     return searches.outcome(None if components else reduction.proof)
 
