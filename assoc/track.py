@@ -307,6 +307,8 @@ def _in_slices(given: Given, tracker: Tracker, windows: Windows, stored: StoredP
             sizes += part.sizes.tolist()
         table.finish()
         missing = slices.missing()
+    # ids begin again in each slice, and other processes watched theirs
+    tracker.identity_watch.found.clear()
     times = np.concatenate([np.zeros(0), *ends])
     return table, Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
 

@@ -88,12 +88,16 @@ def parallel_map(
                 asked += 1
             if given == asked:
                 return
-            busy = False
+            busy, interrupted = False, None
             if here:
                 with suppress(queue.Empty):
                     number, item = questions.get_nowait()  # type: ignore[misc]
-                    arrived[number if ordered else given + len(arrived)] = _tried(task, item)
                     busy = True
+                    try:
+                        arrived[number if ordered else given + len(arrived)] = _tried(task, item)
+                    except KeyboardInterrupt as error:
+                        # what the others have done meanwhile is handed on first
+                        interrupted = error
             with suppress(queue.Empty):
                 while True:
                     number, value, failed = answers.get(timeout=0.0 if busy else _POLL)
@@ -105,6 +109,8 @@ def parallel_map(
                 if failed:
                     raise value
                 yield value
+            if interrupted is not None:
+                raise interrupted
     finally:
         # after an interruption or an error, nobody needs what they still do
         ended.append(True)

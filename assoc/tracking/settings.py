@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import is_number, is_whole
+from assoc._types import Array
 from assoc.costs.tracks.scores import ScoreTerms, score_terms
 from assoc.costs.views import Views
 from assoc.errors import InvalidInputError
@@ -99,7 +100,13 @@ class TrackerSettings:
     @cached_property
     def angles_alone(self) -> bool:
         """Whether no sensor measures distances, so that none starts a track alone."""
-        return all(isinstance(sensor, BearingSensor) or all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
+        return not self.ranging.any()
+
+    @cached_property
+    def ranging(self) -> Array:
+        """Whether each sensor measures distances or positions, bool (S,)."""
+        angles = [isinstance(sensor, BearingSensor) or all(sensor.angular[: sensor.dim]) for sensor in self.sensors]
+        return ~np.array(angles, dtype=np.bool_)
 
     @cached_property
     def height(self) -> LinearMeasurement | None:

@@ -203,13 +203,13 @@ class TrackBatch:
         """The tracks as columns."""
         motion, count = filter.motion, len(self)
         position, velocity = np.zeros((count, 3)), np.zeros((count, 3))
-        mean = self.states.mean
+        mean = self.states.mean.copy()
         position[:, : len(motion.position)] = mean[:, list(motion.position)]
         places = velocity_components(motion)
         velocity[:, : len(places)] = mean[:, places]
-        values = {name: getattr(self, name) for name in _HANDED_OUT}
+        values = {name: getattr(self, name).copy() for name in _HANDED_OUT}
         values["existence"] = 1.0 / (1.0 + np.exp(np.clip(-self.existence, -500.0, 500.0)))
-        states = {"mean": mean, "covariance": self.states.covariance, "position": position, "velocity": velocity}
+        states = {"mean": mean, "covariance": self.states.covariance.copy(), "position": position, "velocity": velocity}
         return TrackColumns(time=np.full(count, time), **states, **values)
 
     def tracks(self, filter: Filter[Any], time: float) -> list[Track]:

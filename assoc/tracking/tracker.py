@@ -308,6 +308,7 @@ class Tracker:
             version. The tracker is then as it was.
         """
         self.state = file.restore(path, self.settings, self.state)
+        self.identity_watch = IdentityWatch(self.sensors)
 
     def __repr__(self) -> str:
         state = self.state

@@ -94,6 +94,21 @@ def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
     assert (np.diff(joined(parts, {}, "").times) >= 0).all()
 
 
+def test_single_wrong_times_make_no_other_plot_late(tmp_path, monkeypatch):
+    monkeypatch.setattr("assoc.integrations.asterix.parts._ROWS", 400)
+    made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording
+    wrong = made.take(np.array([100, 101]))
+    wrong = Recording(wrong.times + 30_000.0, wrong.ranges, wrong.azimuths, wrong.identities, wrong.altitudes)
+    pieces = []
+    for part in (made.take(np.arange(150)), wrong, made.take(np.arange(150, len(made)))):
+        write_plots(tmp_path / "piece.ast", part, (1, 1))
+        pieces.append((tmp_path / "piece.ast").read_bytes())
+    (tmp_path / "plots.ast").write_bytes(b"".join(pieces))
+    reader = AsterixPlots(tmp_path / "plots.ast")
+    parts = [*reader]
+    assert not reader.notes and len(parts) > 2 and sum(map(len, parts)) == len(made) + 2
+
+
 def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):
     """Octal digits of a table become the 12 bits that ASTERIX has, and come back from both."""
     for name, told in (("squawk", "1234"), ("mode3_oct", "1234"), ("mode3", "668"), ("mode3_dec", "668")):

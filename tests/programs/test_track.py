@@ -153,6 +153,7 @@ def test_no_track_starts_in_areas_that_the_user_draws(scene_file, tmp_path, caps
         ("1,2 3,inf", "expected 2 corners of a box"),
         ("1,2 3,4,5", "expected 2 corners of a box"),
         ("1,2 1,4", "--closed: the corners enclose nothing"),
+        ("0,0 1,1 2,2", "--closed: the corners enclose nothing"),
     ):
         assert track.main([str(scene_file), "-o", out[0], "--closed", area]) == 2
         said = capsys.readouterr().err

@@ -238,3 +238,26 @@ def test_an_error_here_is_raised_in_its_turn():
     assert [next(results) for _ in range(3)] == [1 / -3, 1 / -2, -1.0]
     with pytest.raises(ZeroDivisionError):
         next(results)
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_what_others_have_done_is_handed_on_when_this_process_is_interrupted(tmp_path, ordered):
+    here, done = os.getpid(), tmp_path / "done"
+
+    def task(item):
+        if os.getpid() != here:
+            done.write_text("one")
+        elif item > 0:
+            for _ in range(6000):
+                if done.exists():
+                    time.sleep(0.2)
+                    raise KeyboardInterrupt
+                time.sleep(0.01)
+        return item
+
+    found = []
+    with pytest.raises(KeyboardInterrupt):
+        for result in parallel_map(task, range(40), 2, ordered=ordered, here=True):
+            found.append(result)
+    # item 0 was done here, and item 1 was at work
+    assert found == [0] if ordered else len(found) > 1

@@ -81,6 +81,17 @@ def test_mixed_plots_are_told_as_one_address_on_two_tracks():
     assert all("at once" in line for line in told(*plots))
 
 
+def test_after_a_new_beginning_earlier_times_are_watched():
+    watch, pairs = IdentityWatch(SENSORS[1:]), np.array([[[0, A]], [[0, B]]])
+    for begin in (1000.0, 0.0):
+        for k in range(10):
+            watch.take(begin + k, [np.array([7])], [np.ones(1, dtype=bool)], None, [pairs[k // 5]], lambda: ())
+        assert len(watch.found) == 1
+        watch.found.clear()
+        watch.begin_anew()
+        watch._known.clear()
+
+
 def test_memory_is_bounded():
     watch, pairs = IdentityWatch([SENSORS[1]]), np.zeros((2, 2), dtype=np.int64)
     for k in range(6 * MOST):

@@ -330,3 +330,14 @@ def test_m_of_n_and_deletion_by_count():
 def test_count_bits():
     values = np.array([0, 1, 5, 2**61 + 3], dtype=np.int64).astype(np.uint64)
     assert count_bits(values).tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("name", sorted(TRACKERS))
+def test_columns_of_tracks_are_copies(name):
+    tracker = TRACKERS[name].for_scene(scene())
+    for k in range(scene().num_scans):
+        tracker.step(scene().times[k], scene().measurements[k])
+    before, columns = str(tracker.tracks), tracker.track_columns()
+    for values in columns:
+        values[...] = 0
+    assert str(tracker.tracks) == before

@@ -62,6 +62,10 @@ def _name(source: Source) -> str:
     return f"{source[0]}/{source[1]}"
 
 
+_LATEST = 101
+"""Plots whose median time is that of a part's end."""
+
+
 class _Waiting:
     """Plots that wait for those before them, and for those after them by which garbled altitudes are found."""
 
@@ -75,6 +79,8 @@ class _Waiting:
         """Take rows in, and yield the plots that are complete."""
         rows = np.array(new, dtype=np.float64).reshape(-1, 7)
         given = float(self._rows[self._done - 1, 0]) if self._done else -math.inf
+        # the usual time of the latest: single wrong ones must not make all others late
+        now = float(np.median(rows[-_LATEST:, 0])) if len(rows) else given
         late = rows[:, 0] < given
         if late.any():
             what = f"plots left out that came more than {NEARBY:g} s late"
@@ -82,7 +88,7 @@ class _Waiting:
         rows = np.concatenate([self._rows, rows[~late]])
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         times, begin = rows[:, 0], self._done
-        end = len(rows) if last or not len(rows) else int(np.searchsorted(times, times[-1] - NEARBY))
+        end = len(rows) if last or not len(rows) else int(np.searchsorted(times, now - NEARBY))
         if end > begin:
             yield recording_of(rows, self._name, self._notes).take(np.arange(begin, end))
         kept = int(np.searchsorted(times, times[end - 1] - NEARBY)) if end else 0

@@ -65,13 +65,17 @@ class IdentityWatch:
         names = (one_line(sensor.name.removesuffix(NO_HEIGHT)) for sensor in sensors)
         self._names = [name or f"sensor {s}" for s, name in enumerate(names, 1)]
         self._base = 10 if decimal else 8
+        self._known: set[object] = set()
+        self.found: list[OddIdentity] = []
+        """What was found so far, at most 1,000."""
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget all tracks and times, where tracks begin anew; what was found stays."""
         self._forget_at = _FORGET
         self._voices: dict[tuple[int, int], dict[str, _Voice]] = {}
         self._owners: dict[tuple[int, int], set[int]] = {}
-        self._known: set[object] = set()
         self._time = -math.inf
-        self.found: list[OddIdentity] = []
-        """What was found so far, at most 1,000."""
 
     def take(
         self,

@@ -303,6 +303,7 @@ class LiveTracker:
         """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
         self._qualities.keep(())
+        self._watch.begin_anew()
         late = LatePlots(self.settings.make(), self.settings.horizon, first_id=self.state.tracker.next_id)
         antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
         self.state = LiveState(late, antennas, self.state.own)

@@ -123,10 +123,12 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
         patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
     gone = tracks.to_delete(settings.life_cycle, time, patience)
     if settings.life_cycle.deletion == "time" and settings.life_cycle.deletion_time is None:
-        # a missed target that has probably left the region is not waited for, nor shown; heights may be unknown
+        # a missed target that has probably left the region is not waited for, nor shown, unless a sensor that
+        # measures distances sees that far; heights may be unknown
         left = np.flatnonzero(tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0))
         if len(left):
-            gone[left] |= ~_inside(settings, tracks.states[left], 2)
+            seen = settings.views.at_means(tracks.states[left])[:, settings.ranging].any(axis=1)
+            gone[left] |= ~seen & ~_inside(settings, tracks.states[left], 2)
     # out of view for so long that nobody knows where it is
     hidden = np.flatnonzero(tracks.hidden > 0.0)
     if len(hidden):
