@@ -110,9 +110,7 @@ def as_polygon(corners: list[tuple[float, float]], label: str) -> tuple[tuple[fl
     if len(corners) == 2:
         (x, y), (u, v) = corners
         corners = [(x, y), (u, y), (u, v), (x, v)]
-    x, y = zip(*corners, strict=True)
-    area = sum(a * (d - b) for a, b, d in zip(x, (y[-1], *y[:-1]), (*y[1:], y[0]), strict=True))
-    if area == 0.0:
+    if sum(x * v - u * y for (x, y), (u, v) in zip(corners, [*corners[1:], corners[0]], strict=True)) == 0.0:
         raise InvalidInputError(f"{label}: the corners enclose nothing: they lie on one line")
     return tuple(corners)
 

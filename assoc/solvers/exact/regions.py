@@ -60,7 +60,7 @@ def close_by_regions(component: Component, solve: Solve) -> NDArray[np.bool_] | 
     before = -1
     for _ in range(_ROUNDS):
         _complete(component, inside)
-        rows = np.count_nonzero(inside)
+        rows = int(np.count_nonzero(inside))
         if rows > _MOST * packing.num_rows or rows == before:
             break
         before, weight = rows, component.weight
