@@ -24,6 +24,7 @@ around heavier, until (2) holds everywhere. Where much is undecided they fall to
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -195,7 +196,7 @@ def _bound_alone(graph: _Graph, widest: int, deadline: float, upper: Floats) -> 
         if count > widest:
             continue
         _summed(graph, own[:count], prices, tables)
-        upper[j] = min(upper[j], np.exp(graph.log_weight[j]) / tables.inside[(1 << count) - 1])
+        upper[j] = min(upper[j], math.exp(graph.log_weight[j]) / tables.inside[(1 << count) - 1])
 
 
 @njit
@@ -264,7 +265,7 @@ def _summed(graph: _Graph, own: Ints, prices: Floats, tables: _Tables) -> None:
                 elif r >= 0:
                     outside += prices[r]
                     crosses = True
-            weight = np.exp(graph.log_weight[j] - outside)
+            weight = math.exp(graph.log_weight[j] - outside)
             # one that underflows adds nothing that counts, and would make no number of a sum that has overflowed
             if first and weight > 0.0:
                 tables.column[count], tables.bits[count] = j, bits
@@ -293,10 +294,10 @@ def _summed(graph: _Graph, own: Ints, prices: Floats, tables: _Tables) -> None:
 def _limited(rows: int, tables: _Tables) -> None:
     """Fill in how large the prices of each R may be: by (2), or what is left of R without some rows, at least 0."""
     full = (1 << rows) - 1
-    whole = np.log(tables.inside[full])
+    whole = math.log(tables.inside[full])
     tables.limit[0] = 0.0
     for taken in range(1, full + 1):
-        limit = max(whole - np.log(tables.relaxed[full ^ taken]), 0.0)
+        limit = max(whole - math.log(tables.relaxed[full ^ taken]), 0.0)
         for i in range(rows):
             if taken >> i & 1:
                 limit = max(limit, tables.limit[taken ^ (1 << i)])
