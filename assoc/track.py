@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker
-    from assoc.tracking.plots import PlotTracks
+    from assoc.tracking.offline.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
@@ -194,7 +194,7 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
 def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
     """The scene without the biases of its sensors, if they are to be found first."""
     from assoc.registration import register
-    from assoc.tracking.smoothing import check_smoothable
+    from assoc.tracking.offline.smoothing import check_smoothable
 
     if given["registration"] != "first":
         settings |= given.some(("registration",))
@@ -212,7 +212,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
-    from assoc.tracking.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
+    from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
     from assoc.tracking.track_table import LongTable
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
@@ -281,8 +281,8 @@ def _in_slices(given: Given, tracker: Tracker, windows: Windows, stored: StoredP
     import numpy as np
 
     from assoc._cli.track.slices import kept_slices
-    from assoc.tracking.plots import TakenPlots
-    from assoc.tracking.slices import Stitching, TrackSlice, overlap
+    from assoc.tracking.offline.plots import TakenPlots
+    from assoc.tracking.offline.slices import Stitching, TrackSlice, overlap
     from assoc.tracking.track_table import LongTable
 
     work = TrackSlice(tracker, not given["all"], given["origin"])

@@ -13,7 +13,7 @@ from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.live_tracker import LiveTracker
 from assoc.tracking.live.pictures import Picture
 from assoc.tracking.moving import MovingTargets
-from assoc.tracking.smoothing import smoothed
+from assoc.tracking.offline.smoothing import smoothed
 from assoc.tracking.stages.identity_evidence import IdentityParameters
 from assoc.tracking.stages.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track

@@ -12,7 +12,7 @@ from assoc import solve, track
 from assoc._cli.track.slices import Slices
 from assoc.recordings import write_plots
 from assoc.simulation import simulate, simulate_recording
-from assoc.tracking.slices import Stitching, TrackSlice, _same
+from assoc.tracking.offline.slices import Stitching, TrackSlice, _same
 from tests.sizes import sample
 
 WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]

@@ -309,7 +309,7 @@ def test_gospa_in_one_convention_and_its_cutoff(scene_file, tmp_path, capsys):
 def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
     from assoc.metrics import ct_mt_it
     from assoc.recordings import clustering_time_window, radar_of, read_plots
-    from assoc.tracking.plots import track_plots
+    from assoc.tracking.offline.plots import track_plots
 
     plots(tmp_path / "plots.csv")
     words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE]

@@ -18,7 +18,7 @@ from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import names, recording_names, simulate, simulate_recording
 from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
-from assoc.tracking.plots import step_windows
+from assoc.tracking.offline.plots import step_windows
 from tests.sizes import sample
 
 FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(

@@ -12,7 +12,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, LifeCycle
 from assoc.tracking.filter_choice import height_note, make_filter
-from assoc.tracking.plots import track_plots
+from assoc.tracking.offline.plots import track_plots
 
 CIRCLE = [-math.pi, math.pi]
 REGION = np.array([[-20e3, 20e3], [-20e3, 20e3], [0.0, 12e3]])

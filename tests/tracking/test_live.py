@@ -19,7 +19,7 @@ from assoc.sensors import Platform, PositionSensor, Radar3D
 from assoc.simulation import observe, simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
 from assoc.tracking.live.kept_identities import KeptIdentities
-from assoc.tracking.plots import track_plots
+from assoc.tracking.offline.plots import track_plots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
 

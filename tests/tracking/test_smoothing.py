@@ -10,7 +10,7 @@ from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
 from assoc.recordings import clustering_time_window, radar_of
 from assoc.scene import Scene
 from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoothed, track_scene
-from assoc.tracking.plots import track_plots
+from assoc.tracking.offline.plots import track_plots
 from tests.tracking import plain
 
 

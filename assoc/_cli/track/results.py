@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from assoc.metrics import CtMtIt
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker, TrackTable
-    from assoc.tracking.plots import PlotTracks
+    from assoc.tracking.offline.plots import PlotTracks
 
 
 # odd identities that are named without --check

@@ -21,7 +21,7 @@ from assoc._system.engine import spread
 from assoc._text.times import moment
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.tracking.slices import Slice, SliceTracks, TrackSlice, slices_of
+from assoc.tracking.offline.slices import Slice, SliceTracks, TrackSlice, slices_of
 from assoc.tracking.track_table import COLUMNS
 
 if TYPE_CHECKING:

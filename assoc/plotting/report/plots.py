@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.plotting.report.views import plain_numbers
-from assoc.tracking.plots import PlotTracks
+from assoc.tracking.offline.plots import PlotTracks
 
 _MOST = 30_000
 

@@ -24,7 +24,7 @@ from assoc.plotting.report.views import number, plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
-from assoc.tracking.plots import PlotTracks
+from assoc.tracking.offline.plots import PlotTracks
 from assoc.tracking.track_table import against_truth
 
 if TYPE_CHECKING:

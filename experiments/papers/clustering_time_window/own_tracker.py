@@ -23,7 +23,7 @@ from assoc._types import Array
 from assoc.recordings import Recording, Window, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
 from assoc.tracking import Tracker
-from assoc.tracking.plots import track_plots
+from assoc.tracking.offline.plots import track_plots
 from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
 from experiments.papers.clustering_time_window import false_start, pairs, published, traffic

@@ -14,8 +14,8 @@ from assoc.metrics.ct_mt_it import RatesSoFar
 from assoc.metrics.plot_identity import IdentitiesSoFar
 from assoc.recordings import Recording, Window
 from assoc.scene.scene import Scene
+from assoc.tracking.offline.smoothing import smoothed
 from assoc.tracking.quality import Qualities
-from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Step, TrackColumns
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker

@@ -18,7 +18,7 @@ from assoc.problem import AssignmentProblem
 from assoc.recordings import Window
 from assoc.scene.geodesy import Origin
 from assoc.solvers.assign import assign
-from assoc.tracking.plots import Followed, follow, known_of
+from assoc.tracking.offline.plots import Followed, follow, known_of
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
