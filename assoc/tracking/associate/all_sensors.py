@@ -36,8 +36,8 @@ def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: 
         Scores of a miss of the tracks; see `assoc.tracking.stages.looks.misses`.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
-    tracks = _begun_anew(progress, tracks, rows, lambda tuples: _fresh(progress, tuples))
-    return _joined(progress, tracks, rows, _begin(progress, born), missed)
+    old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh(progress, tuples))
+    return _joined(progress, tracks, rows, missed, (old, anew), _begin(progress, born))
 
 
 def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, rows: Array, born: Array) -> Association:
@@ -47,28 +47,33 @@ def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, row
     gain = -score_costs(timed, followed, rows, terms, missed[track])
     when = np.where(rows.any(axis=1), followed.when, np.nan)
     tracks = progress.state.tracks.scored(timed.at_end(followed, track), gain, when)
-    tracks = _begun_anew(progress, tracks, rows, lambda tuples: _fresh_in_order(progress, timed, tuples, missed))
-    return _joined(progress, tracks, rows, _begin_in_order(progress, timed, born, missed), missed[track])
+    old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh_in_order(progress, timed, tuples, missed))
+    return _joined(progress, tracks, rows, missed[track], (old, anew), _begin_in_order(progress, timed, born, missed))
 
 
 def _joined(
-    progress: Progress, tracks: TrackBatch, rows: Array, new: tuple[TrackBatch, Array], missed: Array
-) -> Association:
-    """Join tracks and new tracks; `missed`: scores of a miss of the tracks, (T, S)."""
-    begun = np.ones(len(new[0]), dtype=np.bool_)
-    at_all = np.concatenate([looked(progress, missed), begun])
-    batch = TrackBatch.concatenate([tracks, new[0]]).counted(np.concatenate([rows.any(axis=1), begun]), at_all)
-    return Association(batch, owners(np.concatenate([rows, new[1]]), batch.track_id, progress.scan.sizes))
+    progress: Progress, tracks: TrackBatch, rows: Array, missed: Array, anew: tuple[Array, TrackBatch],
+    born: tuple[TrackBatch, Array],
+) -> Association:  # fmt: skip
+    """Join tracks, those that begin anew and which they replace, and new ones; `missed`: scores of a miss, (T, S)."""
+    old, begun = anew
+    stay = np.setdiff1d(np.arange(len(tracks)), old) if len(old) else slice(None)
+    fresh = np.ones(len(begun) + len(born[0]), dtype=np.bool_)
+    hit = np.concatenate([rows[stay].any(axis=1), fresh])
+    at_all = np.concatenate([looked(progress, missed[stay]), fresh])
+    batch = TrackBatch.concatenate([tracks[stay], begun, born[0]]).counted(hit, at_all)
+    taken = np.concatenate([rows[stay], rows[old], born[1]])
+    return Association(batch, owners(taken, batch.track_id, progress.scan.sizes))
 
 
 def _begun_anew(
     progress: Progress, tracks: TrackBatch, rows: Array, fresh: Callable[[Array], tuple[TrackBatch, Array]]
-) -> TrackBatch:
-    """The tracks after a scan; tentative ones begin anew where new ones of their measurements promise more.
+) -> tuple[Array, TrackBatch]:
+    """Tentative tracks (K,) that begin anew, since new ones of their measurements promise more, and these new ones.
 
     So a track that began with a false alarm does not hold back the target whose measurements it takes (as in Page's
-    test, whose sum begins anew). A new track does not know its velocity yet: at its next measurement it wins less, by
-    the share of the areas in which the two expect it.
+    test, whose sum begins anew). It gets a new id: what was before is not of the target. A new track does not know its
+    velocity yet: at its next measurement it wins less, by the share of the areas in which the two expect it.
 
     Parameters
     ----------
@@ -82,7 +87,7 @@ def _begun_anew(
     """
     weak = np.flatnonzero(~tracks.confirmed & (tracks.score < 0.0) & rows.any(axis=1))
     if not len(weak):
-        return tracks
+        return weak, tracks[:0]
     new, which = fresh(np.asarray(rows[weak], dtype=np.int32))
     old = weak[which]
     better = np.flatnonzero(new.score > tracks.score[old])
@@ -90,14 +95,10 @@ def _begun_anew(
     if len(old):
         # a track that has its second detection knows its velocity by it, if that was its target's
         lead = np.where(tracks.hits[old] == 1, _lead(progress, tracks.states[old], new.states), 0.0)
-        promise = new.score - lead
-        better = np.flatnonzero(promise > tracks.score[old])
+        better = np.flatnonzero(new.score - lead > tracks.score[old])
         old, new = old[better], new[better]
-    if not len(old):
-        return tracks
-    new.counts[:, ID] = tracks.track_id[old]
-    stay = np.setdiff1d(np.arange(len(tracks)), old)
-    return TrackBatch.concatenate([tracks[stay], new])[np.argsort(np.concatenate([stay, old]), kind="stable")]
+    new.counts[:, ID] = progress.work.new_ids(len(old))
+    return old, new
 
 
 def _lead(progress: Progress, states: Any, new: Any) -> Array:
