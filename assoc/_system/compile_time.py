@@ -16,8 +16,6 @@ from threading import get_ident
 # by thread; read for every solution, where a dictionary is quicker than threading.local
 _total: dict[int, float] = {}
 _under_way: dict[int, float] = {}
-# seconds of compiling before it is announced
-_PATIENCE = 2.0
 _LINE = "assoc: compiling kernels, once after installation (assoc.warm_up() does it ahead)"
 
 
@@ -37,10 +35,10 @@ def loading() -> Iterator[None]:
 
 
 class Announcement:
-    """Says once, on stderr, that kernels are compiled, when that has taken some seconds together."""
+    """Says once, on stderr, that kernels are compiled, when that has taken ``patience`` seconds together."""
 
-    def __init__(self) -> None:
-        self._left = _PATIENCE
+    def __init__(self, patience: float = 2.0) -> None:
+        self._left = patience
         self._since: float | None = None
         self._timer: threading.Timer | None = None
         self._silent = False

@@ -34,8 +34,6 @@ MOST_PLOTS = 20_000_000
 _FARTHEST = 1e7
 # metres: no radar of plots sees farther; and plots from which on bearings within 2 pi degrees are no chance
 _REACH, _ENOUGH = 1.5e6, 10
-# rows that are read at once
-_ROWS = 50_000
 # what pandas takes for a number and `number` does not
 _NO_NUMBER = re.compile(r"(^|[,;\t])[ +-]*(nan|inf)", re.IGNORECASE | re.MULTILINE)
 _TIME, _RANGE, _BEARING, _MODE3, _ALTITUDE, _AIRCRAFT = range(len(COLUMNS))
@@ -82,19 +80,14 @@ def read_plots(
     InvalidInputError
         The file cannot be read as such a table; the message begins with the path and names the line.
     """
-    reader = PlotReader(path, columns, units, max_disorder, garbled_codes)
-    parts: list[Recording] = []
-    for part in reader:
-        parts.append(part)
-        if sum(map(len, parts)) > MOST_PLOTS:
-            raise LimitExceededError(f"{reader.file}: more than {MOST_PLOTS} plots; split the file")
-    return joined(parts, reader.notes, reader.file.name)
+    return PlotReader(path, columns, units, max_disorder, garbled_codes).together()
 
 
 class PlotReader:
     """The plots of a file in parts, in the order of time, so that memory does not grow with the file.
 
     Arguments are as for `read_plots`, ``notes`` as those of a `Recording`; they are complete after the last part.
+    About ``at_once`` rows are read at a time.
     """
 
     def __init__(
@@ -104,25 +97,36 @@ class PlotReader:
         units: Mapping[str, str] | None = None,
         max_disorder: float = MAX_DISORDER,
         garbled_codes: Array | None = None,
+        *,
+        at_once: int = 50_000,
     ) -> None:
         if not 0 <= max_disorder < math.inf:
             raise InvalidInputError(f"max_disorder: expected seconds >= 0, got {max_disorder!r}")
         self.file = Path(path)
         self.notes: dict[str, int] = {}
         self._columns, self._units = columns or {}, units or {}
-        self._max_disorder, self._codes = max_disorder, garbled_codes
+        self._max_disorder, self._codes, self._at_once = max_disorder, garbled_codes, at_once
+
+    def together(self) -> Recording:
+        """All parts as one recording."""
+        parts: list[Recording] = []
+        for part in self:
+            parts.append(part)
+            if sum(map(len, parts)) > MOST_PLOTS:
+                raise LimitExceededError(f"{self.file}: more than {MOST_PLOTS} plots; split the file")
+        return joined(parts, self.notes, self.file.name)
 
     def __iter__(self) -> Iterator[Recording]:
         parquet = self.file.suffix.lower() == ".parquet"
-        found: tuple[list[str], str, Any] = _frames(self.file) if parquet else _lines(self.file)
+        found: tuple[list[str], str, Any] = _frames(self.file, self._at_once) if parquet else _lines(self.file)
         header, separator, content = found
         try:
             columns_of, units = choose(header, self._columns, self._units)
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.file}: {error}") from None
-        table = _Table(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator)
+        table = _Table(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator, self._at_once)
         order = _Order(table, self._max_disorder)
-        plots = _Plots(self.file.name, units, "aircraft" in columns_of, self._codes)
+        plots = _Plots(self.file.name, units, "aircraft" in columns_of, self._codes, self._at_once)
         for rows in table.of_frames(content) if parquet else table.of_lines(content):
             yield from plots.of(order.take(rows), last=False)
         if not order.count:
@@ -153,7 +157,7 @@ def _lines(file: Path) -> tuple[list[str], str, Iterator[str]]:
         raise InvalidInputError(f"{file}: line 1: {error}") from None
 
 
-def _frames(file: Path) -> tuple[list[str], str, Iterator[pd.DataFrame]]:
+def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataFrame]]:
     """Column names of a Parquet file, the separator of its rows as CSV, and its rows in parts."""
     check_extra("pyarrow", "parquet")
     from pyarrow import parquet
@@ -165,7 +169,7 @@ def _frames(file: Path) -> tuple[list[str], str, Iterator[pd.DataFrame]]:
         try:
             with parquet.ParquetFile(file) as opened:
                 yield opened.schema_arrow.names
-                for batch in opened.iter_batches(_ROWS):
+                for batch in opened.iter_batches(at_once):
                     yield batch.to_pandas()
         except (ValueError, OSError) as error:
             if isinstance(error, InvalidInputError):
@@ -180,9 +184,9 @@ class _Table:
     """Makes rows of a file into arrays with a column for each meaning, NaN where it is empty, and the line (n, 7)."""
 
     def __init__(
-        self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, separator: str
+        self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, separator: str, at_once: int
     ) -> None:
-        self.file = file
+        self.file, self._at_once = file, at_once
         self.columns_of = columns_of
         self.base, self.separator = base, separator
         self.decimal = "." if separator == "," else ","
@@ -195,7 +199,7 @@ class _Table:
     def of_lines(self, lines: Iterator[str]) -> Iterator[Array]:
         """The rows of the lines that follow the header."""
         done = 1
-        while block := list(islice(lines, _ROWS)):
+        while block := list(islice(lines, self._at_once)):
             text = "".join(block)
             if '"' in text:
                 # what is in quotes may reach over several lines: the rest is read cell by cell
@@ -276,7 +280,7 @@ class _Table:
                 row = self._row(cells, line)
                 if row is not None:
                     rows.append((*row, line))
-                if len(rows) >= _ROWS:
+                if len(rows) >= self._at_once:
                     yield np.array(rows)
                     rows = []
         except csv.Error as error:
@@ -401,8 +405,8 @@ class _Order:
 class _Plots:
     """Makes sorted rows into recordings, and flags garbled altitudes by the plots before and after."""
 
-    def __init__(self, name: str, units: Mapping[str, str], sources: bool, codes: Array | None) -> None:
-        self._name, self._units, self._sources = name, units, sources
+    def __init__(self, name: str, units: Mapping[str, str], sources: bool, codes: Array | None, at_once: int) -> None:
+        self._name, self._units, self._sources, self._at_once = name, units, sources, at_once
         self._codes = () if units["altitude"] != "fl" else GARBLED_CODES if codes is None else codes
         self._rows = np.zeros((0, len(COLUMNS) + 1))
         self._done = self._count = 0
@@ -413,7 +417,7 @@ class _Plots:
         self._rows = np.concatenate([self._rows, rows])
         times, begin = self._rows[:, _TIME], self._done
         end = len(times) if last or not len(times) else int(np.searchsorted(times, times[-1] - NEARBY))
-        if end == begin or (end - begin < _ROWS and not last):
+        if end == begin or (end - begin < self._at_once and not last):
             return
         scale = {meaning: UNITS[meaning][unit] for meaning, unit in self._units.items()}
         levels, identities = self._rows[:, _ALTITUDE], self._rows[:, _MODE3].astype(np.int64)

@@ -15,8 +15,8 @@ from assoc.packing.branching.root import Root, plain_root
 from assoc.packing.components import component
 from assoc.packing.components.component import Component
 from assoc.packing.components.team import Team
-from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.packing import Packing
 from assoc.solvers.aco import max_min
 from assoc.solvers.genetic import population
@@ -187,7 +187,7 @@ OWN = (
 
 SHARED = (
     Part(_UNDIVED, SOLVERS, without=_no_dives),
-    Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
+    Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(Diver, "root", staticmethod(_uncut))),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Team, "_branch", lambda self: None)),
     Part("no cluster search", SOLVERS, without=_no_clusters),
     Part("no dimensionwise search", SOLVERS, without=_no_rematching),

@@ -60,9 +60,8 @@ def test_plots_there_and_back(plots, file, tmp_path):
         np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
 
 
-def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
+def test_parts_of_a_file_are_the_whole(tmp_path):
     """Also with plots that come late, garbled altitudes at the borders, and another radar between."""
-    monkeypatch.setattr("assoc.integrations.asterix.parts._ROWS", 60)
     made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording
     pieces = []
     for number, rows in enumerate(np.array_split(np.arange(len(made)), 40)):
@@ -74,7 +73,7 @@ def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
     whole = read_asterix(tmp_path / "plots.ast").plots
     assert whole[1, 1].garbled.any() and not whole[1, 1].garbled.all()
     for radar, one in (("1/1", whole[1, 1]), ("1/2", whole[1, 2])):
-        reader = AsterixPlots(tmp_path / "plots.ast", radar)
+        reader = AsterixPlots(tmp_path / "plots.ast", radar, at_once=60)
         parts = [*reader]
         assert len(parts) > 2 and not reader.notes
         together = joined(parts, {}, "")
@@ -85,7 +84,7 @@ def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
             [*AsterixPlots(tmp_path / "plots.ast", radar)]
     # what came later than plots that are given already is counted
     (tmp_path / "late.ast").write_bytes(b"".join([*pieces[5:], pieces[0]]))
-    reader = AsterixPlots(tmp_path / "late.ast", "1/1")
+    reader = AsterixPlots(tmp_path / "late.ast", "1/1", at_once=60)
     parts = [*reader]
     (count,) = reader.notes.values()
     assert (
@@ -94,8 +93,7 @@ def test_parts_of_a_file_are_the_whole(tmp_path, monkeypatch):
     assert (np.diff(joined(parts, {}, "").times) >= 0).all()
 
 
-def test_single_wrong_times_make_no_other_plot_late(tmp_path, monkeypatch):
-    monkeypatch.setattr("assoc.integrations.asterix.parts._ROWS", 400)
+def test_single_wrong_times_make_no_other_plot_late(tmp_path):
     made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording
     wrong = made.take(np.array([100, 101]))
     wrong = Recording(wrong.times + 30_000.0, wrong.ranges, wrong.azimuths, wrong.identities, wrong.altitudes)
@@ -104,7 +102,7 @@ def test_single_wrong_times_make_no_other_plot_late(tmp_path, monkeypatch):
         write_plots(tmp_path / "piece.ast", part, (1, 1))
         pieces.append((tmp_path / "piece.ast").read_bytes())
     (tmp_path / "plots.ast").write_bytes(b"".join(pieces))
-    reader = AsterixPlots(tmp_path / "plots.ast")
+    reader = AsterixPlots(tmp_path / "plots.ast", at_once=400)
     parts = [*reader]
     assert not reader.notes and len(parts) > 2 and sum(map(len, parts)) == len(made) + 2
 

@@ -8,7 +8,6 @@ import sys
 
 import pytest
 
-from assoc._system import compiled
 from tests.told import told
 
 _SEARCH = """
@@ -74,17 +73,6 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     code = "from prepares import prepare_clock\n" + _AHEAD
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
     assert (done.returncode, told(done.stderr)) == (0, "")
-
-
-def test_what_is_compiled_is_looked_for_once(monkeypatch):
-    """Searching the cache takes longer than solving most problems."""
-    looked = []
-    monkeypatch.setattr(compiled, "may_use_processes", lambda: True)
-    monkeypatch.setattr(compiled, "is_kept", lambda kernel: looked.append(kernel) or True)
-    monkeypatch.setattr(compiled, "_kept", set())
-    for _ in range(3):
-        compiled.compile_ahead("a kernel", print)
-    assert looked == ["a kernel"]
 
 
 _TRIALS = """

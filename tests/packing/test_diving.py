@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 
 import assoc
 from assoc.packing.branching.depth_first import Limits
-from assoc.packing.branching.root import plain_root, root_with_cuts
+from assoc.packing.branching.root import plain_root
 from assoc.packing.components import component as component_file
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
@@ -45,11 +45,15 @@ def priced():
     return one
 
 
+class Plain(Diver):
+    """A diver without cuts: programs of the packing alone are easily rebuilt."""
+
+    root = staticmethod(lambda packing, duals, *_: plain_root(packing, duals))
+
+
 @pytest.fixture
-def plain(priced, monkeypatch):
-    """Its diver, without cuts: programs of the packing alone are easily rebuilt."""
-    monkeypatch.setattr(diving, "root_with_cuts", lambda packing, duals, *_: plain_root(packing, duals))
-    return Diver(priced, NONE, np.inf)
+def plain(priced):
+    return Plain(priced, NONE, np.inf)
 
 
 def dive(one, seed=0, *, trail=None, strictness=4.0, cutoff=np.inf):
@@ -128,11 +132,11 @@ def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     assert (np.abs(among - chance) <= 5.0 * np.sqrt(chance / second.size) + 2e-3).all()
 
 
-def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
+def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
     """It stops as soon as nothing better can follow, with a valid cover."""
     steps = []
     for cutoff in (np.inf, priced.bound + 1e-6):
-        diver = Diver(priced, NONE, np.inf)
+        diver = Plain(priced, NONE, np.inf)
         diver.share = diving._LOWEST
         solve, count = diver._program.solve, []
         monkeypatch.setattr(
@@ -146,10 +150,7 @@ def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
 def test_dives_begin_in_a_program_with_cuts(priced, plain):
     """Its bound is nearer to the optimum, and its solution to whole numbers."""
     root = plain._relaxed
-    diver = Diver.__new__(Diver)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(diving, "root_with_cuts", root_with_cuts)
-        diver.__init__(priced, NONE, np.inf)
+    diver = Diver(priced, NONE, np.inf)
     core = diver._core
     best = _milp(core, np.ones(core.num_columns, dtype=bool), [])
     assert root.bound + 0.01 < diver._relaxed.bound <= best + 1e-7

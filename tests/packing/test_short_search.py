@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
-from assoc.packing.branching.short_search import Part, search_shortly
+from assoc.packing.branching.short_search import Part, arrays_within, remainder_within, search_shortly
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
@@ -88,35 +87,30 @@ def test_what_is_found_is_the_best_of_its_part():
     assert feasible > 25
 
 
-def test_it_searches_what_is_left_alone(monkeypatch):
+def test_it_searches_what_is_left_alone():
     """Neither rows that fixed columns cover nor columns that are not allowed are in its program."""
-    rng, seen, new_work = np.random.default_rng(5), [], short_search.new_work
-    monkeypatch.setattr(
-        short_search, "new_work", lambda arrays, *words: seen.append((arrays, words[0])) or new_work(arrays, *words)
-    )
+    rng = np.random.default_rng(5)
     for packing in packings(6, 42):
         linear = begun(packing)
         part = part_of(packing, rng, 0.9, 2)
         linear.solve(columns=part.columns, slack=part.slack)
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
-        arrays, program = seen.pop()
+        rest = remainder_within(packing, linear, part)
+        arrays, program = arrays_within(packing, rest), rest.program
         covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
         assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
         assert arrays.slack.size == program.sides.size <= packing.num_rows - covered
 
 
-def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
+def test_it_begins_where_the_program_of_the_whole_is():
     """Its root needs no pivot: its bound plus the fixed columns' weight is the whole program's bound."""
-    rng, roots, open_nodes, warm = np.random.default_rng(6), [], short_search.OpenNodes, 0
-    monkeypatch.setattr(short_search, "OpenNodes", lambda root: roots.append(root) or open_nodes(root))
+    rng, warm = np.random.default_rng(6), 0
     for packing in packings(6, 45):
         linear = begun(packing)
         part = part_of(packing, rng, 1.0, 2)
         relaxed = linear.solve(columns=part.columns, slack=part.slack)
         if relaxed.status != OPTIMAL:
             continue
-        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
-        root = roots.pop()
+        root = remainder_within(packing, linear, part)
         begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         fixed = float(packing.weights[part.fixed].sum())
         assert bound_of(root.program, begin) + fixed == pytest.approx(relaxed.bound, abs=1e-6)

@@ -16,7 +16,7 @@ import pytest
 
 from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
-from assoc.plotting.live import LivePage, server
+from assoc.plotting.live import LivePage
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from assoc.tracking.live.pictures import Agreement, Heard
@@ -209,11 +209,9 @@ def test_only_this_machine_is_served(scene):
         page.close()
 
 
-def test_connections_are_few_and_idle_ones_end(scene, monkeypatch):
-    monkeypatch.setattr(server, "_MOST", 8)
+def test_connections_are_few_and_idle_ones_end(scene):
     # who comes too late is sent away at once, the others when they have said nothing for so long
-    monkeypatch.setattr(server._Handler, "timeout", 3600.0)
-    page = LivePage(scene)
+    page = LivePage(scene, connections=8, idle=3600.0)
     port = int(page.address.rsplit(":", 1)[1].strip("/"))
     try:
         all_of_them = [socket.create_connection(("127.0.0.1", port), timeout=300) for _ in range(12)]
@@ -226,8 +224,7 @@ def test_connections_are_few_and_idle_ones_end(scene, monkeypatch):
             one.close()
     finally:
         page.close()
-    monkeypatch.setattr(server._Handler, "timeout", 0.2)
-    page = LivePage(scene)
+    page = LivePage(scene, connections=8, idle=0.2)
     port = int(page.address.rsplit(":", 1)[1].strip("/"))
     try:
         with socket.create_connection(("127.0.0.1", port), timeout=300) as one:

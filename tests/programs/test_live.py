@@ -135,13 +135,15 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux what it dropped")
 @pytest.mark.parametrize("slow", ["system", "tracker"])
-def test_datagrams_that_are_lost_are_counted(slow, monkeypatch):
+def test_datagrams_that_are_lost_are_counted(slow):
     """Where nobody takes them out of the socket, and where nobody takes them from who does."""
-    begin, receive = threading.Event(), Lines._receive
-    if slow == "system":
-        monkeypatch.setattr(Lines, "_receive", lambda *all: begin.wait(60) and receive(*all))
-    monkeypatch.setattr(plot_lines, "_WAITING", 20_000)
-    lines = Lines(0)
+    begin = threading.Event()
+
+    class Late(Lines):
+        def _receive(self, *given):
+            return begin.wait(60) and super()._receive(*given)
+
+    lines = (Late if slow == "system" else Lines)(0, waiting=20_000)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         for _ in range(5000):
             out.sendto(b"1,2.5,1000,0.5,0.1\n", ("127.0.0.1", lines.port))

@@ -34,7 +34,7 @@ def same(one, other):
 
 
 @pytest.mark.parametrize("rows", [50, 1000])
-def test_parts_change_nothing(table, tmp_path, monkeypatch, rows):
+def test_parts_change_nothing(table, tmp_path, rows):
     paths = [tmp_path / "p.csv", tmp_path / "p.parquet", tmp_path / "comma.csv"]
     table.to_csv(paths[0], index=False)
     table.to_parquet(paths[1], index=False)
@@ -44,16 +44,15 @@ def test_parts_change_nothing(table, tmp_path, monkeypatch, rows):
     table.to_csv(quoted, index=False, quoting=1, quotechar='"')
     expected = read_plots(quoted)
     assert expected.notes["late plots sorted in"] > 100 and expected.notes["repeated rows left out"] > 10
-    monkeypatch.setattr(reading, "_ROWS", rows)
     for path in paths:
-        same(read_plots(path), expected)
-    parts = [*reading.PlotReader(paths[0])]
+        same(reading.PlotReader(path, at_once=rows).together(), expected)
+    parts = [*reading.PlotReader(paths[0], at_once=rows)]
     assert len(parts) > 1
     stored = StoredPlots(parts)
     for part, again in zip(parts, stored, strict=True):
         same(part, again)
-    whole = [Survey([expected]), stored.survey]
-    assert whole[0].summary({}) == whole[1].summary({})
+    surveys = [Survey([expected]), stored.survey]
+    assert surveys[0].summary({}) == surveys[1].summary({})
     assert estimate_rotation(stored) == estimate_rotation(expected)
     given = {"range_noise": None, "azimuth_noise": 1e-3}
     assert radar_of(stored.survey, **given) == radar_of(expected, **given)
@@ -79,14 +78,13 @@ def test_windows_are_made_as_plots_come():
 
 
 @pytest.mark.parametrize("line", ["1,2,x,1,5", "1,,3,1,5", "0,0,0,0,0", "1,2,3,1,nan", "5,-2,3,1,5", "1,2,3,1.5,5"])
-def test_an_unusual_row_is_treated_alike_wherever_it_stands(tmp_path, monkeypatch, line):
+def test_an_unusual_row_is_treated_alike_wherever_it_stands(tmp_path, line):
     rows = [f"{k},{10 + k},{k % 360},1,100" for k in range(30)]
     found = []
-    for kind in (30_000, 7):
-        monkeypatch.setattr(reading, "_ROWS", kind)
+    for count in (30_000, 7):
         (tmp_path / "p.csv").write_text("\n".join(["time,range,bearing,mode3,altitude", *rows[:20], line, *rows[20:]]))
         try:
-            found.append({**read_plots(tmp_path / "p.csv").notes})
+            found.append({**reading.PlotReader(tmp_path / "p.csv", at_once=count).together().notes})
         except InvalidInputError as error:
             found.append(str(error))
     assert found[0] == found[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -199,20 +201,22 @@ def test_visibility_of_a_cycle():
 
 
 @pytest.fixture
-def diving(monkeypatch):
+def diving():
     """Dives that return one cover, the best of many, and what they were given; there are so many until time is over."""
-    one = component(open_problem(), "full")
-    one.refinement = "none"
-    best = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
     trails, left = [], [0]
 
-    def dive(self, number, rng, trail, beta):
-        trails.append(trail.copy())
-        left[0] -= 1
-        return best.copy()
+    class Diving(Component):
+        dives = property(lambda self: left[0] > 0)
 
-    monkeypatch.setattr(Component, "dive", dive)
-    monkeypatch.setattr(Component, "dives", property(lambda self: left[0] > 0))
+        def dive(self, number, rng, trail, beta):
+            trails.append(trail.copy())
+            left[0] -= 1
+            return best.copy()
+
+    plain = component(open_problem(), "full")
+    one = Diving(**{field.name: getattr(plain, field.name) for field in fields(plain)})
+    one.refinement = "none"
+    best = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
     return one, best, trails, left
 
 

@@ -126,13 +126,12 @@ def test_a_run_and_its_parts_do_not_count_what_is_compiled(monkeypatch):
         assert pool.submit(run.remaining).result() == 4.0
 
 
-def test_compiling_is_announced_once(capsys, monkeypatch):
+def test_compiling_is_announced_once(capsys):
     one = compile_time.Announcement()
     one.begin()
     one.end()
     assert capsys.readouterr().err == ""  # not yet
-    monkeypatch.setattr(compile_time, "_PATIENCE", 0.02)
-    one = compile_time.Announcement()
+    one = compile_time.Announcement(0.02)
     for _ in range(2):
         one.begin()
         time.sleep(0.1)

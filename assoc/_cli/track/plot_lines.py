@@ -197,16 +197,18 @@ class Lines:
     ----------
     port : int or None
         UDP port on 127.0.0.1; None: stdin. Over UDP the line "end" ends the stream.
+    waiting : int
+        Bytes that may wait, here and in the system.
     """
 
-    def __init__(self, port: int | None) -> None:
+    def __init__(self, port: int | None, *, waiting: int = 64_000_000) -> None:
         self._dropped = 0
-        self._waiting = _Waiting(_WAITING)
+        self._waiting = _Waiting(waiting)
         self._socket = None
         if port is not None:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             try:
-                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING)
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, waiting)
                 self._socket.bind(("127.0.0.1", port))
             except (OSError, OverflowError) as error:
                 self._socket.close()

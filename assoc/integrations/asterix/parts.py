@@ -13,9 +13,6 @@ from assoc.integrations.asterix.reading import Decoded, Source, recording_of
 from assoc.recordings.altitude import NEARBY
 from assoc.recordings.recording import Recording
 
-# plots that are given at once
-_ROWS = 50_000
-
 
 class AsterixPlots:
     """The plots of one radar in a file in parts, in the order of time, so that memory grows by the file's bytes alone.
@@ -27,6 +24,8 @@ class AsterixPlots:
         SAC/SIC of the radar; needed if the file has plots of several.
     label : str
         What gives the radar, for errors.
+    at_once : int
+        About how many plots a part has.
 
     Attributes
     ----------
@@ -34,8 +33,10 @@ class AsterixPlots:
         As those of `AsterixContent`, and plots that came too late; complete after the last part.
     """
 
-    def __init__(self, path: str | os.PathLike[str], radar: str | None = None, label: str = "radar") -> None:
-        self._path, self._radar, self._label = path, radar, label
+    def __init__(
+        self, path: str | os.PathLike[str], radar: str | None = None, label: str = "radar", *, at_once: int = 50_000
+    ) -> None:
+        self._path, self._radar, self._label, self._at_once = path, radar, label, at_once
         self.notes: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[Recording]:
@@ -46,7 +47,7 @@ class AsterixPlots:
             for source, rows in read.plots.items():
                 if self._radar not in (None, _name(source)) or len(read.plots) > 1 and self._radar is None:
                     rows.rows = []
-                elif len(rows.rows) >= _ROWS:
+                elif len(rows.rows) >= self._at_once:
                     yield from waiting.of(rows.rows, last=False)
                     rows.rows = []
         read.check(self._path)

@@ -46,10 +46,10 @@ def search_shortly(
     """
     wait_for_kernels()
     nothing = np.zeros(0, dtype=np.int64)
-    rest = _remainder(packing, linear, part)
+    rest = remainder_within(packing, linear, part)
     if rest is None:
         return nothing, True
-    work = new_work(_arrays(packing, rest), rest.program, rest.slack)
+    work = new_work(arrays_within(packing, rest), rest.program, rest.slack)
     no_sets = np.zeros((0, packing.num_rows), dtype=np.bool_)
     nodes = OpenNodes(Root(rest.program, rest.slack, rest.variable, rest.duals, no_sets))
     below = cutoff - float(packing.weights[part.fixed].sum())
@@ -58,8 +58,8 @@ def search_shortly(
     return found, left == 0
 
 
-def _remainder(packing: Packing, linear: LinearProgram, part: Part) -> Remainder | None:
-    """The remainder of the program with those columns fixed."""
+def remainder_within(packing: Packing, linear: LinearProgram, part: Part) -> Remainder | None:
+    """The remainder of the program with a part's columns fixed; None if they do not fit together."""
     slack = linear.slack.copy()
     slack[: packing.num_rows] = part.slack
     columns = part.columns.copy()
@@ -67,7 +67,7 @@ def _remainder(packing: Packing, linear: LinearProgram, part: Part) -> Remainder
     return remainder_of(linear.program, linear.basis, part.fixed, np.flatnonzero(columns), slack)
 
 
-def _arrays(packing: Packing, rest: Remainder) -> PackingArrays:
+def arrays_within(packing: Packing, rest: Remainder) -> PackingArrays:
     """The remaining columns of a packing over the remaining rows, as branch and bound takes them."""
     rows = rest.rows[rest.rows < packing.num_rows]
     index = np.full(packing.num_rows + 1, -1, dtype=np.int32)

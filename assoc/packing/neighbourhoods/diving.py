@@ -62,6 +62,8 @@ class Diver:
     ``rounds`` times where cuts change the reduced costs.
     """
 
+    root = staticmethod(root_with_cuts)
+
     def __init__(
         self, priced: Priced, known: NDArray[np.int64], deadline: float, *, core: int = 40, rounds: int = 3
     ) -> None:
@@ -77,7 +79,7 @@ class Diver:
             near |= reduced <= np.partition(reduced, count)[count]
             # rows that must be covered keep at least one column: insertion may bring back the others
             self._core: Packing = packing.restrict(near)
-            self._root = root_with_cuts(self._core, priced.duals[self._core.row_origin], cutoff, deadline)
+            self._root = self.root(self._core, priced.duals[self._core.row_origin], cutoff, deadline)
             reduced = priced.reduced if is_over(deadline) else self._reduced_costs(priced.duals)
             if reduced[~near].min(initial=0.0) >= -priced.tolerance:
                 break

@@ -38,8 +38,8 @@ _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 
 # pictures that wait for a slow browser; beyond this it misses some
 _WAITING = 50
 _BEAT = 10.0
-# connections at once, seconds that one may be silent, and pause (s) if the system has no more connections
-_MOST, _IDLE, _PAUSE = 32, 15.0, 0.2
+# pause (s) if the system has no more connections
+_PAUSE = 0.2
 # decimals: centimetres
 _DIGITS = 2
 
@@ -56,6 +56,10 @@ class LivePage:
     title : str
     heights : bool
         Whether tracks have heights. They are shown above the ellipsoid where the scene has an origin.
+    connections : int
+        Most connections at once.
+    idle : float
+        Seconds that one may be silent.
 
     Raises
     ------
@@ -63,7 +67,16 @@ class LivePage:
         The port is not available.
     """
 
-    def __init__(self, scene: Scene, port: int = 0, title: str = "", *, heights: bool = True) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        port: int = 0,
+        title: str = "",
+        *,
+        heights: bool = True,
+        connections: int = 32,
+        idle: float = 15.0,
+    ) -> None:
         self._origin, self._heights = scene.origin, heights
         first = {
             "title": title,
@@ -85,9 +98,10 @@ class LivePage:
             """Requests of this page."""
 
             owner = page
+            timeout = idle
 
         try:
-            self._server = _Server(("127.0.0.1", port), Handler)
+            self._server = _Server(connections, ("127.0.0.1", port), Handler)
         except (OSError, OverflowError) as error:
             raise InvalidInputError(f"--page: port {port} cannot be used ({error})") from None
         threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
@@ -194,9 +208,9 @@ class _Server(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, *arguments: Any) -> None:
+    def __init__(self, most: int, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self._free = threading.BoundedSemaphore(_MOST)
+        self._free = threading.BoundedSemaphore(most)
 
     def get_request(self) -> tuple[Any, Any]:
         try:
@@ -222,7 +236,6 @@ class _Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     owner: ClassVar[LivePage]
     protocol_version = "HTTP/1.1"
-    timeout = _IDLE
 
     def do_GET(self) -> None:
         """Answer with the page, one of its files, or the events."""
