@@ -162,7 +162,7 @@ def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: i
     listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
     narrow = _NARROW if len(problem.sizes) > 2 else _NARROW_PAIRS
-    known = _without_listing(problem, index, len(tuples), run, widest, method != "estimate")
+    known = without_listing(problem, index, len(tuples), run, widest, method != "estimate")
     for cluster, which in _clusters(problem):
         if known is not None and len(which) and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
             waiting[which] = False
@@ -196,7 +196,7 @@ def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: i
     return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed, spread)
 
 
-def _without_listing(
+def without_listing(
     problem: AssignmentProblem, index: NDArray[np.int64], num: int, run: Run, widest: int, bounds: bool
 ) -> Floats | None:
     """Estimate and bounds of each distinct tuple, (3, T), by sums, windows or blocks; None without time."""

@@ -8,6 +8,7 @@ from assoc.tracking.associate.mht_hypothesis import HypothesisOrientedMHT
 from assoc.tracking.associate.multi_sensor import MultiSensorTracker
 from assoc.tracking.associate.nearest_neighbour import NearestNeighbourTracker
 from assoc.tracking.associate.static import StaticFusionTracker
+from assoc.tracking.associate.track_problem import track_problem
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.live_tracker import LiveTracker
@@ -55,5 +56,6 @@ __all__ = [
     "TrackTable",
     "Tracker",
     "smoothed",
+    "track_problem",
     "track_scene",
 ]

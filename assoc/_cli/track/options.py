@@ -56,6 +56,8 @@ _OF_TRACKERS = (
            {"tracker": ("mht-hypothesis",)}),
     Option("max_events", "N", "joint-probabilistic: joint events kept apart at a time (default 4096)", kinds.whole(1),
            {"tracker": ("joint-probabilistic",)}),
+    Option("all_sensors", "", "joint-probabilistic: all sensors of a scan at once, not one after the other",
+           only={"tracker": ("joint-probabilistic",)}),
     Option("rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver",
            kinds.OneOf(("greedy", "assignment")), {"tracker": ("nearest-neighbour",)}),
 )  # fmt: skip

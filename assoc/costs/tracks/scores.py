@@ -109,6 +109,18 @@ def doubted_gain(score: Array, gain: Array) -> Array:
     return np.asarray(np.logaddexp(odds, gain) - np.logaddexp(odds, 0.0))
 
 
+def existence_gain(score: Array, gain: Array, seen: Array) -> Array:
+    """Logarithm of a tuple's weight in joint events where its track may be false, (M,): ln(p exp(gain)) if it was seen.
+
+    The score before the scan is the log odds of p, the probability that the track is a target; ``gain`` are detections
+    and misses of a target. Only a target is seen; without a measurement the track is false or its target missed, which
+    is ln(1 - p + p exp(gain)), as `doubted_gain`. So weights of joint events are proportional to their probabilities.
+
+    D. Musicki, R. Evans, as above, equations 20 to 25.
+    """
+    return np.asarray(np.where(seen, gain - np.logaddexp(0.0, -score), doubted_gain(score, gain)))
+
+
 def sequential_threshold(false_probability: float, missed_probability: float = 0.0) -> float:
     """Score at which a track is confirmed: ln((1 - beta) / alpha), the upper limit of Wald's sequential test.
 

@@ -123,17 +123,19 @@ def grow_track_tuples(
     *,
     gate_probability: float,
     max_tuples: int = MAX_TUPLES,
+    margin: float = 0.0,
 ) -> TrackTuples:
     """Candidate tuples, ordered by track, of T predicted tracks and one measurement or none of each sensor.
 
     `misses` (T, S) is the score of a miss of each track by each sensor: ln(1 - P_d), less where it cannot see the
-    track. A tuple that costs as much as its track all missed is left out: false alarms cost 0. LimitExceededError for
-    more than `max_tuples`.
+    track. A tuple that costs `margin` more than its track all missed is left out: false alarms cost 0, so that no best
+    association contains it, though it may be the true one. LimitExceededError for more than `max_tuples`.
     """
     count = len(states)
     growth = _Growth(
         filter, measurements, sensors, terms, _ahead(sensors, terms, misses),
         [gate_of(sensor, gate_probability) for sensor in sensors], [angular_components(sensor) for sensor in sensors],
+        margin,
     )  # fmt: skip
     near = []
     for z, sensor, angles, gate in zip(measurements, sensors, growth.angles, growth.gates, strict=True):
@@ -181,6 +183,7 @@ class _Growth(NamedTuple):
     ahead: Array
     gates: list[float]
     angles: list[tuple[bool, ...]]
+    margin: float
 
 
 def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], most: int) -> TrackTuples:
@@ -189,7 +192,7 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
     track = np.arange(len(states))
     rows = np.zeros((len(states), len(growth.sensors)), dtype=np.int32)
     costs = np.zeros(len(states))
-    alone = -misses.sum(axis=1)
+    alone = growth.margin - misses.sum(axis=1)
     for s, (z, sensor, gate) in enumerate(zip(growth.measurements, growth.sensors, growth.gates, strict=True)):
         expected = filter.expected(states, sensor)
         if s:
@@ -208,7 +211,7 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
         )
         rows = np.concatenate([rows, new])
         track = np.concatenate([track, track[done.track]])
-        # the sensors left must be able to bring the cost below that of a track all missed
+        # the sensors left must be able to bring the cost below the most that is kept
         hopeful = np.flatnonzero((costs - growth.ahead[s + 1] < alone[track]) | ~rows.any(axis=1))
         if s < last:
             old = int(np.searchsorted(hopeful, len(states)))

@@ -37,7 +37,7 @@ def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: 
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
     old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh(progress, tuples))
-    return _joined(progress, tracks, rows, missed, (old, anew), _begin(progress, born))
+    return _joined(progress, tracks, rows, missed, (old, anew), begin(progress, born))
 
 
 def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, rows: Array, born: Array) -> Association:
@@ -48,7 +48,7 @@ def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, row
     when = np.where(rows.any(axis=1), followed.when, np.nan)
     tracks = progress.state.tracks.scored(timed.at_end(followed, track), gain, when)
     old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh_in_order(progress, timed, tuples, missed))
-    return _joined(progress, tracks, rows, missed[track], (old, anew), _begin_in_order(progress, timed, born, missed))
+    return _joined(progress, tracks, rows, missed[track], (old, anew), begin_in_order(progress, timed, born, missed))
 
 
 def _joined(
@@ -112,7 +112,7 @@ def _lead(progress: Progress, states: Any, new: Any) -> Array:
     return np.asarray(np.maximum(areas[0] - areas[1], 0.0))
 
 
-def _begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
+def begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
     """New tracks of tuples that determine a position, with ids in the order of positions."""
     settings = progress.settings
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
@@ -137,8 +137,8 @@ def _fresh(progress: Progress, tuples: Array) -> tuple[TrackBatch, Array]:
     return TrackBatch.new(states, np.zeros(len(order), dtype=np.int64), score, scan.time), order
 
 
-def _begin_in_order(progress: Progress, timed: TimedScan, born: Array, missed: Array) -> tuple[TrackBatch, Array]:
-    """`_begin` where measurements have times of their own."""
+def begin_in_order(progress: Progress, timed: TimedScan, born: Array, missed: Array) -> tuple[TrackBatch, Array]:
+    """`begin` where measurements have times of their own."""
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(progress.settings.sensors))
     batch, order = _fresh_in_order(progress, timed, tuples, missed)
     batch.counts[:, ID] = progress.work.new_ids(len(order))

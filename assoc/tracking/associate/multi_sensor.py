@@ -33,7 +33,7 @@ class MultiSensor(Method):
         )  # fmt: skip
         gain = -tuples.costs - scan.crowding(tuples.rows)
         value = doubted_gain(tracks.score[tuples.track], gain)
-        rows, costs = _new_targets(progress)
+        rows, costs = new_targets(progress)
         known = np.column_stack([tuples.track + 1, tuples.rows])
         fresh = np.column_stack([np.zeros(len(rows), dtype=np.int64), rows])
         sizes = np.concatenate([[len(tracks)], scan.sizes])
@@ -68,7 +68,7 @@ class MultiSensor(Method):
         return associated_in_order(progress, timed, missed, rows, born)
 
 
-def _new_targets(progress: Progress) -> tuple[Array, Array]:
+def new_targets(progress: Progress) -> tuple[Array, Array]:
     """Tuples without a track that are better than false alarms, and their costs with the birth density."""
     births = progress.settings.births
     problem = births.problem(progress.scan)
