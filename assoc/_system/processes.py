@@ -36,6 +36,37 @@ def start_python(path: Sequence[str], **options: Any) -> subprocess.Popen[bytes]
     return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, **options)
 
 
+class _Exchange:
+    """Queues between the caller and the threads that wait for processes.
+
+    An interrupt may strike anywhere: `threading` could be left locked by it, these queues and threads of C cannot.
+    """
+
+    def __init__(self) -> None:
+        self.tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self.questions: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
+        self.answers: queue.SimpleQueue[tuple[int, Any, bool]] = queue.SimpleQueue()
+        self.left: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self.ended: list[bool] = []
+
+    def attend(self, worker: subprocess.Popen[bytes]) -> None:
+        """Give a process the task and questions, one after the other, and take its answers."""
+        try:
+            # if it died, its first item will find that
+            with suppress(OSError, EOFError, pickle.UnpicklingError):
+                _write(worker.stdin, self.tasks.get())
+                # others may take the first items until it has started
+                pickle.load(worker.stdout)  # type: ignore[arg-type]
+            while (entry := self.questions.get()) is not None and not self.ended:
+                number, item = entry
+                try:
+                    self.answers.put((number, *_asked(worker, item)))
+                except BaseException as error:
+                    self.answers.put((number, error, True))
+        finally:
+            self.left.put(None)
+
+
 def parallel_map(
     task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True, here: bool = False
 ) -> Generator[Any]:
@@ -48,29 +79,8 @@ def parallel_map(
     memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", here=False)
     content = _packed(task)
     workers: list[subprocess.Popen[bytes]] = []
-    # an interrupt may strike anywhere: `threading` could be left locked by it, these queues and threads of C cannot
-    tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    questions: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
-    answers: queue.SimpleQueue[tuple[int, Any, bool]] = queue.SimpleQueue()
-    left: queue.SimpleQueue[None] = queue.SimpleQueue()
-    ended: list[bool] = []
-
-    def attend(worker: subprocess.Popen[bytes]) -> None:
-        try:
-            # if it died, its first item will find that
-            with suppress(OSError, EOFError, pickle.UnpicklingError):
-                _write(worker.stdin, tasks.get())
-                # others may take the first items until it has started
-                pickle.load(worker.stdout)  # type: ignore[arg-type]
-            while (entry := questions.get()) is not None and not ended:
-                number, item = entry
-                try:
-                    answers.put((number, *_asked(worker, item)))
-                except BaseException as error:
-                    answers.put((number, error, True))
-        finally:
-            left.put(None)
-
+    at = _Exchange()
+    questions, answers = at.questions, at.answers
     # a thread for each process waits for its answers
     threads = 0
     numbered, asked, given = enumerate(items), 0, 0
@@ -78,8 +88,8 @@ def parallel_map(
     try:
         _start(workers, jobs - here)
         for worker in workers:
-            tasks.put(content)
-            _thread.start_new_thread(attend, (worker,))
+            at.tasks.put(content)
+            _thread.start_new_thread(at.attend, (worker,))
             threads += 1
         del content  # it may be large
         while True:
@@ -113,12 +123,12 @@ def parallel_map(
                 raise interrupted
     finally:
         # after an interruption or an error, nobody needs what they still do
-        ended.append(True)
+        at.ended.append(True)
         for worker in workers:
             worker.kill()
             questions.put(None)
         for _ in range(threads):
-            left.get()
+            at.left.get()
         for worker in workers:
             worker.communicate()
 

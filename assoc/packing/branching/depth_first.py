@@ -79,6 +79,14 @@ def _by_values(work: Work, allowed: Allowed) -> bool:
     return whole
 
 
+@inner_njit
+def _lightest(work: Work, num: int) -> Any:
+    """As `_greedy`, by weight: where columns that share a row are equal, the lightest of each kind."""
+    for a in range(num):
+        work.key[a] = work.weights[work.node.active[a]]
+    return _greedy(work, allowed_at(work, num))
+
+
 @njit
 def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float, limits: Limits) -> Any:
     """Search depth first; the number of open nodes, the incumbent's weight and number of columns, the nodes done.
@@ -149,11 +157,7 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
         if closed:
             continue
         if one < 0:
-            # columns that share a row are equal: take the lightest of each kind
-            allowed = allowed_at(work, num)
-            for a in range(num):
-                work.key[a] = work.weights[work.node.active[a]]
-            weight, count = _greedy(work, allowed)
+            weight, count = _lightest(work, num)
             if weight < incumbent:
                 incumbent = weight
                 count_found = count

@@ -241,7 +241,13 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
     for r in range(size):
         if not taken[r]:
             basis.anchors[r] = old[r]
-    # values derived from the inverse
+    _recompute(program, basis)
+
+
+@inner_njit
+def _recompute(program: Program, basis: Basis) -> None:
+    """What follows from the variables and the inverse: norms, values and multipliers."""
+    num, size, inverse = program.weights.size, program.sides.size, basis.inverse
     costs = np.zeros(size)
     for i in range(size):
         code = basis.variable[i]

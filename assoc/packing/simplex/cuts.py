@@ -61,22 +61,7 @@ def odd_sets(cols: Ints, basis: Basis, num_rows: int) -> Any:
             for s in range(num_sensors):
                 if cols[j, s] >= 0:
                     uncovered[cols[j, s]] -= value
-    # the fractional columns by row
-    pointer = np.zeros(num_rows + 1, np.int64)
-    for a in range(count):
-        for s in range(num_sensors):
-            if cols[members[a], s] >= 0:
-                pointer[cols[members[a], s] + 1] += 1
-    for r in range(num_rows):
-        pointer[r + 1] += pointer[r]
-    by_row = np.empty(pointer[num_rows], np.int32)
-    place = pointer[:num_rows].copy()
-    for a in range(count):
-        for s in range(num_sensors):
-            r = cols[members[a], s]
-            if r >= 0:
-                by_row[place[r]] = a
-                place[r] += 1
+    pointer, by_row = _by_row(cols, members[:count], num_rows)
     sets = np.zeros((_KEPT, num_rows), np.bool_)
     scores = np.full(_KEPT, _LARGEST)
     kept = 0
@@ -127,6 +112,27 @@ def odd_sets(cols: Ints, basis: Basis, num_rows: int) -> Any:
         if best < _LARGEST:
             kept = _keep(sets, scores, kept, best_set, best)
     return sets[:kept].copy()
+
+
+@inner_njit
+def _by_row(cols: Ints, members: Ints, num_rows: int) -> Any:
+    """Where each row begins in a list of indices of the columns that use it, and the list."""
+    pointer = np.zeros(num_rows + 1, np.int64)
+    for j in members:
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                pointer[cols[j, s] + 1] += 1
+    for r in range(num_rows):
+        pointer[r + 1] += pointer[r]
+    by_row = np.empty(pointer[num_rows], np.int32)
+    end = pointer[:num_rows].copy()
+    for a in range(members.size):
+        for s in range(cols.shape[1]):
+            r = cols[members[a], s]
+            if r >= 0:
+                by_row[end[r]] = a
+                end[r] += 1
+    return pointer, by_row
 
 
 @inner_njit

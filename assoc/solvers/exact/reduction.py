@@ -233,50 +233,9 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         # a dropped row's multiplier stays part of the proof: rows leave only with all their columns
         for r in range(rows.size):
             proof[rows[r]] = hard[r]
-        # element by element here and below: numba compiles every ``values[places]`` anew
-        num_sensors = packing.cols.shape[1]
-        chosen, place = np.empty(kept, np.int32), np.full(keep.size, -1, np.int32)
-        cols_kept, weights_kept = np.empty((kept, num_sensors), np.int32), np.empty(kept)
-        kept = 0
-        for j in range(keep.size):
-            if keep[j]:
-                chosen[kept], weights_kept[kept] = j, packing.weights[j]
-                for s in range(num_sensors):
-                    cols_kept[kept, s] = packing.cols[j, s]
-                kept += 1
-        # rows without slack in closed components have been covered: they leave as rows with slack do
-        free = packing.slack.copy()
-        parent = np.empty(num_rows, np.int32)
-        for c in range(alive.size):
-            parent[row_start[c] : row_start[c + 1]] = c
-            if not alive[c]:
-                free[row_start[c] : row_start[c + 1]] = True
-        cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row = assembled(
-            cols_kept, weights_kept, free, chosen
+        packing, origin, rows, smooth, hard, owner, weight, temperature = _rest(
+            _State(packing, origin, rows, smooth, hard, owner, weight, bound, temperature), keep, alive
         )
-        packing = PackingArrays(cols, weights, slack, col_start, row_start, row_ptr, row_cols)
-        new_origin = np.empty(column.size, np.int32)
-        for j in range(column.size):
-            place[column[j]] = j
-            new_origin[j] = origin[column[j]]
-        # the parts of a component start from the same cover and the same multipliers
-        new_owner, new_rows = np.empty(row.size, np.int32), np.empty(row.size, np.int32)
-        new_smooth, new_hard = np.empty(row.size), np.empty(row.size)
-        for r in range(row.size):
-            j = owner[row[r]]
-            new_owner[r] = place[j] if j >= 0 else -1
-            new_rows[r], new_smooth[r], new_hard[r] = rows[row[r]], smooth[row[r]], hard[row[r]]
-        owner, smooth, hard, origin, rows = new_owner, new_smooth, new_hard, new_origin, new_rows
-        first, cooled = np.empty(col_start.size - 1, np.int32), np.empty(col_start.size - 1)
-        for c in range(first.size):
-            first[c] = parent[row[row_start[c]]]
-            cooled[c] = temperature[first[c]]
-        temperature = cooled
-        new_weight = _cover_weights(packing, owner)
-        for c in range(new_weight.size):
-            if weight[first[c]] == np.inf:
-                new_weight[c] = np.inf
-        weight = new_weight
         bound = bounds_by_component(packing, hard, reduced)
     if packing.slack.size == 0:
         return None
@@ -284,6 +243,56 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         packing.cols, packing.weights, packing.slack, packing.col_start, packing.row_start, packing.row_ptr,
         packing.row_cols, origin, rows, smooth, hard, owner, weight, bound, temperature,
     )  # fmt: skip
+
+
+@inner_njit
+def _rest(state: _State, keep: NDArray[np.bool_], alive: NDArray[np.bool_]) -> Any:
+    """The fields of the state, but for bounds, with the columns to keep and the components that are alive."""
+    packing, temperature = state.packing, state.temperature
+    num_sensors, row_start = packing.cols.shape[1], packing.row_start
+    kept = 0
+    for j in range(keep.size):
+        kept += keep[j]
+    # element by element here and below: numba compiles every ``values[places]`` anew
+    chosen, index = np.empty(kept, np.int32), np.full(keep.size, -1, np.int32)
+    cols_kept, weights_kept = np.empty((kept, num_sensors), np.int32), np.empty(kept)
+    kept = 0
+    for j in range(keep.size):
+        if keep[j]:
+            chosen[kept], weights_kept[kept] = j, packing.weights[j]
+            for s in range(num_sensors):
+                cols_kept[kept, s] = packing.cols[j, s]
+            kept += 1
+    # rows without slack in closed components have been covered: they leave as rows with slack do
+    free = packing.slack.copy()
+    parent = np.empty(packing.slack.size, np.int32)
+    for c in range(alive.size):
+        parent[row_start[c] : row_start[c + 1]] = c
+        if not alive[c]:
+            free[row_start[c] : row_start[c + 1]] = True
+    cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row = assembled(
+        cols_kept, weights_kept, free, chosen
+    )
+    packing = PackingArrays(cols, weights, slack, col_start, row_start, row_ptr, row_cols)
+    origin = np.empty(column.size, np.int32)
+    for j in range(column.size):
+        index[column[j]] = j
+        origin[j] = state.origin[column[j]]
+    # the parts of a component start from the same cover and the same multipliers
+    owner, rows = np.empty(row.size, np.int32), np.empty(row.size, np.int32)
+    smooth, hard = np.empty(row.size), np.empty(row.size)
+    for r in range(row.size):
+        j = state.owner[row[r]]
+        owner[r] = index[j] if j >= 0 else -1
+        rows[r], smooth[r], hard[r] = state.rows[row[r]], state.smooth[row[r]], state.hard[row[r]]
+    cooled = np.empty(col_start.size - 1)
+    weight = _cover_weights(packing, owner)
+    for c in range(cooled.size):
+        before = parent[row[row_start[c]]]
+        cooled[c] = temperature[before]
+        if state.weight[before] == np.inf:
+            weight[c] = np.inf
+    return packing, origin, rows, smooth, hard, owner, weight, cooled
 
 
 @inner_njit
