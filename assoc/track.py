@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker
+    from assoc.tracking.adapting.identity_watch import OddIdentity
     from assoc.tracking.offline.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
@@ -258,26 +259,28 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
         return table, Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
 
     if sliced:
-        table, judged, missing = _in_slices(given, tracker, windows, stored)
+        table, judged, missing, odd = _in_slices(given, tracker, windows, stored)
         plots, count = None, len(judged.ends)
     else:
         turns = 1 + (survey.last - survey.first) / windows.rotation
         (table, judged, plots), count = _watched(
             given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
         )
-        missing = []
+        missing, odd = [], None
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
-        tracker.identity_watch.found.clear()
+        odd = ()
         judged = judged._replace(rates=None, kept=None)
         plots = plots and plots._replace(rates=None, kept=None)
         (table if whole else table.names).take_names(TrackTable())
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing])
+    return Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing], odd=odd)
 
 
-def _in_slices(given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots) -> tuple[Any, Judged, list[str]]:
-    """Track slices of the recording, write their tracks, and name what is missing."""
+def _in_slices(
+    given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots
+) -> tuple[Any, Judged, list[str], Sequence[OddIdentity]]:
+    """Track slices of the recording, write their tracks, and name what is missing, and odd identities."""
     import numpy as np
 
     from assoc._cli.track.slices import kept_slices
@@ -307,10 +310,9 @@ def _in_slices(given: Given, tracker: Tracker, windows: Windows, stored: StoredP
             sizes += part.sizes.tolist()
         table.finish()
         missing = slices.missing()
-    # ids begin again in each slice, and other processes watched theirs
-    tracker.identity_watch.found.clear()
     times = np.concatenate([np.zeros(0), *ends])
-    return table, Judged(times, sizes, stored.sourced, takers.rates(), takers.kept()), missing
+    judged = Judged(times, sizes, stored.sourced, takers.rates(), takers.kept())
+    return table, judged, missing, stitching.odd_identities
 
 
 def _watched(

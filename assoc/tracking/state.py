@@ -13,6 +13,7 @@ from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
 from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import Estimates
+from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.doubles import Doubles
@@ -44,6 +45,8 @@ class TrackerState(NamedTuple):
     """Number of calls of the solver so far."""
     registration: OnlineRegistration | None = None
     identities: Identities | None = None
+    watch: IdentityWatch = IdentityWatch()
+    """What identities said of tracks, and which cannot all be right."""
     estimates: Estimates | None = None
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None

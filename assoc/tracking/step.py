@@ -33,6 +33,7 @@ from assoc.tracking.stages.looks import count_out_of_view, keep_pace
 from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.taking_up import take_up
+from assoc.tracking.stages.watching import watch_identities
 from assoc.tracking.state import TrackerState, rng_of
 from assoc.tracking.track import Step
 
@@ -57,6 +58,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
         *([] if nursing else [take_up, merge, name_parents]),
+        watch_identities,
         report,
     ]
 
@@ -101,9 +103,9 @@ def check(
     if settings.registration is not None and stamps is not None:
         raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
     codes = None
-    if settings.identity is not None and identities is not None:
+    if identities is not None:
         codes = tuple(checked_identities(identities, [len(z) for z in checked]))
-        if stamps is None:
+        if stamps is None and settings.identity is not None:
             # only the functions for measurements with times of their own weigh identities
             stamps = tuple(np.full(len(z), when) for z in checked)
     scan = Scan(state.scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)

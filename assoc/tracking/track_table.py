@@ -24,6 +24,7 @@ from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.filter_choice import open_heights
 from assoc.tracking.quality import Qualities
+from assoc.tracking.stages.identity_evidence import address_text
 from assoc.tracking.track import Decision, Track, TrackColumns
 from assoc.tracking.tracker import Tracker
 
@@ -68,8 +69,8 @@ class TrackTable(Shown):
         Name of the target that each track followed most, where the truth has names, else address or code: column
         target.
     identities : dict of int to (str, str)
-        Address (hexadecimal) and Mode 3/A code (octal) that most plots of each track had, empty where none had one:
-        columns address_hex and mode3_oct.
+        Address (hexadecimal; of a ship its MMSI) and Mode 3/A code (octal) that most plots of each track had, empty
+        where none had one: columns address_hex and mode3_oct.
     """
 
     def __repr__(self) -> str:
@@ -156,7 +157,7 @@ class TrackTable(Shown):
         """Take the codes and addresses that were counted most."""
         addresses, codes = (kind.most() for kind in self._known)
         for number in dict.fromkeys([*addresses, *codes]):
-            address = f"{addresses[number]:06x}" if number in addresses else ""
+            address = address_text(addresses[number]) if number in addresses else ""
             code = f"{codes[number]:04o}" if number in codes else ""
             self.identities[number] = address, code
             self.targets.setdefault(number, address or code)

@@ -22,14 +22,14 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
-from assoc.tracking.adapting.identity_watch import IdentityWatch
+from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.births.nursery import current, with_nursery
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_time
-from assoc.tracking.stages.identity_evidence import IdentityParameters, checked_identities
+from assoc.tracking.stages.identity_evidence import IdentityParameters
 from assoc.tracking.stages.life_cycle import LifeCycle
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
@@ -136,8 +136,6 @@ class Tracker:
             warn(doubt)
         self.settings = with_nursery(settings)
         self.state = first_state(self.settings)
-        self.identity_watch = IdentityWatch(place.sensors)
-        """What is odd about the identities that `step` was given; see `health`. It is not saved."""
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, targets: str | None = None, **options: Any) -> Self:
@@ -190,7 +188,12 @@ class Tracker:
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
         found = self.state.estimates
-        return None if found is None else health(self.sensors, found, tuple(self.identity_watch.found))
+        return None if found is None else health(self.sensors, found, self.odd_identities)
+
+    @property
+    def odd_identities(self) -> tuple[OddIdentity, ...]:
+        """Codes and addresses that `step` was given and that cannot all be right; `health` has them, too."""
+        return self.state.watch.found
 
     @property
     def solver_calls(self) -> int:
@@ -264,8 +267,9 @@ class Tracker:
             what it looked at. No sensor may have looked in a direction twice. A sector without width: it did not
             look, as one that is off or reports on its own (AIS). Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
-            Mode 3/A code and ICAO address (of a ship its MMSI) of each measurement, 0 where it has none. Trackers that
-            were made without `identity` only watch them (`health`).
+            Mode 3/A code and ICAO address (of a ship its MMSI, `assoc.tracking.stages.identity_evidence.ship`) of each
+            measurement, 0 or -1 where it has none. Trackers that were made without `identity` only watch them
+            (`health`).
 
         Returns
         -------
@@ -283,10 +287,7 @@ class Tracker:
             Once, if all sensors measure angles alone and these measurements can start no track.
         """
         scan = check(self.settings, self.state, time, measurements, times, sectors, identities)
-        known = None if identities is None else checked_identities(identities, [len(z) for z in scan.measurements])
         self.state, step = advance(self.settings, self.state, scan)
-        if known is not None:
-            self.identity_watch.take(step.time, step.assigned, step.confirmed, times, known, lambda: self.tracks)
         return step
 
     def flush(self) -> tuple[Decision, ...]:
@@ -308,7 +309,6 @@ class Tracker:
             version. The tracker is then as it was.
         """
         self.state = file.restore(path, self.settings, self.state)
-        self.identity_watch = IdentityWatch(self.sensors)
 
     def __repr__(self) -> str:
         state = self.state

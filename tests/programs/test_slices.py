@@ -62,6 +62,20 @@ def test_slices_make_the_tracks_of_one_process(here, capsys, tracker):
     check_same(one, cut)
 
 
+def test_slices_tell_odd_identities_once(here, capsys):
+    plots = pd.read_csv("all.csv")
+    one, other = plots.mode3[plots.mode3 > 0].value_counts().index[:2]
+    plots.loc[plots.mode3 == one, "mode3"] = other
+    plots.to_csv("all.csv", index=False)
+    said, code = [], f"code {other:04o} is that of tracks "
+    for more in ([], ["--slice", "120"]):
+        words = ["all.csv", "--tracker", "nearest-neighbour", "-o", "t.csv", *more, *WORDS]
+        assert track.main([word for word in words if word != "-q"]) == 0
+        said.append([line for line in capsys.readouterr().out.splitlines() if code in line])
+    assert len(said[0]) == len(said[1]) == 1
+    assert said[0][0].rpartition(", ")[2] == said[1][0].rpartition(", ")[2]
+
+
 def test_stitching_is_by_as_many_common_plots_as_possible():
     before, early = np.repeat([7, 8, 8, 9, -1], [3, 1, 3, 4, 2]), np.repeat([1, 1, 2, 3, 3], [3, 1, 3, 4, 2])
     assert _same(before, early) == {1: 7, 2: 8, 3: 9}

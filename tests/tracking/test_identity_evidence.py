@@ -174,8 +174,8 @@ def test_bad_identities_are_refused():
         ([], "one array for each of 1 sensors"),
         ([np.zeros((2, 1), dtype=int)], "of shape"),
         ([np.zeros((2, 2))], "whole numbers"),
-        ([np.array([[-1, 0], [0, 0]])], "from 0 to"),
-        ([np.array([[0, LARGEST + 1], [0, 0]])], "from 0 to"),
+        ([np.array([[-2, 0], [0, 0]])], "from 0 .or -1: none. to"),
+        ([np.array([[0, LARGEST + 1], [0, 0]])], "from 0 .or -1: none. to"),
     ):
         with pytest.raises(InvalidInputError, match=words):
             tracker.step(10.0, [z], identities=bad)

@@ -148,7 +148,7 @@ def test_late_plots_keep_their_identities():
             assert kept[0].any()
     with pytest.raises(InvalidInputError, match="identities of sensor 0"):
         LatePlots(TRACKERS["mht"]([radar(recording)], identity=IdentityParameters())).step(
-            1.0, [recording.measurements[:1]], None, None, [np.array([[-1, 0]])]
+            1.0, [recording.measurements[:1]], None, None, [np.array([[-2, 0]])]
         )
 
 

@@ -244,7 +244,7 @@ def test_identities_that_are_none_are_told():
     place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
     told = []
     live = LiveTracker(place, lambda: TRACKERS["mht"]([radar(recording)]), tell=told.append)
-    for pair in ((-1, 0), (0, 10**9), (0.5, 0), (1,), "use", None):
+    for pair in ((-2, 0), (0, 2 * 10**9), (0.5, 0), (1,), "use", None):
         live.take("1", 0.0, recording.measurements[0], pair)
     assert live.counts["unusable"] == 6 and len(told) == 1 and "identities" in told[0]
     live.take("1", 0.0, recording.measurements[0])

@@ -18,7 +18,7 @@ from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import COORDINATES, coordinates
 from assoc.recordings.several import NO_HEIGHT, heights_above
-from assoc.tracking.stages.identity_evidence import LARGEST
+from assoc.tracking.stages.identity_evidence import ship
 
 if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin
@@ -151,14 +151,15 @@ def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
         A value is out of range or not a number.
     """
     found = []
-    for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, LARGEST)):
+    for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, 999_999_999)):
         number = 0
         if isinstance(given, str) and given.strip():
             digits = given.strip()
-            # nine decimal digits are a ship's MMSI
-            ship = base == 16 and len(digits) == 9 and digits.isdigit()
-            plain = digits.isascii() and digits.isalnum() and (ship or base == 10 or len(digits) <= 6)
-            number = int(digits, 10 if ship else base) if plain else -1
+            plain = digits.isascii() and digits.isalnum()
+            if plain and base == 16 and len(digits) == 9 and digits.isdigit():
+                found.append(ship(int(digits)))
+                continue
+            number = int(digits, base) if plain and (base == 10 or len(digits) <= 6) else -1
         elif isinstance(given, int) and not isinstance(given, bool):
             number = given
         elif given is not None and given != "":

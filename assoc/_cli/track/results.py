@@ -38,6 +38,13 @@ class Tracked(NamedTuple):
     """For reports."""
     missing: Sequence[str] = ()
     """Files and slices that they lack."""
+    odd: Sequence[object] | None = None
+    """Identities that cannot all be right; None: those that the tracker found."""
+
+    @property
+    def odd_identities(self) -> Sequence[object]:
+        """Identities that cannot all be right."""
+        return self.tracker.odd_identities if self.odd is None else self.odd
 
 
 class Judged(NamedTuple):
@@ -72,7 +79,7 @@ def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: flo
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
         (given["check"], lambda: print_lines(str(found.tracker.health))),
-        (not given["check"], lambda: _print_odd(found.tracker.identity_watch.found)),
+        (not given["check"], lambda: _print_odd(found.odd_identities)),
         (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
         (found.plots, lambda: _print_rates(found.plots, given["identity"])),
     )

@@ -21,6 +21,7 @@ from assoc._system.engine import spread
 from assoc._text.times import moment
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.offline.slices import Slice, SliceTracks, TrackSlice, slices_of
 from assoc.tracking.track_table import COLUMNS
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from assoc.recordings import Window
 
-_FORMAT, _VERSION = "assoc.slice", 1
+_FORMAT, _VERSION = "assoc.slice", 2
 _ARRAYS = {"ends": 1, "sizes": 1, "early": 1, "tracks": 1, "sure": 1, "known": 2}
 _WHOLE = ("track_id", "hits", "parent", "hits_1", "hits_2", "sizes", "early", "tracks", "known")
 
@@ -87,6 +88,7 @@ class Slices:
             for column in frame:
                 values = frame[column].to_numpy()
                 arrays[f"{name}.{column}"] = values.astype(np.str_) if column == "status" else values
+        arrays["odd"] = np.array(IdentityWatch(found=part.odd).text())
         save_npz(self._path(part.number), _FORMAT, _VERSION, arrays)
 
     def load(self, number: int) -> SliceTracks | None:
@@ -94,7 +96,7 @@ class Slices:
         import pandas as pd
 
         columns = (*COLUMNS, "latitude", "longitude", "nis", "consistent", "hits_1", "hits_2")
-        fields = {name: Field(_kind(name), ndim) for name, ndim in _ARRAYS.items()}
+        fields = {name: Field(_kind(name), ndim) for name, ndim in _ARRAYS.items()} | {"odd": Field("str", 0)}
         for table in ("frame", "border"):
             fields |= {f"{table}.{name}": Field(_kind(name), 1, name in COLUMNS) for name in columns}
         if not os.path.exists(self._path(number)):
@@ -105,9 +107,10 @@ class Slices:
             for table in ("frame", "border"):
                 names = [name for name in columns if f"{table}.{name}" in found]
                 frames.append(pd.DataFrame({name: found[f"{table}.{name}"] for name in names}))
-        except ValueError:  # of this package, or columns of several lengths
+            odd = IdentityWatch.restored(str(found["odd"])).found
+        except (ValueError, TypeError):  # of this package, or columns of several lengths
             return None
-        return SliceTracks(number, frames[0], frames[1], *(found[name] for name in _ARRAYS))
+        return SliceTracks(number, frames[0], frames[1], odd=odd, **{name: found[name] for name in _ARRAYS})
 
     def done(self) -> list[int]:
         """Numbers of the slices that are done, in order."""

@@ -1,27 +1,30 @@
 """Identities that cannot all be right, told by name: which one, of which tracks, by which sensor, when.
 
-A transponder or an AIS that says a wrong code or address is seen in three ways: its track's address changes, two
-sensors say different ones of one track, or two tracks have the same one at a time. A sensor's word counts once it has
-said the same of a confirmed track three times in a row: single garbled or misplaced plots mean nothing. A code may
-change in flight, and codes that end in 00 are of many aircraft.
+A transponder or an AIS that says a wrong code or address is seen in four ways: its track's address changes; a track
+with a new address goes on where another ended (a tracker that associates by addresses); two sensors say different ones
+of one track; two tracks have the same one at a time. A sensor's word counts once it has said the same of a confirmed
+track three times in a row: single garbled or misplaced plots mean nothing. A code may change in flight, and codes that
+end in 00 are of many aircraft.
+
+Tracks that swap plots where targets meet are no fault of identities. What is wrong survives a swap: an address that
+became another is heard no more, from any track; the new one was not that of another track. Two tracks with two
+addresses in common have exchanged plots.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
-from assoc._text.plain import one_line
 from assoc._text.times import moment
 from assoc._types import Array
-from assoc.recordings.several import NO_HEIGHT
-from assoc.sensors import Sensor
-from assoc.tracking.stages.identity_evidence import ADDRESSES, UNKNOWN
-from assoc.tracking.track import Track
+from assoc.tracking.stages.identity_evidence import UNKNOWN, address_text
 
 SURE = 3
 """Equal identities in a row that a sensor must have said of a track."""
+SILENT = 6
+"""Reports of a new address in a row after which the old one, unheard meanwhile, is taken to have become it."""
 MOST = 1_000
 """Odd identities that are remembered."""
 _CODE = 0
@@ -33,158 +36,305 @@ class OddIdentity(NamedTuple):
 
     time: float
     """Seconds."""
-    text: str
+    kind: str
+    """"became", "goes on", "twice" or "differ"."""
+    column: int
+    """0: a Mode 3/A code, 1: an address."""
+    tracks: tuple[int, ...]
+    numbers: tuple[int, ...]
+    sensors: tuple[str, ...]
+    decimal: bool = False
+    """Whether a code is its four octal digits, read as a decimal number."""
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What is odd, whoever says it, and when."""
+        return self.kind, self.column, self.tracks, self.numbers
+
+    def named(self, name: Callable[[int], int]) -> OddIdentity:
+        """The same with the tracks' names in place of their ids."""
+        tracks = tuple(map(name, self.tracks))
+        return self._replace(tracks=tuple(sorted(tracks)) if self.kind == "twice" else tracks)
 
     def __str__(self) -> str:
-        return f"{self.text}, {moment(self.time)}"
+        word, by = ("code" if self.column == _CODE else "address"), self.sensors
+        (one, *rest), number = self.tracks, [self._digits(number) for number in self.numbers]
+        texts = {
+            "became": lambda: f"track {one}: {word} {number[0]} became {number[1]} ({by[0]})",
+            "goes on": lambda: f"track {one} goes on as {rest[0]}: {word} {number[0]} became {number[1]} ({by[0]})",
+            "twice": lambda: f"{word} {number[0]} is that of tracks {one} and {rest[0]} at once ({by[0]})",
+            "differ": lambda: f"track {one}: {word} {number[0]} by {by[0]}, {number[1]} by {by[1]}",
+        }
+        return f"{texts[self.kind]()}, {moment(self.time)}"
+
+    def _digits(self, number: int) -> str:
+        if self.column == _CODE:
+            return f"{number:04d}" if self.decimal else f"{number:04o}"
+        return address_text(number)
 
 
-class _Voice:
-    """What one sensor says of one track."""
+class Voice(NamedTuple):
+    """What one sensor says of one track; times in seconds."""
 
-    __slots__ = ("before", "last", "run", "said", "settled", "since")
+    said: int
+    """The last number."""
+    run: int
+    """How often in a row."""
+    begin: float
+    """When it said it first."""
+    before: float
+    last: float
+    """The last two times."""
+    settled: int
+    """The last number that it said three times in a row."""
 
-    def __init__(self) -> None:
-        self.said, self.run, self.settled = UNKNOWN, 0, UNKNOWN
-        self.since = self.before = self.last = -math.inf
-        """When it was sure of the settled identity, and when it said it the last two times, seconds."""
+
+class Heard(NamedTuple):
+    """Where a number was heard."""
+
+    last: float
+    """When, of any track or none, seconds."""
+    scan: int
+    carriers: tuple[tuple[int, float], ...]
+    """The last two confirmed tracks that had it, the newest first, and when."""
 
 
-class IdentityWatch:
-    """Watches the identities of tracks' measurements; it is not saved with a tracker.
+class Doubt(NamedTuple):
+    """A number that may have become another one."""
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-        Plots of one radar with heights and without are one sensor.
-    decimal : bool
-        Whether a code is its four octal digits, read as a decimal number.
-    """
+    number: int
+    track: int
+    since: float
+    """When the new one was first said, seconds."""
 
-    def __init__(self, sensors: Sequence[Sensor], *, decimal: bool = False) -> None:
-        names = (one_line(sensor.name.removesuffix(NO_HEIGHT)) for sensor in sensors)
-        self._names = [name or f"sensor {s}" for s, name in enumerate(names, 1)]
-        self._base = 10 if decimal else 8
-        self._known: set[object] = set()
-        self.found: list[OddIdentity] = []
-        """What was found so far, at most 1,000."""
-        self.begin_anew()
 
-    def begin_anew(self) -> None:
-        """Forget all tracks and times, where tracks begin anew; what was found stays."""
-        self._forget_at = _FORGET
-        self._voices: dict[tuple[int, int], dict[str, _Voice]] = {}
-        self._owners: dict[tuple[int, int], set[int]] = {}
-        self._time = -math.inf
+class Sight(NamedTuple):
+    """What is known of tracks besides their identities."""
 
-    def take(
-        self,
-        time: float,
-        taken: Sequence[Array],
-        confirmed: Sequence[Array],
-        times: Sequence[Array] | None,
-        identities: Sequence[Array],
-        living: Callable[[], Iterable[Track]],
-    ) -> list[OddIdentity]:
-        """Take in the measurements of a step; returns what is new. Steps that are done again are left out.
+    near: Callable[[int], Sequence[int]]
+    """The confirmed tracks whose targets may be where a track's is, the nearest first."""
+    living: Callable[[], set[int]]
+    """Ids of the tracks that live or may be taken up again."""
+
+
+class IdentityWatch(NamedTuple):
+    """What is known of identities; an immutable part of a tracker's state."""
+
+    decimal: bool = False
+    """As of `OddIdentity`."""
+    voices: Mapping[tuple[int, int, str], Voice] = {}
+    """By track, column and name of the sensor."""
+    numbers: Mapping[tuple[int, int], Heard] = {}
+    """By column and number."""
+    doubts: Mapping[tuple[int, int, str], Doubt] = {}
+    """As voices."""
+    found: tuple[OddIdentity, ...] = ()
+    """What was found so far, at most 1,000."""
+    forget_at: int = _FORGET
+
+    def after(
+        self, scan: int, time: float, names: Sequence[str], taken: Sequence[Array], confirmed: Sequence[Array],
+        times: Sequence[Array] | None, identities: Sequence[Array], sight: Sight, *, used: bool = False,
+    ) -> IdentityWatch:  # fmt: skip
+        """The watch after the measurements of a step.
 
         Parameters
         ----------
-        time : float
-            Of the step, seconds.
+        scan, time : int, float
+            Number and time (s) of the step.
+        names : sequence over sensors of str
+            Those of one name are one sensor.
         taken, confirmed : sequences over sensors of arrays (n_s,)
             The track that took each measurement, 0 if none did, and whether it was confirmed then.
         times : sequence over sensors of arrays (n_s,) or None
             Own times; None: that of the step.
         identities : sequence over sensors of int arrays (n_s, 2)
             Codes and addresses, 0 where there are none.
-        living : callable
-            Returns the tracks that live.
+        sight : Sight
+        used : bool
+            Whether the tracker associates by addresses.
         """
-        if time <= self._time:
-            return []
-        self._time, before = time, len(self.found)
+        if not any(pairs.any() for pairs in identities):
+            return self
+        hearing = _Hearing(self, scan, names, sight, used)
         for s, (ids, sure, pairs) in enumerate(zip(taken, confirmed, identities, strict=True)):
-            known = sure & (ids > 0) & pairs.any(axis=1)
+            known = pairs.any(axis=1)
             stamps = [time] * int(known.sum()) if times is None else times[s][known].tolist()
-            for track, when, pair in zip(ids[known].tolist(), stamps, pairs[known].tolist(), strict=True):
+            rows = zip(ids[known].tolist(), sure[known].tolist(), stamps, pairs[known].tolist(), strict=True)
+            for track, certain, when, pair in rows:
                 for column, number in enumerate(pair):
                     if number != UNKNOWN:
-                        self._hear(track, self._names[s], when, column, number)
-        if len(self._voices) > self._forget_at:
-            self._forget({track.track_id for track in living()})
-        return self.found[before:]
+                        hearing.hear(track if certain else 0, column, names[s], when, number)
+        return hearing.watch()
+
+    def text(self) -> str:
+        """The watch as JSON; `restored` reads it."""
+        tables = ([[*key, *value] for key, value in table.items()] for table in self[1:4])
+        return json.dumps([self.decimal, *tables, self.found, self.forget_at])
+
+    @staticmethod
+    def restored(text: str) -> IdentityWatch:
+        """Read what `text` returned; ValueError or TypeError for anything else."""
+        decimal, voices, numbers, doubts, found, forget_at = json.loads(text)
+        return IdentityWatch(
+            bool(decimal),
+            {(int(t), int(c), str(s)): Voice(int(a), int(n), float(x), float(y), float(z), int(b))
+             for t, c, s, a, n, x, y, z, b in voices},
+            {(int(c), int(n)): Heard(float(last), int(scan), tuple((int(t), float(x)) for t, x in of))
+             for c, n, last, scan, of in numbers},
+            {(int(t), int(c), str(s)): Doubt(int(n), int(o), float(x)) for t, c, s, n, o, x in doubts},
+            tuple(_odd(*one) for one in found),
+            int(forget_at),
+        )  # fmt: skip
+
+
+def _odd(time: Any, kind: Any, column: Any, tracks: Any, numbers: Any, sensors: Any, decimal: Any) -> OddIdentity:
+    ids, values, names = tuple(map(int, tracks)), tuple(map(int, numbers)), tuple(map(str, sensors))
+    found = OddIdentity(float(time), str(kind), int(column), ids, values, names, bool(decimal))
+    try:
+        str(found)
+    except (KeyError, IndexError) as error:
+        raise ValueError(f"an odd identity lacks {error}") from None
+    return found
+
+
+class _Hearing:
+    """The watch while the measurements of a step are taken in."""
+
+    def __init__(self, before: IdentityWatch, scan: int, names: Sequence[str], sight: Sight, used: bool) -> None:
+        self._before, self._scan, self._sight, self._used = before, scan, sight, used
+        self._names = tuple(dict.fromkeys(names))
+        self._voices, self._numbers, self._doubts = dict(before.voices), dict(before.numbers), dict(before.doubts)
+        self._found = list(before.found)
+
+    def watch(self) -> IdentityWatch:
+        """The watch now."""
+        forget_at = self._before.forget_at
+        if max(len(self._voices), len(self._numbers)) > forget_at:
+            self._forget(self._sight.living())
+            forget_at = _FORGET + 2 * max(len(self._voices), len(self._numbers))
+        tables = self._voices, self._numbers, self._doubts
+        return self._before._replace(
+            voices=tables[0], numbers=tables[1], doubts=tables[2], found=tuple(self._found), forget_at=forget_at
+        )
 
     def _forget(self, living: set[int]) -> None:
-        """Forget tracks that do not live."""
-        self._voices = {key: voices for key, voices in self._voices.items() if key[0] in living}
-        self._owners = {key: owners & living for key, owners in self._owners.items() if owners & living}
-        self._forget_at = _FORGET + 2 * len(self._voices)
+        """Forget tracks that do not live, and numbers that only they had and that were not heard of late."""
+        self._voices = {key: voice for key, voice in self._voices.items() if key[0] in living}
+        self._doubts = {key: doubt for key, doubt in self._doubts.items() if key[0] in living}
+        late = self._scan - _FORGET
+        self._numbers = {
+            key: heard
+            for key, heard in self._numbers.items()
+            if heard.scan > late or any(track in living for track, _ in heard.carriers)
+        }
 
-    def _hear(self, track: int, sensor: str, time: float, column: int, number: int) -> None:
-        voices = self._voices.setdefault((track, column), {})
-        voice = voices.get(sensor)
-        if voice is None:
-            voice = voices[sensor] = _Voice()
-        voice.run = voice.run + 1 if voice.said == number else 1
-        voice.said = number
-        if voice.settled != number:
-            if voice.run < SURE:
-                return
-            old, voice.settled, voice.since = voice.settled, number, time
-            voice.before = voice.last = -math.inf
-            self._owners.setdefault((column, number), set()).add(track)
-            if old != UNKNOWN and column != _CODE:
-                text = f"track {track}: {self._named(column, old)} became {self._digits(column, number)} ({sensor})"
-                self._add(time, (track, old, number), text)
-        owners = self._owners.get((column, number), ())
-        if len(voices) == 1 and len(owners) == 1 and track in owners:
-            # nearly all: nobody else says it, or anything of this track
-            voice.before, voice.last = voice.last, time
+    def hear(self, track: int, column: int, sensor: str, time: float, number: int) -> None:
+        """Take in what a sensor says of a confirmed track; 0: of something else."""
+        heard = self._numbers.get((column, number), Heard(time, self._scan, ()))
+        others = tuple(one for one in heard.carriers if one[0] != track)
+        carriers = ((track, time), *others[:1]) if track else heard.carriers
+        self._numbers[column, number] = Heard(time, self._scan, carriers)
+        if not track:
             return
-        name = self._named(column, number)
-        # codes whose last two octal digits are 0 are not of one aircraft
-        shared = column == _CODE and number % self._base**2 == 0
-        for other, twin in () if shared else self._twins(track, column, number):
-            if _at_once(voice, twin):
-                low, high = sorted((track, other))
-                text = f"{name} is that of tracks {low} and {high} at once ({sensor})"
-                self._add(time, (column, number, low, high), text)
-        for other_name, other_voice in voices.items():
-            said = other_voice.settled
-            if said not in (UNKNOWN, number) and _at_once(voice, other_voice):
-                low, high = sorted((number, said))
-                # what another track has is a matter of the two tracks
-                if not any(self._owners.get((column, one), {track}) - {track} for one in (low, high)):
-                    text = f"track {track}: {name} by {sensor}, {self._digits(column, said)} by {other_name}"
-                    self._add(time, (column, track, low, high), text)
-        voice.before, voice.last = voice.last, time
+        key = track, column, sensor
+        voice = self._voices.get(key)
+        if voice is None:
+            voice = Voice(number, 1, time, time, time, UNKNOWN)
+            if self._used and column != _CODE and not others:
+                self._find_predecessor(key, time)
+        elif voice.said == number:
+            voice = Voice(number, voice.run + 1, voice.begin, voice.last, time, voice.settled)
+        else:
+            voice = Voice(number, 1, time, time, time, voice.settled)
+        if voice.run >= SURE:
+            if voice.settled != number:
+                self._settle(key, voice, others)
+                voice = voice._replace(settled=number)
+            if key in self._doubts:
+                self._judge(key, voice)
+        self._voices[key] = voice
+        if voice.run >= SURE:
+            if others and not self._shared(column, number):
+                self._find_twins(key, voice, others)
+            self._compare_sensors(key, voice)
 
-    def _twins(self, track: int, column: int, number: int) -> Iterator[tuple[int, _Voice]]:
-        """Voices that say of other tracks what is said of this one."""
-        for other in sorted(self._owners.get((column, number), set()) - {track}):
-            for voice in self._voices.get((other, column), {}).values():
-                if voice.settled == number:
-                    yield other, voice
+    def _shared(self, column: int, number: int) -> bool:
+        """Whether the last two octal digits of a code are 0: those are not of one aircraft."""
+        return column == _CODE and number % (100 if self._before.decimal else 64) == 0
 
-    def _named(self, column: int, number: int) -> str:
-        return f"{'code' if column == _CODE else 'address'} {self._digits(column, number)}"
+    def _settle(self, key: tuple[int, int, str], voice: Voice, others: tuple[tuple[int, float], ...]) -> None:
+        """A sensor has said a new number of a track three times: was it another one before?"""
+        if others:
+            self._doubts.pop(key, None)
+        elif key[1] != _CODE and voice.settled != UNKNOWN:
+            self._doubts[key] = Doubt(voice.settled, key[0], voice.begin)
 
-    def _digits(self, column: int, number: int) -> str:
-        """Four octal digits of a code, six hexadecimal ones of an address, nine decimal ones of a ship's."""
-        if column == _CODE:
-            return f"{number:04o}" if self._base == 8 else f"{number:04d}"
-        return f"{number:06x}" if number < ADDRESSES else f"{number:09d}"
+    def _find_predecessor(self, key: tuple[int, int, str], time: float) -> None:
+        """A track is heard for the first time: may it go on where another, of another address, ended?"""
+        for other in self._sight.near(key[0]):
+            for theirs in self._of(other, key[1]).values():
+                if theirs.settled != UNKNOWN:
+                    self._doubts[key] = Doubt(theirs.settled, other, time)
+                    return
 
-    def _add(self, time: float, key: object, text: str) -> None:
-        if key not in self._known and len(self.found) < MOST:
-            self._known.add(key)
-            self.found.append(OddIdentity(time, text))
+    def _unheard(self, column: int, number: int, since: float) -> bool:
+        heard = self._numbers.get((column, number))
+        return heard is not None and heard.last < since
+
+    def _judge(self, key: tuple[int, int, str], voice: Voice) -> None:
+        """Whether a number that may have become another one is heard no more."""
+        (track, column, sensor), doubt = key, self._doubts[key]
+        if not self._unheard(column, doubt.number, doubt.since):
+            del self._doubts[key]
+        elif voice.run >= SILENT:
+            del self._doubts[key]
+            kind, tracks = ("became", (track,)) if doubt.track == track else ("goes on", (doubt.track, track))
+            self._add(voice.last, kind, column, tracks, (doubt.number, voice.said), (sensor,))
+
+    def _find_twins(self, key: tuple[int, int, str], voice: Voice, others: tuple[tuple[int, float], ...]) -> None:
+        """Is a number that of two tracks at once?"""
+        track, column, sensor = key
+        for other, when in others:
+            if when <= voice.begin:
+                continue
+            mine, theirs = self._of(track, column), self._of(other, column)
+            if not any(one.said == voice.said and _at_once(voice, one) for one in theirs.values()):
+                continue
+            said = ({one.said for one in voices.values() if one.last >= voice.begin} for voices in (mine, theirs))
+            # two in common: they have exchanged plots
+            if len(set.intersection(*said)) == 1 and other not in self._sight.near(track):
+                self._add(voice.last, "twice", column, (min(track, other), max(track, other)), (voice.said,), (sensor,))
+
+    def _compare_sensors(self, key: tuple[int, int, str], voice: Voice) -> None:
+        """Do two sensors say different numbers of a track?"""
+        track, column, sensor = key
+        for other, theirs in self._of(track, column).items():
+            if theirs.said == voice.said or not _at_once(voice, theirs):
+                continue
+            since, pairs = min(voice.begin, theirs.begin), sorted([(voice.said, sensor), (theirs.said, other)])
+            # what another track has is a matter of the two tracks
+            carriers = (
+                self._numbers[column, number].carriers for number, _ in pairs if (column, number) in self._numbers
+            )
+            if all(one == track or when < since for of in carriers for one, when in of):
+                numbers, sensors = zip(*pairs, strict=True)
+                self._add(voice.last, "differ", column, (track,), numbers, sensors)
+
+    def _of(self, track: int, column: int) -> dict[str, Voice]:
+        """What the sensors say of a track."""
+        found = {name: self._voices.get((track, column, name)) for name in self._names}
+        return {name: voice for name, voice in found.items() if voice is not None}
+
+    def _add(self, time: float, kind: str, column: int, tracks: Any, numbers: Any, sensors: Any) -> None:
+        odd = OddIdentity(time, kind, column, tracks, numbers, sensors, self._before.decimal)
+        if len(self._found) < MOST and not any(one.key == odd.key for one in self._found):
+            self._found.append(odd)
 
 
-def _at_once(one: _Voice, other: _Voice) -> bool:
-    """Whether `one`, heard now, and another have both been heard twice since the other was sure.
+def _at_once(one: Voice, other: Voice) -> bool:
+    """Whether `one`, heard now, and another have both been heard twice since the other's number was first said.
 
     A track that has ended, and takes one more plot of those of its successor, is not meant.
     """
-    return one.last > other.since and other.before > one.since
+    return min(one.run, other.run) >= SURE and one.before > other.begin and other.before > one.begin

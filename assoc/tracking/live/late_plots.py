@@ -19,6 +19,7 @@ from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
+from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.births.nursery import current
 from assoc.tracking.stages.checking import checked_measurements
 from assoc.tracking.stages.identity_evidence import checked_identities, no_identities
@@ -127,6 +128,12 @@ class LatePlots:
         return sorted((track.named(self._name(track.track_id)) for track in inner), key=lambda track: track.track_id)
 
     @property
+    def odd_identities(self) -> tuple[OddIdentity, ...]:
+        """Identities that cannot all be right, of tracks whose names are known; see `Tracker.odd_identities`."""
+        found = self.tracker.odd_identities
+        return tuple(odd.named(self.names.__getitem__) for odd in found if self.names.keys() >= {*odd.tracks})
+
+    @property
     def scans(self) -> list[float]:
         """Times of the scans that may still be revised, the oldest first, seconds."""
         return [past.time for past in self.past]
@@ -177,7 +184,7 @@ class LatePlots:
         tracker, now = self.tracker, self.tracker.time
         checked = checked_measurements(measurements, tracker.sensors)
         codes = None
-        if identities is not None and tracker.settings.identity is not None:
+        if identities is not None:
             codes = checked_identities(identities, [len(z) for z in checked])
         if times is None or now is None:
             return self._finish(self._advance(time, checked, times, sectors, codes), 0, 0)

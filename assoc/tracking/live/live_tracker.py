@@ -89,13 +89,11 @@ class LiveTracker:
         spans = positive(interval, "interval"), None if turns is None else [positive(turn, "turns") for turn in turns]
         late = positive(horizon, "horizon"), positive(wait, "wait", zero=True)
         self.settings = LiveSettings(scene, make, *spans, *late, tell, quality)
-        self.state = LiveState(
-            LatePlots(make(), self.settings.horizon), [Antenna() for _ in scene.sensors], OwnPositions(scene)
-        )
+        self.state = LiveState(self._begun(), [Antenna() for _ in scene.sensors], OwnPositions(scene))
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
-        self._watch = IdentityWatch(scene.sensors, decimal=True)
+        self._told: set[tuple[object, ...]] = set()
         self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
         self._first: list[list[Array]] = [[] for _ in scene.sensors]
@@ -103,6 +101,12 @@ class LiveTracker:
         """Plots used, late plots, and those that could not be used, by reason."""
         self.seconds: deque[float] = deque(maxlen=_MOST_TIMED)
         """Wall time of each of the last steps."""
+
+    def _begun(self, **ids: int) -> LatePlots:
+        tracker = self.settings.make()
+        # codes are their four octal digits, read as decimal numbers
+        tracker.state = tracker.state._replace(watch=IdentityWatch(decimal=True))
+        return LatePlots(tracker, self.settings.horizon, **ids)
 
     @property
     def positions(self) -> tuple[int, ...]:
@@ -139,6 +143,7 @@ class LiveTracker:
             The file is not such a state.
         """
         self.state, self.confirmed, self.counts = state_file.restore(path, self.settings)
+        self._told = {odd.key for odd in self.state.tracker.odd_identities}
 
     @property
     def heard(self) -> list[Heard]:
@@ -303,8 +308,8 @@ class LiveTracker:
         """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
         self._qualities.keep(())
-        self._watch.begin_anew()
-        late = LatePlots(self.settings.make(), self.settings.horizon, first_id=self.state.tracker.next_id)
+        self._told.clear()
+        late = self._begun(first_id=self.state.tracker.next_id)
         antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
         self.state = LiveState(late, antennas, self.state.own)
 
@@ -381,12 +386,13 @@ class LiveTracker:
         begin, step = clock.perf_counter(), None
         try:
             step = state.tracker.step(end, z, times, sectors, identities)
-            known = step.assigned, step.confirmed, times, identities
-            for one in zip(*known, strict=True):
+            for one in zip(step.assigned, step.confirmed, times, identities, strict=True):
                 self._kept.take(*one)
-            for odd in self._watch.take(end, *known, lambda: state.tracker.tracks):
-                self.counts["odd identities"] += 1
-                settings.tell(f"warning: {odd}")
+            for odd in state.tracker.odd_identities:
+                if odd.key not in self._told:
+                    self._told.add(odd.key)
+                    self.counts["odd identities"] += 1
+                    settings.tell(f"warning: {odd}")
             self.counts["late"] += step.late
             if step.refused:
                 self.counts["too old"] += step.refused

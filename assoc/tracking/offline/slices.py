@@ -18,6 +18,7 @@ from assoc.problem import AssignmentProblem
 from assoc.recordings import Window
 from assoc.scene.geodesy import Origin
 from assoc.solvers.assign import assign
+from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.offline.plots import Followed, follow, known_of
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
@@ -79,6 +80,8 @@ class SliceTracks(NamedTuple):
     """Whether these were confirmed."""
     known: Array
     """Aircraft (-2: not known), code and address of its own plots, (n, 3)."""
+    odd: tuple[OddIdentity, ...] = ()
+    """Identities that cannot all be right."""
 
 
 class TrackSlice:
@@ -118,6 +121,7 @@ class TrackSlice:
             np.concatenate([one.tracks for one in own]),
             np.concatenate([one.sure for one in own]),
             np.concatenate([known_of(one.window) for one in own]),
+            self._tracker.odd_identities,
         )
 
 
@@ -127,6 +131,8 @@ class Stitching:
     def __init__(self) -> None:
         self._next = 1
         self._before: SliceTracks | None = None
+        self.odd_identities: list[OddIdentity] = []
+        """Identities that cannot all be right, each once."""
 
     def add(self, part: SliceTracks) -> SliceTracks:
         """Return the next slice with ids of the whole; after a missing one all its tracks are new."""
@@ -147,6 +153,10 @@ class Stitching:
         if before is not None and len(before.frame):
             frame = _continued(frame, before.frame, part.border, same)
         tracks = np.array([names[local] for local in part.tracks.tolist()], dtype=np.int64)
+        # of tracks that this slice shows alone
+        shown, known = {*part.tracks.tolist()}, {odd.key for odd in self.odd_identities}
+        odd = (one.named(names.__getitem__) for one in part.odd if shown >= {*one.tracks})
+        self.odd_identities += [one for one in odd if one.key not in known]
         self._before = part._replace(frame=frame, tracks=tracks)
         return self._before
 

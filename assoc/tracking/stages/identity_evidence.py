@@ -28,14 +28,25 @@ from assoc.errors import InvalidInputError
 
 CODES, ADDRESSES = 2**12, 2**24
 """Numbers of Mode 3/A codes and of addresses."""
-LARGEST = 999_999_999
-"""Largest identity: ships have nine decimal digits (MMSI) in place of an address, above all addresses."""
+_SHIPS = 1_000_000_000
+LARGEST = _SHIPS + ADDRESSES - 1
+"""Largest identity: ships have nine decimal digits (MMSI) in place of an address, above all addresses; see `ship`."""
 UNKNOWN = 0
 """Code or address of a plot without one."""
 MEMORY = 6
 """Last plots of a track that count: codes may change in flight."""
 PREFIX = "identity."
 """Prefix of the names of the arrays in files."""
+
+
+def ship(mmsi: int) -> int:
+    """The identity of a ship: its MMSI, and 10^9 more where this could be an address (stations on shore: 00...)."""
+    return mmsi if mmsi >= ADDRESSES else _SHIPS + mmsi
+
+
+def address_text(number: int) -> str:
+    """Six hexadecimal digits of an address, the nine decimal ones of a ship."""
+    return f"{number:06x}" if number < ADDRESSES else f"{number % _SHIPS:09d}"
 
 
 @dataclass(frozen=True)
@@ -168,7 +179,7 @@ def no_identities(measurements: Sequence[Array]) -> list[Array]:
 
 
 def checked_identities(identities: Sequence[Array], sizes: Sequence[int]) -> list[Array]:
-    """Codes and addresses of each sensor's measurements, int64 (n_s, 2).
+    """Codes and addresses of each sensor's measurements, int64 (n_s, 2); -1, as 0, is none.
 
     Raises
     ------
@@ -185,6 +196,6 @@ def checked_identities(identities: Sequence[Array], sizes: Sequence[int]) -> lis
                 f"got {array.dtype} {array.shape}"
             )
         # some sources write the four octal digits of a code as a decimal number, up to 7777
-        if array.size and not (array.min() >= 0 and array.max() <= LARGEST):
-            raise InvalidInputError(f"identities of sensor {s}: expected numbers from 0 to {LARGEST}")
-    return [array.astype(np.int64) for array in found]
+        if array.size and not (array.min() >= -1 and array.max() <= LARGEST):
+            raise InvalidInputError(f"identities of sensor {s}: expected numbers from 0 (or -1: none) to {LARGEST}")
+    return [np.maximum(array.astype(np.int64), UNKNOWN) for array in found]
