@@ -242,7 +242,7 @@ def test_no_track_starts_in_closed_areas(tmp_path, capsys):
         ("[[[46.5, 8.0]]]", "closed: area 1: expected 2 corners of a box"),
         ("[[[46.5, 8.0], [146.5, 8.2]]]", "closed: area 1: expected a latitude within +-90"),
         ("[[[46.5, 8.0], [46.5, 8.2]]]", "closed: area 1: the corners enclose nothing"),
-        ('[[[46.5, "a"], [46.5, 8.2]]]', "closed: area 1: expected [latitude, longitude"),
+        ('[[[46.5, "a"], [46.5, 8.2]]]', "closed: area 1: expected 2 corners of a box"),
     ):
         (tmp_path / "radars.toml").write_text(f"closed = {wrong}\n{text}")
         assert track.main([file, "-o", str(out)]) == 2

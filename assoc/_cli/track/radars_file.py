@@ -97,7 +97,7 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
     for number, area in enumerate(value, 1):
         where = f"{label}: area {number}"
         corners = area if isinstance(area, list) else []
-        if len(corners) < 2 or any(not isinstance(one, list) or len(one) != 2 for one in corners):
+        if len(corners) < 2 or not all(_is_corner(one) for one in corners):
             raise InvalidInputError(
                 f"{where}: expected 2 corners of a box, or 3 or more, [latitude, longitude] in degrees, got {area!r}"
             )
@@ -105,6 +105,11 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
         latitudes, longitudes = np.array(polygon).T
         found.append(east_north_up(latitudes, longitudes, np.zeros(len(polygon)), origin)[:, :2])
     return found
+
+
+def _is_corner(value: object) -> bool:
+    """Whether it is two numbers."""
+    return isinstance(value, list) and [type(one) in (int, float) for one in value] == [True, True]
 
 
 def _days(recordings: list[Recording]) -> list[float]:
