@@ -53,10 +53,12 @@ class _Costs(NamedTuple):
 
     indptr: Ints
     indices: Ints
+    unsigned: Ints
+    """The same: numba does not ask whether such an index is negative."""
     costs: Floats
     row_slack: Floats
-    base: Floats
-    """Cost of leaving a column unmatched; high, but finite, where it must be matched."""
+    above: Floats
+    """Costs less the base of the column, the cost of leaving it unmatched: high, but finite, where that must not be."""
 
 
 class _State(NamedTuple):
@@ -128,12 +130,13 @@ def match_sparse(
         v[j] = 0.0
     owner = np.full(m, -1, np.int64)
     pending = np.empty(n, np.int64)
+    above = np.empty(indptr[n])
     num_pending = 0
     for i in range(n):
         row_edge[i] = -1
         least, best = np.inf, -1
         for k in range(indptr[i], indptr[i + 1]):
-            value = costs[k] - base[indices[k]]
+            above[k] = value = costs[k] - base[indices[k]]
             if value < least:
                 least, best = value, k
         if row_slack[i] <= least:
@@ -149,7 +152,7 @@ def match_sparse(
             else:
                 pending[num_pending] = i
                 num_pending += 1
-    problem = _Costs(indptr, indices, costs, row_slack, base)
+    problem = _Costs(indptr, indices, indices.astype(np.uint64), costs, row_slack, above)
     state = _State(row_edge, u, v, owner, pending)
     many = indices.size > _MANY
     dense = many and 4 * indices.size > n * m
@@ -173,7 +176,7 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int, most: int) ->
 
     Returns how many rows are still pending.
     """
-    indptr, indices, costs, row_slack, base = problem
+    indptr, indices, unsigned, _, row_slack, above = problem
     row_edge, u, v, owner, pending = state
     steps = most * num_pending + 8
     left = 0
@@ -184,8 +187,7 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int, most: int) ->
         while i >= 0:
             least, second, best = np.inf, row_slack[i], -1
             for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                value = costs[k] - base[j] - v[j]
+                value = above[k] - v[unsigned[k]]
                 if value < least:
                     # a parallel edge to the same column is not a second choice; it would only make the step smaller
                     second = min(second, least)
@@ -236,9 +238,9 @@ def _augment(indices: Ints, edge_row: Ints, previous: Ints, state: _State, start
 @inner_njit
 def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     """Augment along a shortest path from each pending row; False if a row that must be matched cannot be."""
-    indptr, indices, costs, row_slack, base = problem
+    indptr, indices, unsigned, _, row_slack, above = problem
     row_edge, u, v, owner, pending = state
-    m = base.size
+    m = v.size
     distance = np.full(m, np.inf)
     closed = np.zeros(m, np.bool_)
     previous = np.empty(m, np.int64)
@@ -265,24 +267,24 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
                 sink_distance = d + row_slack[i] - u[i]
                 sink_row, sink_column = i, -1
             for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if closed[j]:
+                near = unsigned[k]
+                if closed[near]:
                     continue
-                value = d + max(0.0, costs[k] - base[j] - u[i] - v[j])
-                if value < distance[j] and value < sink_distance:
-                    if distance[j] == np.inf and owner[j] >= 0:
-                        reached[num_reached] = j
+                value = d + max(0.0, above[k] - u[i] - v[near])
+                if value < distance[near] and value < sink_distance:
+                    if distance[near] == np.inf and owner[near] >= 0:
+                        reached[num_reached] = near
                         num_reached += 1
-                    previous[j] = k
-                    if owner[j] < 0:
+                    previous[near] = k
+                    if owner[near] < 0:
                         # a path may end here: nothing farther away counts from now on
-                        sink_distance, sink_column = value, j
+                        sink_distance, sink_column = value, indices[k]
                         continue
-                    distance[j] = value
+                    distance[near] = value
                     if size == heap_key.size:
                         heap_key = doubled(heap_key)
                         heap_column = doubled(heap_column)
-                    push(heap_key, heap_column, size, value, j)
+                    push(heap_key, heap_column, size, value, indices[k])
                     size += 1
             found = False
             while size > 0:
@@ -319,19 +321,19 @@ def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
 @inner_njit
 def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
     """The same on a matrix of the costs: with many edges the nearest column is found faster by a look at all."""
-    indptr, indices, costs, row_slack, base = problem
+    indptr, indices, _, costs, row_slack, above = problem
     row_edge, u, v, owner, pending = state
-    n, m = row_slack.size, base.size
+    n, m = row_slack.size, v.size
     matrix, mate = np.full((n, m), np.inf), np.full(n, -1, np.int64)
     for i in range(n):
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
-            matrix[i, j] = min(matrix[i, j], costs[k] - base[j])
+            matrix[i, j] = min(matrix[i, j], above[k])
         if row_edge[i] >= 0:
             mate[i] = indices[row_edge[i]]
     distance, previous = np.empty(m), np.empty(m, np.int64)
     # columns: those that are still open, then those that are closed, the last first
-    order = np.arange(m)
+    order = np.arange(m).astype(np.uint64)
     tree_distance = np.empty(m)
     for at in range(num_pending):
         start = pending[at]
@@ -344,22 +346,22 @@ def _augment_dense(problem: _Costs, state: _State, num_pending: int) -> bool:
                 sink_distance, sink_row = d + row_slack[i] - u[i], i
             least, nearest, row, shift = np.inf, -1, matrix[i], d - u[i]
             for t in range(num_open):
-                j = order[t]
-                value, known = shift + row[j] - v[j], distance[j]
+                far = order[t]
+                value, known = shift + row[far] - v[far], distance[far]
                 if value < known:
-                    distance[j], previous[j], known = value, i, value
-                if known < least or (known == least and owner[j] < 0):
+                    distance[far], previous[far], known = value, i, value
+                if known < least or (known == least and owner[far] < 0):
                     least, nearest = known, t
             if least >= sink_distance:
                 break
-            j = order[nearest]
+            j = np.int64(order[nearest])
             # rounding may make a reduced cost negative
             d = max(d, least)
             if owner[j] < 0:
-                sink_distance, sink_column = d, j
+                sink_distance, sink_column = d, int(j)
                 break
             num_open -= 1
-            order[nearest], order[num_open] = order[num_open], j
+            order[nearest], order[num_open] = order[num_open], order[nearest]
             tree_distance[num_open] = d
             i = owner[j]
         if sink_distance == np.inf:
