@@ -11,6 +11,8 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing as closing_of
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker
     from assoc.tracking.adapting.identity_watch import OddIdentity
+    from assoc.tracking.offline.ended_tracks import EndedTracks
     from assoc.tracking.offline.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
@@ -214,7 +217,6 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
     from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
-    from assoc.tracking.track_table import LongTable
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if is_asterix(file) else "tables", given["identity"] or "score-only"
@@ -245,17 +247,18 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
             done.table.origin = given["origin"]
             sizes = [len(window) for window in done.windows]
             return done.table, Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
-        takers = TakenPlots(survey.named, stored.addressed)
-        table, ends, sizes = LongTable(given["origin"]), [], []
-        for followed in follow(tracker, scans, forget=True):
-            takers.take(followed)
-            table.names.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
-            table.add(*followed.listed(not given["all"]))
-            ends.append(float(followed.step.time))
-            sizes.append(len(followed.window))
-            if len(ends) % FORGET == 0:
-                takers.keep(may_return(tracker))
-        table.finish()
+        takers, ends, sizes = TakenPlots(survey.named, stored.addressed), [], []
+        with _ended_tracks(given, stored) as table:
+            for followed in follow(tracker, scans, forget=True):
+                takers.take(followed)
+                table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
+                table.add(*followed.listed(not given["all"]))
+                ends.append(float(followed.step.time))
+                sizes.append(len(followed.window))
+                if len(ends) % FORGET == 0:
+                    living = may_return(tracker)
+                    takers.keep(living)
+                    table.end(living)
         return table, Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
 
     if sliced:
@@ -272,9 +275,23 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
         odd = ()
         judged = judged._replace(rates=None, kept=None)
         plots = plots and plots._replace(rates=None, kept=None)
-        (table if whole else table.names).take_names(TrackTable())
+        if whole:
+            table.take_names(TrackTable())
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return Tracked(tracker, table, None, judged, count, total, plots, missing=[*left, *missing], odd=odd)
+    return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], not whole, odd)
+
+
+@contextmanager
+def _ended_tracks(given: Given, stored: StoredPlots) -> Iterator[EndedTracks]:
+    """Takes rows of tracks, and writes them as the tracks end; the file takes its name at the end."""
+    from assoc._files.tables import table_writer
+    from assoc.tracking.offline.ended_tracks import EndedTracks
+
+    identified = given["identity"] != "ignore" and (stored.survey.coded or stored.addressed)
+    with table_writer(given["output"]) as writer:
+        table = EndedTracks(writer, given["origin"], identified)
+        yield table
+        table.finish()
 
 
 def _in_slices(
@@ -286,31 +303,33 @@ def _in_slices(
     from assoc._cli.track.slices import kept_slices
     from assoc.tracking.offline.plots import TakenPlots
     from assoc.tracking.offline.slices import Stitching, TrackSlice, overlap
-    from assoc.tracking.track_table import LongTable
 
     work = TrackSlice(tracker, not given["all"], given["origin"])
     places = {"jobs": given["jobs"] or 1, "scheduler": given["scheduler"]}
     takers, stitching = TakenPlots(stored.survey.named, stored.addressed), Stitching()
-    ends, sizes = [], []
+    ends, sizes = [np.zeros(0)], []
     with kept_slices(given, given["files"]) as slices:
+        seconds, early = given["slice"] or _SLICE, overlap(tracker, windows.rotation)
         try:
-            with _EARLY_END.work(0.0):
-                slices.run(work, windows, given["slice"] or _SLICE, overlap(tracker, windows.rotation), places)
+            with (
+                _EARLY_END.work(0.0),
+                _ended_tracks(given, stored) as table,
+                closing_of(slices.run(work, windows, seconds, early, places)) as parts,
+            ):
+                for part in map(stitching.add, parts):
+                    table.add_frame(part.frame)
+                    table.count_identities(part.tracks, part.known[:, 1:])
+                    takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
+                    living = {*part.tracks.tolist(), *part.frame.track_id.tolist()}
+                    takers.keep(living)
+                    table.end(living)
+                    ends.append(part.ends)
+                    sizes += part.sizes.tolist()
         except KeyboardInterrupt:
             _EARLY_END.say(f"{len(slices.done())} slices are kept; the same command goes on from there")
             raise
-        table = LongTable(given["origin"])
-        for part in filter(None, map(slices.load, slices.done())):
-            part = stitching.add(part)
-            table.add_frame(part.frame)
-            table.names.count_identities(part.tracks, part.known[:, 1:])
-            takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
-            takers.keep({*part.tracks.tolist()})
-            ends.append(part.ends)
-            sizes += part.sizes.tolist()
-        table.finish()
         missing = slices.missing()
-    times = np.concatenate([np.zeros(0), *ends])
+    times = np.concatenate(ends)
     judged = Judged(times, sizes, stored.sourced, takers.rates(), takers.kept())
     return table, judged, missing, stitching.odd_identities
 

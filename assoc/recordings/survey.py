@@ -31,7 +31,7 @@ class Survey:
         self.first, self.last, self.farthest = math.nan, math.nan, 0.0
         self.ranges = self.bearings = np.zeros(0)
         self.sectors = np.zeros(CELLS, dtype=np.int64)
-        self.named = False
+        self.named = self.coded = False
         self._garbled = self._missing = self._undecoded = 0
         self._identities = np.zeros(0, dtype=np.int64)
         for part in parts:
@@ -53,7 +53,8 @@ class Survey:
         self._missing += int(np.isnan(part.altitudes).sum())
         self._undecoded += int((~part.decoded).sum())
         self._identities = np.union1d(self._identities, part.identities[part.decoded])
-        self.named |= part.sources is not None or bool(part.decoded.any())
+        self.coded |= bool(part.decoded.any())
+        self.named |= self.coded or part.sources is not None
 
     def summary(self, notes: Mapping[str, int]) -> str:
         """Contents and defects in a few lines."""

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-import pickle
-import tempfile
-import weakref
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assoc._files.tables import csv_text, table_writer
+from assoc._files.tables import csv_text, escaped
 from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
-from assoc._text.plain import spreadsheet_text
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.exports.maps import FOLLOWED_WITHIN, coordinates, followed_targets
@@ -44,7 +40,7 @@ of the filter's estimate and not from plot to plot), the heading in degrees, clo
 compass heading."""
 
 
-# rows that wait to be written together
+# counts that wait to be sorted together
 _ROWS = 20_000
 # types of columns that are no floats
 _KINDS: dict[str, type] = {"track_id": np.int64, "confirmed": np.bool_, "hits": np.int64, "status": np.str_,
@@ -153,9 +149,9 @@ class TrackTable(Shown):
             rows = np.flatnonzero(taken & (column != 0))
             kind.count(ids[rows], column[rows])
 
-    def name_by_identities(self) -> None:
-        """Take the codes and addresses that were counted most."""
-        addresses, codes = (kind.most() for kind in self._known)
+    def name_by_identities(self, living: Collection[int] = ()) -> None:
+        """Take the codes and addresses that were counted most, of all tracks but the living; their counts then go."""
+        addresses, codes = (kind.most(living) for kind in self._known)
         for number in dict.fromkeys([*addresses, *codes]):
             address = address_text(addresses[number]) if number in addresses else ""
             code = f"{codes[number]:04o}" if number in codes else ""
@@ -203,7 +199,7 @@ class TrackTable(Shown):
 
         frame = self.to_frame()
         if self.targets:
-            frame["target"] = _escaped(frame["target"])
+            frame["target"] = escaped(frame["target"])
         write_text(path, csv_text(frame))
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
@@ -248,71 +244,6 @@ class TrackTable(Shown):
         return times[kept], ids[kept], positions[kept]
 
 
-class LongTable:
-    """A `TrackTable` that grows on the disk, in a temporary file: names of tracks are known at the end alone.
-
-    Parameters
-    ----------
-    origin : tuple of latitude, longitude, height, optional
-        As of `TrackTable`.
-    """
-
-    def __init__(self, origin: Origin | None = None) -> None:
-        self._origin, self._table, self.names = origin, TrackTable(origin), TrackTable()
-        self._file = tempfile.TemporaryFile()
-        weakref.finalize(self, self._file.close)
-        self._ids: set[int] = set()
-        self._inconsistent: dict[int, float] = {}
-        self._rows = 0
-
-    def __len__(self) -> int:
-        return self._rows + len(self._table)
-
-    def add(self, *arguments: Any) -> None:
-        """Add the tracks of a scan; see `TrackTable.add`."""
-        self._table.add(*arguments)
-        if len(self._table) >= _ROWS:
-            self._put_away()
-
-    def finish(self) -> None:
-        """Name the tracks; to be called when all are there."""
-        self.names.name_by_identities()
-        self._put_away()
-
-    def _put_away(self) -> None:
-        table, self._table = self._table, TrackTable(self._origin)
-        self.add_frame(table.to_frame())
-
-    def add_frame(self, frame: pd.DataFrame) -> None:
-        """Add rows of a table."""
-        pickle.dump(frame, self._file, pickle.HIGHEST_PROTOCOL)
-        self._rows += len(frame)
-        if len(frame):
-            self._ids |= {*frame.track_id[frame.confirmed].tolist()}
-            wrong = frame[~frame.consistent]
-            for track, nis in zip(wrong.track_id.tolist(), wrong.nis.tolist(), strict=True):
-                self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write all rows: Parquet if the name ends so, else CSV."""
-        end = self._file.tell()
-        self._file.seek(0)
-        with table_writer(path) as writer:
-            while self._file.tell() < end:
-                frame = self.names.with_names(pickle.load(self._file))
-                if "target" in frame and not writer.parquet:
-                    frame["target"] = _escaped(frame["target"])
-                writer.add(frame)
-
-    def confirmed_ids(self) -> set[int]:
-        """As of `TrackTable`."""
-        return self._ids
-
-    def inconsistent(self) -> dict[int, float]:
-        """As of `TrackTable`."""
-        return self._inconsistent
-
-
 def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Trajectories]:
     """The truth of a scene and tracks as metrics compare them: horizontally where heights are open (`open_heights`)."""
     both = Trajectories.from_scene(scene), tracks
@@ -320,11 +251,6 @@ def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Tra
         return both
     truth, found = (Trajectories(one.times, one.ids, one.positions[:, :2]) for one in both)
     return truth, found
-
-
-def _escaped(names: pd.Series) -> pd.Series:
-    """Names as a CSV file may have them; see `spreadsheet_text`."""
-    return names.map({name: spreadsheet_text(name) for name in names.unique()})
 
 
 def _texts(values: list[str]) -> Array:
@@ -359,12 +285,14 @@ class _Names:
         self._counted = np.column_stack([every[first, :2], counts])[order]
         self._new, self._waiting = [], 0
 
-    def most(self) -> dict[int, int]:
-        """The number by which each track was known most; of equals the one that came first."""
+    def most(self, living: Collection[int]) -> dict[int, int]:
+        """The number by which each track but the living was known most; of equals the one that came first."""
         self._settle()
+        kept = np.isin(self._counted[:, 0], np.array([*living], dtype=np.int64))
+        counted, self._counted = self._counted[~kept], self._counted[kept]
         # the last one of a track counts
-        order = np.argsort(self._counted[::-1, 2], kind="stable")
-        return {track: number for track, number, _ in self._counted[::-1][order].tolist()}
+        order = np.argsort(counted[::-1, 2], kind="stable")
+        return {track: number for track, number, _ in counted[::-1][order].tolist()}
 
 
 def _nees(mean: Array, covariance: Array, positions: Sequence[int], truth: Array) -> float:

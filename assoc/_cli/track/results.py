@@ -29,7 +29,8 @@ class Tracked(NamedTuple):
     """Tracks of a scene or of plots, and how many of all scans were tracked."""
 
     tracker: Tracker
-    table: TrackTable
+    table: Any
+    """TrackTable, or EndedTracks where they were written as they ended."""
     scene: Any
     plots: Any
     num_tracked: int
@@ -38,6 +39,8 @@ class Tracked(NamedTuple):
     """For reports."""
     missing: Sequence[str] = ()
     """Files and slices that they lack."""
+    written: bool = False
+    """Whether the tracks were written as they ended."""
     odd: Sequence[object] | None = None
     """Identities that cannot all be right; None: those that the tracker found."""
 
@@ -74,7 +77,7 @@ def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: flo
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),
         (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
-        (given["output"], lambda: _write_tracks(given["output"], found.table)),
+        (None if found.written else given["output"], lambda: _write_tracks(given["output"], found.table)),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
@@ -102,10 +105,8 @@ def _write_asterix(path: str, found: Tracked) -> None:
     write_tracks(path, frame)
 
 
-def _write_tracks(path: str, tracks: Any) -> None:
-    if not hasattr(tracks, "to_csv"):
-        tracks.write(path)
-    elif TRACKS.ending(path) == ".parquet":
+def _write_tracks(path: str, tracks: TrackTable) -> None:
+    if TRACKS.ending(path) == ".parquet":
         tracks.to_parquet(path)
     else:
         tracks.to_csv(path)

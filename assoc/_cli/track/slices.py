@@ -6,7 +6,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -49,9 +49,12 @@ class Slices:
 
     def run(
         self, work: TrackSlice, windows: Iterable[Window], seconds: float, early: float, places: Mapping[str, Any]
-    ) -> None:
-        """Track the slices that are not done; after the loss of a worker those that are left, as long as that helps."""
-        again = True
+    ) -> Generator[SliceTracks]:
+        """Track the slices that are not done; after the loss of a worker those that are left, as long as that helps.
+
+        Yields the tracks of all slices that are done, in order, each as soon as those before it are done or failed.
+        """
+        again, number = True, 0
         while again:
             again, self.lost = False, ""
             parts = self._left(slices_of(windows, seconds, early))
@@ -63,7 +66,14 @@ class Slices:
                         self._save(result)
                     else:
                         self.failed[result[0]] = result[1]
-                return
+                    while number in self.spans:
+                        part = self.load(number)
+                        if part is not None:
+                            yield part
+                        elif number not in self.failed:
+                            break
+                        number += 1
+                again = False
             except (LimitExceededError, LostError) as error:
                 self.lost = str(error)
             except InvalidInputError as error:
@@ -72,6 +82,9 @@ class Slices:
                 self.lost = str(error)
             finally:
                 results.close()
+        for rest in self.done():
+            if rest >= number and (part := self.load(rest)) is not None:
+                yield part
 
     def _left(self, parts: Iterator[Slice]) -> Iterator[Slice]:
         for part in parts:

@@ -1,0 +1,120 @@
+"""Tracks that are written as they end are those of a table that holds them all."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc import track
+from assoc.errors import LimitExceededError
+from assoc.recordings import read_plots, write_plots
+from assoc.simulation import simulate_recording
+from assoc.tracking import TrackTable
+from assoc.tracking.offline import plots
+from assoc.tracking.offline.ended_tracks import EndedTracks
+
+WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = simulate_recording("rotating-radar", 4, aircraft=12, duration=1_600.0).recording
+    # tracks end, and others begin
+    half = (recording.azimuths > 0) == (recording.times < 600.0)
+    write_plots("plots.csv", recording.take(half))
+    return tmp_path
+
+
+def whole_table(monkeypatch):
+    """Rows of all tracks as the program would list them at once."""
+    kept, plain = TrackTable(), plots.follow
+
+    def follow(*arguments, **options):
+        for one in plain(*arguments, **options):
+            kept.add(*one.listed(True))
+            kept.count_identities(one.tracks, plots.known_of(one.window)[:, 1:])
+            yield one
+
+    monkeypatch.setattr(plots, "follow", follow)
+    return kept
+
+
+@pytest.mark.parametrize("more", [[], ["--identity", "ignore"]])
+def test_rows_are_those_of_a_whole_table(here, monkeypatch, more):
+    kept = whole_table(monkeypatch)
+    assert track.main(["plots.csv", "-o", "t.csv", *WORDS, *more]) == 0
+    if not more:
+        kept.name_by_identities()
+    kept.to_csv("whole.csv")
+    texts = {"mode3_oct": str, "address_hex": str, "target": str}
+    found, expected = (pd.read_csv(name, dtype=texts) for name in ("t.csv", "whole.csv"))
+    assert ("mode3_oct" in found) == (not more) and len(found) > 300 and found.track_id.nunique() > 8
+    order = ["time", "track_id"]
+    again = found.sort_values(order, ignore_index=True)
+    pd.testing.assert_frame_equal(again, expected.sort_values(order, ignore_index=True), check_exact=True)
+    # track by track, those that ended first before those of the end
+    assert (np.diff(found.track_id) != 0).sum() == found.track_id.nunique() - 1
+    assert (found.groupby("track_id").time.diff().dropna() > 0).all()
+    ends = found.groupby("track_id", sort=False).time.max()
+    assert ends.iloc[0] < 900.0 and ends.iloc[-1] > 1_500.0
+    assert track.main(["plots.csv", "-o", "t.parquet", *WORDS, *more]) == 0
+    table = pd.read_parquet("t.parquet")
+    assert [*table.columns] == [*found.columns]
+    for name in found:
+        if table[name].dtype.kind in "fib":
+            np.testing.assert_array_equal(table[name].to_numpy(), found[name].to_numpy())
+        else:
+            assert (table[name].astype(str) == found[name].fillna("")).all()
+
+
+def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
+    (here / "t.csv").write_text("before\n")
+    plain = plots.follow
+
+    def broken(*arguments, **options):
+        for number, one in enumerate(plain(*arguments, **options)):
+            if number == 120:
+                raise LimitExceededError("no more memory")
+            yield one
+
+    monkeypatch.setattr(plots, "follow", broken)
+    assert track.main(["plots.csv", "-o", "t.csv", *WORDS]) == 3
+    assert (here / "t.csv").read_text() == "before\n"
+    assert sorted(path.name for path in here.iterdir()) == ["plots.csv", "t.csv"]
+
+
+def test_no_tracks_make_a_table_of_no_rows(here, capsys):
+    recording = read_plots("plots.csv")
+    write_plots("two.csv", recording.take(np.arange(2)))
+    assert track.main(["two.csv", "-o", "t.csv", *WORDS]) == 0
+    assert (here / "t.csv").read_text().startswith("track_id,time,x,y,z,") and not len(pd.read_csv("t.csv"))
+
+
+class Parts:
+    """Takes parts of a table."""
+
+    parquet = True
+
+    def __init__(self):
+        self.ids = []
+
+    def add(self, part):
+        self.ids += part.track_id.tolist()
+
+
+def test_a_track_is_written_when_it_has_ended_and_not_before():
+    parts = Parts()
+    table = EndedTracks(parts, None, False)
+    living = [{1, 2}, {2}, {2}, {2, 3}, {3}, {3}]
+    written = []
+    for time, ids in enumerate(living):
+        rows = sorted(ids)
+        columns = dict.fromkeys(("x", "nis"), 0.0) | {"confirmed": True, "consistent": True, "status": "confirmed"}
+        table.add_frame(pd.DataFrame({"track_id": rows, "time": float(time), **columns}))
+        table.end(ids)
+        written.append([*parts.ids])
+    # one call later, so that a track that comes back soon is still one
+    assert written == [[], [], [1], [1], [1], [1, 2, 2, 2, 2]]
+    table.finish()
+    assert parts.ids == [1, 2, 2, 2, 2, 3, 3, 3]
+    assert len(table) == 8 and table.confirmed_ids() == {1, 2, 3}
