@@ -7,7 +7,7 @@ one filter serves any number of tracks, hypotheses and threads.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 
@@ -67,6 +67,9 @@ class Update(Generic[S]):
         parts = self.__dict__
         if "rest" not in parts or name not in ("innovation", "covariance", "nis", "log_likelihood"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        if callable(parts["rest"]):
+            parts["innovation"], parts["covariance"], parts["nis"] = parts["rest"]()
+            return parts[name]
         rest, d, B = parts["rest"], parts["measured"], len(parts["state"])
         v, S = B * d, B * d + B * d * d
         parts["innovation"], parts["covariance"] = rest[:v].reshape(B, d), rest[v:S].reshape(B, d, d)
@@ -85,6 +88,13 @@ def update_of(state: S, rest: Array, measured: int) -> Update[S]:
     made: Update[S] = _new(Update)
     parts = made.__dict__
     parts["state"], parts["rest"], parts["measured"] = state, rest, measured
+    return made
+
+
+def update_later(state: S, log_likelihood: Array, rest: Callable[[], tuple[Array, Array, Array]]) -> Update[S]:
+    """Make an update whose innovation, its covariance and NIS are computed on first use."""
+    made: Update[S] = _new(Update)
+    made.__dict__.update(state=state, log_likelihood=log_likelihood, rest=rest)
     return made
 
 
@@ -258,6 +268,18 @@ class Filter(ABC, Generic[S]):
             None: this filter, or this sensor's model, has to correct states for it.
         """
         return None
+
+    def sees_like(self, other: Filter[Any]) -> bool:
+        """Whether this filter corrects states just as the other does; False where that is not known."""
+        return False
+
+    def positions_alone(self, state: S) -> tuple[Filter[Any], Any]:
+        """A filter of positions alone, and the positions of B states: sensors without range rates see no more of them.
+
+        Whoever only asks how well measurements fit, one after the other, need not correct the rest of a state. Filters
+        that cannot say return themselves and the states.
+        """
+        return self, state
 
     def log_likelihood(self, state: S, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood of each of M measurements (M, d) under each of B targets, (B, M)."""

@@ -6,9 +6,11 @@ exp(Q dt), Q the rates per second, so that four seconds are four seconds, in one
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +18,9 @@ from assoc._parameters import positive
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, Fit, Update, check_dimension, complain
+from assoc.filters.base import Expected, Filter, Fit, Update, check_dimension, complain, measured_array, update_later
 from assoc.filters.batches import Batch
-from assoc.filters.kernels.gates import distances
+from assoc.filters.kernels.gates import distances, matched
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement
@@ -145,7 +147,9 @@ class InteractingMultipleModel(Filter[Mixture]):
         if len(set(dims)) > 1:
             raise InvalidInputError(f"filters must share one state, got dimensions {dims}")
         super().__init__(filters[0].motion)
-        self.filters = tuple(filters)
+        self.filters: tuple[GaussianFilter | UnscentedKalmanFilter, ...] = tuple(filters)
+        self._alike = all(model.sees_like(filters[0]) for model in filters)
+        self._still: InteractingMultipleModel | None = None
         m = len(filters)
         self.transition = finite(transition, "transition", 2)
         if self.transition.shape != (m, m):
@@ -227,61 +231,69 @@ class InteractingMultipleModel(Filter[Mixture]):
             cross += mixed.weights[:, j, None, None] * (between + away * after.mean[:, None, :])
         return _mixture([after for after, _ in moved], mixed.weights), cross
 
+    def _of_modes(
+        self, state: Mixture, run: Callable[[GaussianFilter | UnscentedKalmanFilter, Gaussian, int], tuple[Array, ...]]
+    ) -> list[Array]:
+        """Results (B, m, ...) of `run`, given a filter, Gaussians, and how many of them belong to each target.
+
+        All modes are one batch where they see alike.
+        """
+        if not self._alike:
+            each = [run(model, state.component(j), 1) for j, model in enumerate(self.filters)]
+            return [np.stack(parts, axis=1) for parts in zip(*each, strict=True)]
+        B, m, _ = state.means.shape
+        return [array.reshape(B, m, *array.shape[1:]) for array in run(self.filters[0], _flat(state), m)]
+
     def update(self, state: Mixture, measured: Array, sensor: Measurement) -> Update[Mixture]:
         """Correct each model and its probability; see `Filter.update`."""
-        done = [model.update(state.component(j), measured, sensor) for j, model in enumerate(self.filters)]
-        with np.errstate(divide="ignore"):
-            joint = np.stack([d.log_likelihood for d in done], axis=1) + np.log(state.weights)
-        top = joint.max(axis=1, keepdims=True)
-        scaled = np.exp(joint - top)
-        total = scaled.sum(axis=1, keepdims=True)
-        corrected = _mixture([d.state for d in done], scaled / total)
-        # innovation of the mixture, in deviations from the first model's, which are small angles
-        v = np.stack([d.innovation for d in done], axis=1)
         o = self.observe(sensor)
-        base = v[:, :1]
-        if hasattr(sensor, "angular"):
-            angular, off = list(sensor.angular[: o.dim]), v - base
-            v = base + off
-            v[..., angular] -= 2 * np.pi * np.round(off[..., angular] / (2 * np.pi))
-        mean = np.einsum("bm,bmi->bi", state.weights, v)
-        away = v - mean[:, None]
-        S = np.einsum("bm,bmij->bij", state.weights, np.stack([d.covariance for d in done], axis=1))
-        S += np.einsum("bm,bmi,bmj->bij", state.weights, away, away)
-        nis = np.einsum("bi,bi->b", mean, np.linalg.solve(S, mean[..., None])[..., 0])
-        return Update(corrected, mean, S, nis, (top + np.log(total))[:, 0])
+        z = measured_array(measured, len(state), o.dim)
+
+        def run(model: GaussianFilter | UnscentedKalmanFilter, part: Gaussian, times: int) -> tuple[Array, ...]:
+            done = model.update(part, np.repeat(z, times, axis=0), sensor)
+            return done.state.mean, done.state.covariance, done.innovation, done.covariance, done.log_likelihood
+
+        means, covariances, v, S, fits = self._of_modes(state, run)
+        joint, total = _joint(fits, state.weights)
+        corrected = Mixture(means, covariances, np.exp(joint - total[:, None]))
+
+        def as_one() -> tuple[Array, Array, Array]:
+            mean, covariance = matched(state.weights, v, S, _turning(sensor, o.dim))
+            return mean, covariance, np.einsum("bi,bi->b", mean, np.linalg.solve(covariance, mean[..., None])[..., 0])
+
+        return update_later(corrected, total, as_one)
 
     def expected(self, state: Mixture, sensor: Measurement) -> Expected:
         """Return the expected measurements and covariances of the mixtures; see `Filter.expected`."""
-        each = [model.expected(state.component(j), sensor) for j, model in enumerate(self.filters)]
-        h, S = np.stack([e.mean for e in each], axis=1), np.stack([e.covariance for e in each], axis=1)
-        base = h[:, :1]
-        away = h - base
-        if hasattr(sensor, "angular"):
-            angular = np.array(sensor.angular[: h.shape[2]])
-            away[..., angular] = np.mod(away[..., angular] + np.pi, 2 * np.pi) - np.pi
-        mean = np.einsum("bm,bmi->bi", state.weights, away)
-        spread = away - mean[:, None]
-        covariance = np.einsum("bm,bmij->bij", state.weights, S)
-        covariance += np.einsum("bm,bmi,bmj->bij", state.weights, spread, spread)
-        return Expected(base[:, 0] + mean, covariance)
+        h, S = self._of_modes(state, lambda model, part, times: model.expected(part, sensor))
+        return Expected(*matched(state.weights, h, S, _turning(sensor, h.shape[2])))
 
     def fit(self, state: Mixture, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
         """How well measurements fit, without correcting anything; see `Filter.fit`."""
-        each = []
+        fits, m, flat = np.empty((len(rows), len(self.filters))), len(self.filters), _flat(state)
         for j, model in enumerate(self.filters):
-            found = model.fit(state.component(j), expected, rows, measured, sensor)
+            part, of_part = (flat, rows * m + j) if self._alike else (state.component(j), rows)
+            found = model.fit(part, expected, of_part, measured, sensor)
             if found is None:
                 return None
-            each.append(found.log_likelihood)
-        with np.errstate(divide="ignore"):
-            joint = np.stack(each, axis=1) + np.log(state.weights)[rows]
-        top = joint.max(axis=1, keepdims=True)
-        total = np.exp(joint - top).sum(axis=1, keepdims=True)
+            fits[:, j] = found.log_likelihood
         status, nis = distances(*expected, rows, measured, self.observe(sensor).code)
         if status != GOOD:
             complain(status)
-        return Fit((top + np.log(total))[:, 0], nis)
+        return Fit(_joint(fits, state.weights[rows])[1], nis)
+
+    def positions_alone(self, state: Mixture) -> tuple[Filter[Any], Any]:
+        """A filter of positions alone, and the positions of these states; see `Filter.positions_alone`."""
+        model, flat = self.filters[0].positions_alone(_flat(state))
+        if not self._alike or model is self.filters[0]:
+            return self, state
+        if self._still is None:
+            assert isinstance(model, GaussianFilter)
+            self._still = copy(self)
+            self._still.motion, self._still.filters, self._still._seen = model.motion, (model,) * len(self.filters), {}
+        B, m, _ = state.means.shape
+        n = flat.mean.shape[1]
+        return self._still, Mixture(flat.mean.reshape(B, m, n), flat.covariance.reshape(B, m, n, n), state.weights)
 
     def log_likelihood(self, state: Mixture, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood under the mixture of the models' predictions, (B, M)."""
@@ -293,6 +305,25 @@ class InteractingMultipleModel(Filter[Mixture]):
     def compare(self, state: Mixture, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:
         """`log_likelihood` and `distances`, these from the mixture as one Gaussian; (B, M) each."""
         return self.log_likelihood(state, measurements, sensor), super().compare(state, measurements, sensor)[1]
+
+
+def _flat(state: Mixture) -> Gaussian:
+    """The components of all targets as one batch, those of a target side by side."""
+    n = state.means.shape[2]
+    return gaussian(state.means.reshape(-1, n), state.covariances.reshape(-1, n, n))
+
+
+def _joint(log_likelihoods: Array, weights: Array) -> tuple[Array, Array]:
+    """Logarithms of likelihoods (K, m) times weights (K, m), and of their sums over the models, (K,)."""
+    with np.errstate(divide="ignore"):
+        joint = log_likelihoods + np.log(weights)
+    # model by model: numpy is slow with short rows
+    return joint, reduce(np.logaddexp, joint.T)
+
+
+def _turning(sensor: Measurement, dim: int) -> Array:
+    """Which components are angles, bool (d,)."""
+    return np.array(getattr(sensor, "angular", (False,) * dim)[:dim], dtype=np.bool_)
 
 
 def _mixture(parts: Sequence[Gaussian], weights: Array) -> Mixture:

@@ -44,6 +44,7 @@ class GaussianFilter(Filter[Gaussian]):
         kind = type(motion)
         self._linear: LinearMotion | None = None
         self._plan: tuple[Any, ...] = (None, None)
+        self._still: GaussianFilter | None = None
         if isinstance(motion, LinearMotion) and (kind.jacobian, kind.noise) == _PLAIN_MODELS:
             self._linear = motion
 
@@ -167,6 +168,24 @@ class GaussianFilter(Filter[Gaussian]):
             H = o.model.jacobian(state.mean)
             return Expected(o.model.measure(state.mean), H @ state.covariance @ H.transpose(0, 2, 1) + o.covariance)
         return Expected(*expect(state.mean, state.covariance, o.packed, o.dim))
+
+    def sees_like(self, other: Filter[Any]) -> bool:
+        """Whether this filter corrects states just as the other does."""
+        own, mine, its = type(self), self.motion, other.motion
+        plain = own is type(other) and own.update is GaussianFilter.update and self.kind == other.kind
+        return plain and (mine.dim, mine.position) == (its.dim, its.position)
+
+    def positions_alone(self, state: Gaussian) -> tuple[Filter[Any], Any]:
+        """A filter of positions alone, and the positions of these states; see `Filter.positions_alone`."""
+        motion = self.motion
+        if self.kind != PLAIN or type(self).update is not GaussianFilter.update or len(motion.position) == motion.dim:
+            return self, state
+        axes = list(motion.position)
+        if self._still is None:
+            F, Q = np.eye(len(axes)), np.zeros((len(axes), len(axes)))
+            self._still = GaussianFilter(LinearMotion(lambda dt: F, lambda dt: Q, len(axes), tuple(range(len(axes)))))
+        P = np.ascontiguousarray(state.covariance[:, axes][:, :, axes])
+        return self._still, gaussian(np.ascontiguousarray(state.mean[:, axes]), P)
 
     def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
         """How well measurements fit, without correcting anything; see `Filter.fit`."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import PointFilter, Update, check_dimension, complain, update_of
+from assoc.filters.base import Filter, PointFilter, Update, check_dimension, complain, update_of
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.points import moments, sigma_points, unscented
@@ -82,6 +83,12 @@ class UnscentedKalmanFilter(PointFilter[Gaussian]):
         if status != GOOD:
             complain(status)
         return points
+
+    def sees_like(self, other: Filter[Any]) -> bool:
+        """Whether this filter corrects states just as the other does."""
+        if type(self) is not type(other) or not isinstance(other, UnscentedKalmanFilter):
+            return False
+        return self.motion.position == other.motion.position and np.array_equal(self.weights, other.weights)
 
     def _correct(self, state: Gaussian, z: Array, models: Array) -> Update[Gaussian]:
         check_dimension(state, self.motion.dim)

@@ -383,3 +383,56 @@ def test_each_target_moves_by_a_time_of_its_own_as_if_alone(kind):
         alone = own.predict(state[row : row + 1], step) if step else state[row : row + 1]
         np.testing.assert_allclose(moved.mean[row], alone.mean[0], rtol=1e-12)
         np.testing.assert_allclose(moved.covariance[row], alone.covariance[0], rtol=1e-11, atol=1e-11)
+
+
+class _Alone(ExtendedKalmanFilter):
+    """A class of its own, so that a mixture does not know that it sees as others do."""
+
+
+@pytest.mark.parametrize("sensor", [RADAR, PLACE])
+def test_modes_as_one_batch_and_one_by_one_agree(sensor):
+    """A mixture whose modes see alike corrects them in one call; the numbers are those of the modes by themselves."""
+    rng = np.random.default_rng(5)
+    motions = [ConstantVelocity(noise, dimensions=3, kind="continuous") for noise in (1.0, 30.0)]
+    transition = np.array([[0.9, 0.1], [0.2, 0.8]])
+    together = InteractingMultipleModel([ExtendedKalmanFilter(motion) for motion in motions], transition)
+    apart = InteractingMultipleModel([ExtendedKalmanFilter(motions[0]), _Alone(motions[1])], transition)
+    # azimuths around pi, where angles jump
+    mean = np.column_stack([rng.normal((-9000.0, 0.0, 3000.0), 300.0, (7, 3)), rng.normal(0.0, 100.0, (7, 3))])
+    begun = Gaussian(mean, np.diag([300.0**2] * 3 + [90.0**2] * 3))
+    states = together.predict(together.predict(together.start(begun), 2.0), 4.0)
+    z = sensor.measure(mean[:, :3] + rng.normal(0.0, 200.0, (7, 3)))
+    one, other = together.update(states, z, sensor), apart.update(states, z, sensor)
+    for name in ("innovation", "covariance", "nis", "log_likelihood"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, err_msg=name)
+    np.testing.assert_allclose(one.state.means, other.state.means, rtol=1e-12)
+    np.testing.assert_allclose(one.state.covariances, other.state.covariances, rtol=1e-12)
+    np.testing.assert_allclose(one.state.weights, other.state.weights, rtol=1e-12)
+    expected, rows = together.expected(states, sensor), np.array([0, 0, 3, 6])
+    for mine, its in zip(expected, apart.expected(states, sensor), strict=True):
+        np.testing.assert_allclose(mine, its, rtol=1e-12)
+    fit = together.fit(states, expected, rows, z[rows], sensor)
+    assert fit is not None
+    np.testing.assert_allclose(fit.log_likelihood, one.log_likelihood[rows], rtol=1e-9)
+    np.testing.assert_allclose(fit.nis, one.nis[rows], rtol=1e-9)
+    # positions alone give the same likelihoods, also of the next measurement
+    still, seen = together.positions_alone(states)
+    assert still is not together and seen.means.shape == (7, 2, 3)
+    corrected = still.update(seen, z, sensor)
+    np.testing.assert_allclose(corrected.log_likelihood, one.log_likelihood, rtol=1e-9)
+    np.testing.assert_allclose(corrected.state.mean, one.state.mean[:, :3], rtol=1e-9)
+    again, full = still.update(corrected.state, z, sensor), together.update(one.state, z, sensor)
+    np.testing.assert_allclose(again.log_likelihood, full.log_likelihood, rtol=1e-9)
+
+
+def test_a_mixture_on_both_sides_of_the_azimuth_pi():
+    """West of a radar azimuths jump; the mixture's spread is that of its mirror image in the east."""
+    imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
+    found = []
+    for side in (-1.0, 1.0):
+        begun = imm.start(Gaussian(np.zeros((1, 6)), np.diag([50.0**2] * 6)))
+        begun.means[0, :, :3] = RADAR.position + np.array([[side * 9e3, -100.0, 2e3], [side * 9e3, 300.0, 2e3]])
+        found.append(imm.expected(begun, RADAR))
+    west, east = found
+    assert abs(west.mean[0, 1] % (2.0 * np.pi) - np.pi + east.mean[0, 1]) < 1e-9
+    np.testing.assert_allclose(np.diagonal(west.covariance[0]), np.diagonal(east.covariance[0]), rtol=1e-9)

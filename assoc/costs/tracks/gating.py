@@ -18,6 +18,8 @@ MOST_PAIRS = 20_000_000
 """Most pairs of tracks and measurements; more occur only with useless predictions."""
 
 _TURN = 2.0 * math.pi
+# so few are sorted by insertion, which needs no array of its own
+_MOST_INSERTED = 32
 
 
 def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
@@ -79,7 +81,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
                 start += np.searchsorted(part, h[t, axis] - reach[t, axis], side="left")
             looked += max(end - start, 0)
             for k in range(start, end):
-                if _inside(h[t], z[order[k]], reach[t], turning):
+                if _inside(h, t, z, order[k], reach, turning):
                     if count == tracks.size:
                         tracks, found = _doubled(tracks), _doubled(found)
                     tracks[count] = t
@@ -87,10 +89,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
                     count += 1
                     if count > most:
                         return tracks[:count].copy(), found[:count].copy(), looked
-        # number by number: assigning the slice would compile an error message about lengths
-        ordered = np.sort(found[before:count])
-        for k in range(ordered.size):
-            found[before + k] = ordered[k]
+        _sort(found, before, count)
     return tracks[:count].copy(), found[:count].copy(), looked
 
 
@@ -155,6 +154,23 @@ def _axis(reach: Array, z: Array, turning: Array, other: int) -> int:
 
 
 @inner_njit
+def _sort(found: Array, begin: int, end: int) -> None:
+    """Sort a part of an array in place."""
+    if end - begin > _MOST_INSERTED:
+        # number by number: assigning the slice would compile an error message about lengths
+        ordered = np.sort(found[begin:end])
+        for k in range(ordered.size):
+            found[begin + k] = ordered[k]
+        return
+    for k in range(begin + 1, end):
+        value, at = found[k], k
+        while at > begin and found[at - 1] > value:
+            found[at] = found[at - 1]
+            at -= 1
+        found[at] = value
+
+
+@inner_njit
 def _doubled(array: Array) -> Array:
     larger = np.empty(2 * array.size, np.int64)
     for i in range(array.size):
@@ -199,14 +215,15 @@ def _reach(covariance: Array, gate: float) -> Array:
 
 
 @inner_njit
-def _inside(h: Array, z: Array, reach: Array, turning: Array) -> bool:
-    """Whether no residual is larger than its reach."""
-    for i in range(h.size):
-        off = abs(z[i] - h[i])
+def _inside(h: Array, t: int, z: Array, m: int, reach: Array, turning: Array) -> bool:
+    """Whether no residual of measurement m from row t is larger than its reach."""
+    # by numbers of rows: numba counts references for each view of a row, which takes longer than the comparisons
+    for i in range(turning.size):
+        off = abs(z[m, i] - h[t, i])
         if turning[i]:
             off %= _TURN
             off = min(off, _TURN - off)
-        if not off <= reach[i]:
+        if not off <= reach[t, i]:
             return False
     return True
 
@@ -221,33 +238,46 @@ def _near_both(
     found = np.empty(rows.size, np.int64)
     count = 0
     axis = _axis(reach, z, turning, -1) if track.size and len(z) else -1
-    order, along = near, np.empty(0)
+    order = near
     if axis >= 0:
         # those near a track in their order along the axis: the gate of a tuple is far narrower than the track's
         order = near.copy()
         for t in range(len(first) - 1):
             part = near[first[t] : first[t + 1]]
             order[first[t] : first[t + 1]] = part[np.argsort(z[part, axis], kind="mergesort")]
-        along = z[order, axis]
+    # side by side as they are looked at
+    sorted_z = z[order]
     for row in range(track.size):
         low, high = first[track[row]], first[track[row] + 1]
+        end = math.inf
         if axis >= 0:
-            start, part = low, along[low:high]
-            low = start + np.searchsorted(part, h[row, axis] - reach[row, axis], side="left")
-            high = start + np.searchsorted(part, h[row, axis] + reach[row, axis], side="right")
+            end = h[row, axis] + reach[row, axis]
+            low = _not_below(sorted_z, axis, h[row, axis] - reach[row, axis], low, high)
         begin = count
         for k in range(low, high):
-            if _inside(h[row], z[order[k]], reach[row], turning):
+            if axis >= 0 and sorted_z[k, axis] > end:
+                break
+            if _inside(h, row, sorted_z, k, reach, turning):
                 if count == rows.size:
                     rows, found = _doubled(rows), _doubled(found)
                 rows[count], found[count] = row, order[k]
                 count += 1
                 if count > most:
                     return rows[:count].copy(), found[:count].copy()
-        ordered = np.sort(found[begin:count])
-        for k in range(ordered.size):
-            found[begin + k] = ordered[k]
+        _sort(found, begin, count)
     return rows[:count].copy(), found[:count].copy()
+
+
+@inner_njit
+def _not_below(z: Array, axis: int, value: float, low: int, high: int) -> int:
+    """The first of the rows from low to high, sorted along the axis, that is not below the value."""
+    while low < high:
+        middle = (low + high) // 2
+        if z[middle, axis] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:

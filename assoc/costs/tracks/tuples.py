@@ -132,6 +132,8 @@ def grow_track_tuples(
     association contains it, though it may be the true one. LimitExceededError for more than `max_tuples`.
     """
     count = len(states)
+    if not any(getattr(sensor, "measures_velocity", True) for sensor in sensors):
+        filter, states = filter.positions_alone(states)
     growth = _Growth(
         filter, measurements, sensors, terms, _ahead(sensors, terms, misses),
         [gate_of(sensor, gate_probability) for sensor in sensors], [angular_components(sensor) for sensor in sensors],

@@ -65,17 +65,22 @@ def expect(mean: Array, P: Array, models: Array, d: int) -> tuple[Array, Array]:
     code, kind, position, columns, matrix, noise = unpack(models[0], d)
     c = len(columns)
     hs, S, h = np.empty((B, d)), np.empty((B, d, d)), np.empty(d)
-    H, v, R = np.empty((d, max(3, c))), np.zeros(d), noise.copy()
+    H, HP, v, R = np.empty((d, max(3, c))), np.empty((d, c)), np.zeros(d), noise.copy()
     for b in range(B):
         linearise_at(code, position, columns, matrix, mean[b], h, H)
         for a in range(d):
             hs[b, a] = h[a]
-            for e in range(d):
+            for q in range(c):
                 total = 0.0
                 for p in range(c):
-                    for q in range(c):
-                        total += H[a, p] * P[b, columns[p], columns[q]] * H[e, q]
-                S[b, a, e] = total
+                    total += H[a, p] * P[b, columns[p], columns[q]]
+                HP[a, q] = total
+        for a in range(d):
+            for e in range(a + 1):
+                total = 0.0
+                for q in range(c):
+                    total += HP[a, q] * H[e, q]
+                S[b, a, e] = S[b, e, a] = total
         if kind != PLAIN:
             v[:] = 0.0
             modify(kind, h[0], elevation_of(h, H), v, noise, S[b, 1, 1], S[b, d - 1, d - 1], R)
@@ -149,3 +154,30 @@ def distances(h: Array, S: Array, rows: Array, z: Array, code: int) -> tuple[int
             total += v[a] * v[a]
         square[k] = total
     return GOOD, square
+
+
+@njit
+def matched(weights: Array, h: Array, S: Array, turning: Array) -> tuple[Array, Array]:
+    """Means (B, d) and covariances (B, d, d) of mixtures of measurements, h (B, m, d), S (B, m, d, d), weights (B, m).
+
+    Where a component is ``turning`` it is an angle: means are taken of the differences from the first.
+    """
+    B, m, d = h.shape
+    mean, covariance, away = np.empty((B, d)), np.zeros((B, d, d)), np.empty((m, d))
+    for b in range(B):
+        for a in range(d):
+            middle = 0.0
+            for j in range(m):
+                off = h[b, j, a] - h[b, 0, a]
+                if turning[a]:
+                    off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+                away[j, a] = off
+                middle += weights[b, j] * off
+            mean[b, a] = h[b, 0, a] + middle
+            for j in range(m):
+                away[j, a] -= middle
+        for j in range(m):
+            for a in range(d):
+                for e in range(d):
+                    covariance[b, a, e] += weights[b, j] * (S[b, j, a, e] + away[j, a] * away[j, e])
+    return mean, covariance
