@@ -87,13 +87,6 @@ class Track(Shown):
         """Whether it is confirmed and not lost."""
         return self.status in ("confirmed", "coasting")
 
-    def named(self, track_id: int) -> Track:
-        """The same track under another id."""
-        # `dataclasses.replace` would take longer than everything else done with a track
-        made = object.__new__(Track)
-        made.__dict__.update(self.__dict__, track_id=track_id)
-        return made
-
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)
         return f"Track({self.track_id}, {self.status}, ({place}) m at {moment(self.time)}, score {self.score:.4g})"

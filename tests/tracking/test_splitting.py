@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assoc import filters
-from assoc.tracking import TRACKERS, Initiation, TrackTable
+from assoc.tracking import TRACKERS, Initiation, LatePlots, TrackTable
 from tests.tracking import plain
 
 
@@ -31,3 +31,8 @@ def test_the_new_track_names_its_parent(kind, tmp_path):
     assert len(seen) == 3 and first.track_id == min(seen)
     assert (first.parent, second.parent, far.parent) == (0, first.track_id, 0)
     assert sorted(table.to_frame()["parent"]) == [0, 0, first.track_id]
+    # names that are handed out
+    late = LatePlots(kind(sensors, filter, **options))
+    late.tracker.state, late.names = again.state, {i: 100 + i for i in seen}
+    named = {track.track_id: track.parent for track in late.tracks if track.reported}
+    assert named == {100 + track.track_id: 100 * (track.parent > 0) + track.parent for track in tracks}

@@ -25,6 +25,7 @@ from assoc.tracking.stages.checking import checked_measurements
 from assoc.tracking.stages.identity_evidence import checked_identities, no_identities
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step, Track
+from assoc.tracking.track_batch import ID, PARENT, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0
@@ -124,8 +125,12 @@ class LatePlots:
         if state.time is None:
             return []
         settings = self.tracker.settings
-        inner = current(settings, state).tracks(settings.filter, state.time)
-        return sorted((track.named(self._name(track.track_id)) for track in inner), key=lambda track: track.track_id)
+        inner = current(settings, state)
+        counts = inner.counts.copy()
+        counts[:, ID] = [self._name(i) for i in inner.track_id.tolist()]
+        counts[:, PARENT] = [self.names.get(i, 0) for i in inner.parent.tolist()]
+        order = np.argsort(counts[:, ID], kind="stable")
+        return TrackBatch(inner.states, inner.numbers, counts)[order].tracks(settings.filter, state.time)
 
     @property
     def odd_identities(self) -> tuple[OddIdentity, ...]:
