@@ -177,7 +177,7 @@ def _take_plots(
     lines: Lines | None, scene: Scene, tracker: LiveTracker, given: Given, show: Callable[[list[Picture]], None]
 ) -> None:
     """Pass the plots of the lines (of the scene if there are none) to the tracker, and show its pictures."""
-    from assoc._cli.track.plot_lines import OwnPosition, parse_line, replayed
+    from assoc._cli.track.plot_lines import IdentityError, OwnPosition, parse_line, replayed
 
     if lines is None:
         for plot in replayed(scene, given["replay"]):
@@ -186,6 +186,9 @@ def _take_plots(
     for line in lines:
         try:
             found = parse_line(line, scene)
+        except IdentityError as error:
+            tracker.leave_out("identities not understood", f"identity left out: {error}")
+            found = error.plot
         except InvalidInputError as error:
             tracker.leave_out("lines not understood", f"line left out: {error}")
             continue

@@ -18,7 +18,7 @@ import pytest
 from assoc import live, track
 from assoc._cli.track import plot_lines
 from assoc._cli.track.options import make_tracker
-from assoc._cli.track.plot_lines import LONGEST, Lines, parse_line, replayed
+from assoc._cli.track.plot_lines import LONGEST, IdentityError, Lines, parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
@@ -283,6 +283,9 @@ def test_lines_with_identities(scene_file):
         with pytest.raises(InvalidInputError, match="mode3|address|values") as caught:
             parse_line(f"1,2.5,1000,0.5,0.1,{bad}", scene)
         assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+        # the plot is sound
+        if bad != "0,1,2":
+            assert isinstance(caught.value, IdentityError) and caught.value.plot == ("1", 2.5, plain["values"], (0, 0))
     for more in ({"mode3": 1.5}, {"mode3": True}, {"address": [1]}, {"address": 10**9}):
         with pytest.raises(InvalidInputError, match="expected sensor, time and values"):
             parse_line(json.dumps(plain | more), scene)
@@ -391,3 +394,11 @@ def test_no_output_is_overwritten(scene_file, tmp_path, capsys):
     (tmp_path / "junk.npz").write_bytes(b"junk")
     assert live.main([*words, "--state", str(tmp_path / "junk.npz")]) == 2
     assert "junk.npz: is not a readable npz file" in capsys.readouterr().err
+
+
+def test_a_plot_whose_identity_is_none_is_used(scene_file, monkeypatch, capsys):
+    lines = b"1,0.5,50000,0.6,0.05,9999\n1,0.7,50000,0.6,0.05,,zz\n1,0.8,50000,0.6\n"
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines)))
+    assert live.main([str(scene_file)]) == 0
+    told = capsys.readouterr().err
+    assert "2 plots in " in told and "2 identities not understood" in told and told.count("identity left out") == 1

@@ -53,6 +53,14 @@ class Plot(NamedTuple):
     """Mode 3/A code and ICAO address, 0 where it is missing."""
 
 
+class IdentityError(InvalidInputError):
+    """A plot's identity is none; without it the plot is sound."""
+
+    def __init__(self, message: str, plot: Plot) -> None:
+        super().__init__(message)
+        self.plot = plot
+
+
 class OwnPosition(NamedTuple):
     """Where a platform is, as read from a line."""
 
@@ -76,7 +84,7 @@ def parse_line(line: str, scene: Scene) -> Plot | OwnPosition | None:
     Raises
     ------
     InvalidInputError
-        The line has neither form.
+        The line has neither form; an `IdentityError` if only the identity is none.
     """
     text = line.strip()
     if not text or text.startswith("#"):
@@ -98,14 +106,19 @@ def parse_line(line: str, scene: Scene) -> Plot | OwnPosition | None:
             # of an unknown sensor only the name is read: the tracker reports it
             parts = sensor.components[: sensor.dim] if sensor is not None else ()
             values = [found.get(part, "") if part == "height" else found[part] for part in parts]
-        identity = _identity(found.get("mode3"), found.get("address"))
         if sensor is not None and sensor.components[sensor.dim - 1] == "height":
             name, values = _with_height(name, list(values), scene, sensor)
-        return Plot(name, time, [float(value) for value in values], identity)
+        plot = Plot(name, time, [float(value) for value in values])
     except (ValueError, TypeError, LookupError, RecursionError, AttributeError, OverflowError) as error:
-        what = f"no {error}" if isinstance(error, KeyError) else str(error)
-        expected = "expected sensor, time and values, as CSV or a JSON object"
-        raise InvalidInputError(f"{expected}, got {text[:60]!r} ({what[:80]})") from None
+        raise InvalidInputError(_refusal(text, f"no {error}" if isinstance(error, KeyError) else str(error))) from None
+    try:
+        return plot._replace(identity=_identity(found.get("mode3"), found.get("address")))
+    except ValueError as error:
+        raise IdentityError(_refusal(text, str(error)), plot) from None
+
+
+def _refusal(text: str, what: str) -> str:
+    return f"expected sensor, time and values, as CSV or a JSON object, got {text[:60]!r} ({what[:80]})"
 
 
 def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
