@@ -3,6 +3,9 @@
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pandas as pd
@@ -113,22 +116,10 @@ def test_what_is_done_is_kept_and_what_is_missing_is_named(here, capsys, monkeyp
 
 
 def test_damaged_empty_and_overlapping_files_are_named_and_the_rest_is_tracked(here, capsys, recording):
-    thirds = np.array_split(np.arange(len(recording)), 3)
-    # in the wrong order, and the second reaches into the third
-    for name, rows in (("a", thirds[2]), ("b", np.append(thirds[1], thirds[2][:40])), ("c", thirds[0])):
-        write_plots(f"{name}.csv", recording.take(rows))
-    (here / "empty.csv").write_text("time,range,bearing\n")
-    (here / "damaged.parquet").write_bytes(b"PAR1 is not a table PAR1")
     words = ["--tracker", "nearest-neighbour"]
     _, one, _ = run(["all.csv", *words], "one.csv", capsys)
-    code, many, said = run(["a.csv", "empty.csv", "b.csv", "damaged.parquet", "c.csv", *words], "many.csv", capsys)
-    assert code == 3
-    for line in (
-        "empty.csv: holds no plots",
-        "damaged.parquet: is not a readable",
-        "40 plots of a.csv, which are before",
-    ):
-        assert said.count(line) == 2, line
+    code, many, said = run([*in_hours(recording), *words], "many.csv", capsys)
+    assert code == 3 and all(said.count(line) == 2 for line in OF_FILES)
     pd.testing.assert_frame_equal(one[["track_id", "time", "hits"]], many[["track_id", "time", "hits"]])
     code, _, said = run(["empty.csv", "damaged.parquet", *words], "none.csv", capsys)
     assert code == 2 and "empty.csv: holds no plots" in said and not os.path.exists("none.csv")
@@ -172,6 +163,78 @@ def at_first(monkeypatch, do):
             done.append(do())
 
     monkeypatch.setattr(Slices, "_save", save)
+
+
+def in_hours(recording):
+    """Files of a day: in the wrong order, one without plots, one that is no table, and one that reaches back."""
+    thirds = np.array_split(np.arange(len(recording)), 3)
+    for name, rows in (("a", thirds[2]), ("b", np.append(thirds[1], thirds[2][:40])), ("c", thirds[0])):
+        write_plots(f"{name}.csv", recording.take(rows))
+    with open("empty.csv", "w") as file:
+        file.write("time,range,bearing\n")
+    with open("damaged.parquet", "wb") as file:
+        file.write(b"PAR1 is not a table PAR1")
+    return ["a.csv", "empty.csv", "b.csv", "damaged.parquet", "c.csv"]
+
+
+OF_FILES = ("empty.csv: holds no plots", "damaged.parquet: is not a readable", "40 plots of a.csv, which are before")
+
+
+@pytest.mark.slow
+def test_on_a_cluster_what_is_missing_is_named_and_the_rest_goes_on(
+    here, capsys, monkeypatch, recording, scheduler, start_worker
+):
+    files, tracker = in_hours(recording), SLICED[1:]
+    workers = [start_worker(), start_worker()]
+    assert run(SLICED, "one.csv", capsys)[0] == 0
+    one = pd.read_csv("one.csv")
+    # a worker is lost, and the slices that it had are done by the other
+    with monkeypatch.context() as patch:
+        at_first(patch, workers[0].kill)
+        code, many, said = run([*files, *tracker, "--scheduler", str(scheduler)], "many.csv", capsys)
+    assert code == 3 and all(said.count(line) == 2 for line in OF_FILES) and "the slice" not in said
+    assert workers[0].wait(100) == -signal.SIGKILL
+    pd.testing.assert_frame_equal(many[["track_id", "time", "hits"]], one[["track_id", "time", "hits"]])
+    # the scheduler is lost, too; one of the slices that were done is damaged: other processes make good what is missing
+    at_first(monkeypatch, scheduler.process.kill)
+    code, part, said = run([*files, *tracker, "--scheduler", str(scheduler)], "rest.csv", capsys)
+    assert code == 3 and "written without" in said and "the slice from" in said and len(part) < len(one)
+    assert all(line in said for line in OF_FILES)
+    (folder,) = os.listdir("rest.csv.slices")
+    kept = sorted(os.listdir(f"rest.csv.slices/{folder}"))
+    with open(f"rest.csv.slices/{folder}/{kept[0]}", "r+b") as file:
+        file.truncate(100)
+    code, rest, said = run([*files, *tracker, "--jobs", "2"], "rest.csv", capsys)
+    assert code == 3 and "the slice" not in said and not os.path.exists("rest.csv.slices")
+    pd.testing.assert_frame_equal(rest, many)
+
+
+@pytest.mark.slow
+def test_a_killed_program_is_resumed(here, capsys, recording, scheduler, start_worker):
+    words = [*SLICED, "--scheduler", str(scheduler), *WORDS]
+    start_worker()
+    assert run(SLICED, "one.csv", capsys)[0] == 0
+    process = subprocess.Popen([sys.executable, "-m", "assoc.track", *words, "-o", "many.csv"])
+    deadline = time.monotonic() + 300
+    while not (done := [*here.glob("many.csv.slices/*/00000.npz")]):
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    process.kill()
+    assert process.wait(100) == -signal.SIGKILL and not os.path.exists("many.csv")
+    before = done[0].stat().st_mtime_ns
+    kept = []
+    plain = Slices.load
+
+    def load(self, number):
+        kept.append(os.stat(done[0]).st_mtime_ns)
+        return plain(self, number)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Slices, "load", load)
+        code, many, _ = run([*SLICED, "--scheduler", str(scheduler)], "many.csv", capsys)
+    # what was done is not done again
+    assert code == 0 and {*kept} == {before} and not os.path.exists("many.csv.slices")
+    pd.testing.assert_frame_equal(many, pd.read_csv("one.csv"))
 
 
 @pytest.mark.slow
