@@ -232,8 +232,11 @@ class _Hearing:
     def hear(self, track: int, column: int, sensor: str, time: float, number: int) -> None:
         """Take in what a sensor says of a confirmed track; 0: of something else."""
         heard = self._numbers.get((column, number), Heard(time, self._scan, ()))
-        others = tuple(one for one in heard.carriers if one[0] != track)
-        carriers = ((track, time), *others[:1]) if track else heard.carriers
+        carriers = heard.carriers
+        alone = len(carriers) == 1 and carriers[0][0] == track
+        others = () if alone else tuple(one for one in carriers if one[0] != track)
+        if track:
+            carriers = ((track, time), *others[:1])
         self._numbers[column, number] = Heard(time, self._scan, carriers)
         if not track:
             return
@@ -257,7 +260,8 @@ class _Hearing:
         if voice.run >= SURE:
             if others and not self._shared(column, number):
                 self._find_twins(key, voice, others)
-            self._compare_sensors(key, voice)
+            if len(self._names) > 1:
+                self._compare_sensors(key, voice)
 
     def _shared(self, column: int, number: int) -> bool:
         """Whether the last two octal digits of a code are 0: those are not of one aircraft."""
