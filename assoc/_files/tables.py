@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 _QUOTED = re.compile(r'[,"\r\n]')
 
-# rows that are written at once: few row groups make Parquet small
-_ROWS = 50_000
+# rows that are written at once: few row groups make Parquet small, and texts take memory
+_ROWS, _TEXTS = 50_000, 10_000
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
@@ -63,7 +63,7 @@ class TableWriter:
         """Write some rows; all parts have the same columns."""
         self._parts.append(part)
         self._waiting += len(part)
-        if self._waiting >= _ROWS:
+        if self._waiting >= (_ROWS if self.parquet else _TEXTS):
             self._write()
 
     def _write(self) -> None:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# rows of ended tracks that are written together
+_ROWS = 10_000
+
+
 class EndedTracks:
     """Writes the rows of a `TrackTable` track by track, each when it has ended and its name is known.
 
@@ -40,7 +44,7 @@ class EndedTracks:
         weakref.finalize(self, self._file.close)
         # where the rows of each track are in the file: first row, and how many
         self._parts: dict[int, list[tuple[int, int]]] = {}
-        self._kind: np.dtype[Any] | None = None
+        self._row: np.dtype[Any] = np.dtype([])
         self._stored = self._written = 0
         self._before: set[int] = set()
         self._confirmed: set[int] = set()
@@ -69,14 +73,15 @@ class EndedTracks:
         frame = frame.sort_values("track_id", kind="stable")
         columns = {str(name): frame[name].to_numpy() for name in frame}
         columns["status"] = columns["status"].astype("S10")
-        if self._kind is None:
-            self._kind = np.dtype([(name, column.dtype) for name, column in columns.items()])
-        rows = np.empty(len(frame), self._kind)
+        if not self._stored:
+            self._row = np.dtype([(name, column.dtype) for name, column in columns.items()])
+        rows = np.empty(len(frame), self._row)
         for name, column in columns.items():
             rows[name] = column
         try:
             self._file.seek(0, 2)
-            rows.tofile(self._file)
+            self._file.write(rows.tobytes())
+            self._file.flush()
         except OSError as error:
             raise LimitExceededError(
                 f"tracks cannot be kept in {tempfile.gettempdir()} ({error.strerror or error}); "
@@ -107,18 +112,25 @@ class EndedTracks:
             self._writer.add(self._named(TrackTable(self._origin).to_frame()))
 
     def _write(self, ended: list[int]) -> None:
-        import pandas as pd
-
-        assert self._kind is not None
-        parts = []
+        parts: list[bytes] = []
+        waiting = 0
         for track in ended:
             for begin, count in self._parts.pop(track):
-                self._file.seek(begin * self._kind.itemsize)
-                parts.append(np.fromfile(self._file, self._kind, count))
-        rows = np.concatenate(parts)
+                self._file.seek(begin * self._row.itemsize)
+                parts.append(self._file.read(count * self._row.itemsize))
+                waiting += count
+            if waiting >= _ROWS or track == ended[-1]:
+                self._writer.add(self._named(self._frame(b"".join(parts))))
+                parts, waiting = [], 0
+
+    def _frame(self, content: bytes) -> pd.DataFrame:
+        import pandas as pd
+
+        rows = np.frombuffer(content, self._row)
         frame = pd.DataFrame({name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()})
-        frame["status"] = frame["status"].str.decode("ascii")
-        self._writer.add(self._named(frame))
+        texts, of = np.unique(rows["status"], return_inverse=True)
+        frame["status"] = texts.astype(np.str_).astype(object)[of]
+        return frame
 
     def _named(self, frame: pd.DataFrame) -> pd.DataFrame:
         if not self._identified:
