@@ -5,7 +5,7 @@ They work for the state of any filter: a dataclass of arrays whose first axis is
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Self
 
@@ -85,6 +85,26 @@ def concatenate(states: Sequence[Any]) -> Any:
             values = [_padded(value, shape) for value in values]
         joined[name] = np.concatenate(values)
     return state_from(type(present[0]), joined)
+
+
+def placed(count: int, parts: Iterable[tuple[Array, Any]]) -> Any:
+    """One batch of `count` targets, at least one part, of parts with the rows (K,) that they take.
+
+    Parts may be made one after the other: none is needed any longer once it stands where it belongs. Histories that
+    some do not have yet are filled with zeros.
+    """
+    joined: dict[str, Array] = {}
+    for rows, state in parts:
+        kind = type(state)
+        for name, value in arrays_of(state).items():
+            shape = value.shape[1:]
+            if name not in joined:
+                joined[name] = np.empty((count, *shape), dtype=value.dtype)
+            elif joined[name].shape[1:] != shape:
+                most = np.maximum(joined[name].shape[1:], shape)
+                joined[name], value = _padded(joined[name], most), _padded(value, most)
+            joined[name][rows] = value
+    return state_from(kind, joined)
 
 
 def _padded(value: Array, shape: Array) -> Array:

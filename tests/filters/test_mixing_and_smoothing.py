@@ -31,6 +31,7 @@ from assoc.filters import (
     transition_from_sojourns,
 )
 from assoc.filters.base import predict_each
+from assoc.filters.batches import arrays_of, placed
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
 
@@ -436,3 +437,21 @@ def test_a_mixture_on_both_sides_of_the_azimuth_pi():
     west, east = found
     assert abs(west.mean[0, 1] % (2.0 * np.pi) - np.pi + east.mean[0, 1]) < 1e-9
     np.testing.assert_allclose(np.diagonal(west.covariance[0]), np.diagonal(east.covariance[0]), rtol=1e-9)
+
+
+def test_parts_are_placed_where_they_belong():
+    """States of several kinds of history, each row by row as in the part that it comes from."""
+    rng = np.random.default_rng(3)
+    fuzzy = FuzzyAdaptiveEKF(MOTION, paper_rules())
+    fresh = fuzzy.start(random_state(5, rng))
+    seen = fuzzy.update(fresh, PLACE.measure(fresh.mean[:, :3]), PLACE).state
+    for parts in (
+        [(np.array([4, 0]), fresh, [1, 2]), (np.array([1, 3, 2]), seen, [0, 4, 2])],
+        [(np.array([1, 3, 2]), seen, [0, 4, 2]), (np.array([4, 0]), fresh, [1, 2])],
+    ):
+        whole = arrays_of(placed(5, ((rows, states[chosen]) for rows, states, chosen in parts)))
+        for rows, states, chosen in parts:
+            for name, value in arrays_of(states[chosen]).items():
+                width = tuple(slice(size) for size in value.shape[1:])
+                assert np.array_equal(whole[name][rows][:, *width], value), name
+                assert whole[name][rows].sum() == pytest.approx(value.sum())

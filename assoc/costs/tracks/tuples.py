@@ -21,13 +21,13 @@ from assoc.costs.tracks.gating import Near, angular_components, near_both, near_
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
-from assoc.filters.batches import concatenate
+from assoc.filters.batches import concatenate, placed
 from assoc.filters.measurement import Measurement
 
 # asking for the memory left would take longer than correcting so few tracks
 _FEW = 100
 # tracks are taken in blocks with about so many pairs: what is corrected for their tuples stays in the cache
-_BLOCK = 4_000
+_BLOCK = 12_000
 
 
 class TrackTuples(NamedTuple):
@@ -171,7 +171,7 @@ def corrected(
         seen, missed = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
         if len(seen):
             done = filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor).state
-            states = concatenate([states[missed], done])[np.argsort(np.concatenate([missed, seen]))]
+            states = placed(len(states), [(missed, states[missed]), (seen, done)])
     return states
 
 

@@ -16,13 +16,15 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
-from assoc.filters.batches import concatenate
+from assoc.filters.batches import placed
 from assoc.tracking.progress import Progress
 from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
 from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100
 """The most new targets in a scan that start from crossings of several sensors."""
+_BLOCK = 2_000
+"""Branches that are corrected at a time."""
 
 
 class Births(NamedTuple):
@@ -137,12 +139,15 @@ class AtOnce(Growth):
         return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
-        old, pairs = len(self._states), len(offers.branch)
-        # states are corrected for the pairs that are kept
-        before, hit, new = kept < old, (kept >= old) & (kept < old + pairs), kept >= old + pairs
-        back = np.argsort(np.concatenate([np.flatnonzero(of) for of in (before, hit, new)]))
-        parts = [self._states[kept[before]], self._corrected(kept[hit] - old), self._begun[kept[new] - old - pairs]]
-        self._states = concatenate(parts)[back]
+        # states are corrected for the pairs that are kept, in blocks that stay in the cache
+        ends = np.array([len(self._states), len(self._states) + len(offers.branch)])
+        which = np.searchsorted(ends, kept, side="right")
+        sources = self._states.__getitem__, self._corrected, self._begun.__getitem__
+        parts = []
+        for number, (source, first) in enumerate(zip(sources, (0, *ends.tolist()), strict=True)):
+            rows = np.flatnonzero(which == number)
+            parts += [(part, source, kept[part] - first) for part in np.split(rows, range(_BLOCK, len(rows), _BLOCK))]
+        self._states = placed(len(kept), ((part, source(chosen)) for part, source, chosen in parts))
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
         """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
