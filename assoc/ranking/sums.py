@@ -71,6 +71,14 @@ def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[ND
                 wide[own] = True
                 continue
             level = limit[own].max()
+            # no step at which nothing would be left out
+            least = np.inf
+            for u in own:
+                for x in range(graph.ptr[u], graph.ptr[u + 1]):
+                    if kept[graph.edge[x]]:
+                        least = min(least, log_upper[graph.edge[x]])
+            while level <= least and level < 0.0:
+                level += _STEP
             for u in own:
                 limit[u] = level + _STEP
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):

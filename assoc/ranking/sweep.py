@@ -53,6 +53,10 @@ class Work(NamedTuple):
     shared: Ints
     """Zeros: edges in common with a vertex that is looked at."""
     processed: NDArray[np.bool_]
+    rank: Ints
+    """Where the cluster's list of members has the vertex: of equals, the first comes first."""
+    border: Ints
+    """The vertices that are near, and some that are closed; the last entry is their number, (V + 1,)."""
 
 
 @njit
@@ -64,6 +68,8 @@ def new_work(vertices: int, edges: int) -> Work:
         np.zeros(vertices, np.int64),
         np.zeros(vertices, np.int64),
         np.zeros(edges, np.bool_),
+        np.zeros(vertices, np.int64),
+        np.zeros(vertices + 1, np.int64),
     )
 
 
@@ -79,9 +85,12 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
 
     -1 where more than `most` vertices would be open at a time.
     """
-    left, place, near, _, processed = work
-    for v in members:
+    left, place, near, _, processed, rank, border = work
+    border[-1] = 0
+    for i in range(members.size):
+        v = members[i]
         left[v] = place[v] = near[v] = 0
+        rank[v] = i
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             left[v] += kept[graph.edge[x]]
             processed[graph.edge[x]] = not kept[graph.edge[x]]
@@ -92,7 +101,7 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
             return count
         if place[v] == 0:
             width += 1
-            count = _opened(graph, v, width, steps, count, work)
+            count = _opened(graph, members, v, width, steps, count, work)
         new_table = True
         while True:
             e = _next_edge(graph, v, work)
@@ -101,7 +110,7 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
             for u in graph.ends[e]:
                 if u >= 0 and place[u] == 0:
                     width += 1
-                    count = _opened(graph, u, width, steps, count, work)
+                    count = _opened(graph, members, u, width, steps, count, work)
                     new_table = True
             if width > most:
                 return -1
@@ -119,10 +128,10 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
             for u in graph.ends[e]:
                 if u >= 0 and u != v and left[u] == 0:
                     width -= 1
-                    count = _closed(members, u, steps, count, work)
+                    count = _closed(u, steps, count, work)
                     new_table = True
         width -= 1
-        count = _closed(members, v, steps, count, work)
+        count = _closed(v, steps, count, work)
 
 
 @inner_njit
@@ -147,55 +156,65 @@ def _next_edge(graph: Graph, v: int, work: Work) -> int:
 
 @njit
 def _next_vertex(graph: Graph, members: Ints, work: Work) -> int:
-    """The vertex that leaves the fewest vertices open, preferably next to an open one; -1 if none is left."""
-    left, place, near, shared, processed = work
-    best, least = -1, np.iinfo(np.int64).max
-    for v in members:
-        if place[v] == DONE or left[v] == 0:
+    """The near vertex that leaves the fewest vertices open; -1 if none is left."""
+    left, place, _, shared, processed, rank, border = work
+    best, least, count = -1, np.iinfo(np.int64).max, 0
+    for i in range(border[-1]):
+        v = border[i]
+        if place[v] == DONE:
             continue
-        # vertices that are not next to an open one come last, those with few edges first
-        cost = (np.int64(1) << 40) + left[v]
-        if near[v]:
-            cost = -2 if place[v] > 0 else 0
-            for turn in range(2):
-                for x in range(graph.ptr[v], graph.ptr[v + 1]):
-                    e = graph.edge[x]
-                    if processed[e]:
+        border[count] = v
+        count += 1
+        if left[v] == 0:
+            continue
+        cost = -2 if place[v] > 0 else 0
+        for turn in range(2):
+            for x in range(graph.ptr[v], graph.ptr[v + 1]):
+                e = graph.edge[x]
+                if processed[e]:
+                    continue
+                for u in graph.ends[e]:
+                    if u < 0 or u == v:
                         continue
-                    for u in graph.ends[e]:
-                        if u < 0 or u == v:
-                            continue
-                        if turn == 0:
-                            shared[u] += 1
-                        elif shared[u] > 0:
-                            if place[u] == 0:
-                                cost += 2 if left[u] > shared[u] else 0
-                            elif left[u] == shared[u]:
-                                cost -= 2
-                            shared[u] = 0
-        if cost < least:
+                    if turn == 0:
+                        shared[u] += 1
+                    elif shared[u] > 0:
+                        if place[u] == 0:
+                            cost += 2 if left[u] > shared[u] else 0
+                        elif left[u] == shared[u]:
+                            cost -= 2
+                        shared[u] = 0
+        if cost < least or (cost == least and rank[v] < rank[best]):
             best, least = v, cost
+    border[-1] = count
+    if best < 0:
+        # at the start, when no vertex is near: one with few edges
+        for v in members:
+            if 0 < left[v] < least:
+                best, least = v, left[v]
     return best
 
 
 @njit
-def _opened(graph: Graph, v: int, width: int, steps: Ints, count: int, work: Work) -> int:
+def _opened(graph: Graph, members: Ints, v: int, width: int, steps: Ints, count: int, work: Work) -> int:
     work.place[v] = width
-    work.near[v] = 1
     for x in range(graph.ptr[v], graph.ptr[v + 1]):
         for u in graph.ends[graph.edge[x]]:
-            if u >= 0:
+            # edges that are not kept may lead to other clusters
+            if u >= 0 and work.near[u] == 0 and work.rank[u] < members.size and members[work.rank[u]] == u:
                 work.near[u] = 1
+                work.border[work.border[-1]] = u
+                work.border[-1] += 1
     steps[count, 0], steps[count, 1], steps[count, 2] = OPEN, v, np.int64(1) << (width - 1)
     return count + 1
 
 
 @njit
-def _closed(members: Ints, v: int, steps: Ints, count: int, work: Work) -> int:
+def _closed(v: int, steps: Ints, count: int, work: Work) -> int:
     bit = work.place[v]
-    for u in members:
-        if work.place[u] > bit:
-            work.place[u] -= 1
+    for i in range(work.border[-1]):
+        if work.place[work.border[i]] > bit:
+            work.place[work.border[i]] -= 1
     work.place[v] = DONE
     steps[count, 0], steps[count, 1], steps[count, 2] = CLOSE, v, np.int64(1) << (bit - 1)
     return count + 1

@@ -8,7 +8,8 @@ be the left-out pairs that touch a remaining cluster. In events without pairs of
 
 with the bounds of `assoc.ranking.pairs.messages`. The estimate between the bounds also accounts for the left-out pairs:
 each is replaced at its two vertices by a pair that ends there, weighted by belief propagation. This moves probabilities
-by at most the probability of the replacements, which is added to the width of the interval.
+by at most the probability of the replacements, which is added to the width of the interval. Pairs below `FAINT` are
+left out first, without replacement: they would be most of what belief propagation has to do.
 
 References
 ----------
@@ -25,9 +26,11 @@ import numpy as np
 from assoc._types import Array, Floats
 from assoc.packing.kernels.matching import match
 from assoc.ranking.pairs.graph import PairGraph, pair_graph
-from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
+from assoc.ranking.pairs.messages import bound_pairs, log_beliefs, log_dropped
 from assoc.ranking.sums import plan_clusters, sum_clusters
 
+FAINT = 1e-10
+"""Pairs less likely are left out where a cluster cannot be summed with all of them."""
 _NARROWEST = 2
 """Open vertices needed for a star, a vertex and its neighbours."""
 _ROUNDING = 1e-12
@@ -56,40 +59,77 @@ def pair_probabilities(
     weight = np.ascontiguousarray(log_weight, dtype=np.float64)
     most = max(_NARROWEST, int(states).bit_length() - 1)
     plan = plan_clusters(graph.graph, np.zeros(len(first)), most, False)
-    probability, alone = np.zeros(len(first)), np.ones(sum(sizes))
     rounding = _ROUNDING + 8.0 * np.finfo(float).eps * sum(sizes) * float(np.abs(weight).max())
-    if plan.label.min() >= 0:
-        weights, free = reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0])
+    weights, free = reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0])
+    wide = plan.label < 0
+    if not wide.any():
+        probability, alone = np.zeros(len(first)), np.ones(sum(sizes))
         sum_clusters(plan, weights, free, np.inf, probability, alone)
         low, high = probability - rounding, probability + rounding
         return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
     # bounds are only of the clusters that are too wide
     bounds = np.zeros((2, len(first)))
-    bounds[0] = -np.inf
-    log_bounds(graph, weight, np.flatnonzero(plan.label < 0), np.empty((5, 2 * len(first))), bounds)
-    plan = plan_clusters(graph.graph, bounds[1], most, True)
-    log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight, ~plan.kept))
-    weights, left = reduced(graph, weight, plan.kept, log_free, sizes[0])
-    sum_clusters(plan, weights, left, np.inf, probability, alone)
-    paired = np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
-    unpaired = np.clip(1.0 - paired, 0.0, 1.0)
-    # left-out pairs, by their replacements at the first list's end
-    out = np.flatnonzero(~plan.kept)
-    index = np.empty(len(first), dtype=np.int64)
-    count = graph.ptr[sizes[0]]
-    index[graph.edge[:count]] = np.arange(count)
-    least, highest = np.exp(bounds)
-    ends = graph.ends[out]
-    probability[out] = (unpaired[graph.ends[:, 0]] * np.exp(log_part[index] - log_free[graph.ends[:, 0]]))[out]
-    width = np.bincount(plan.label, -unpaired * np.expm1(-log_free))
-    first_label, second_label = plan.label[ends].T
-    apart = first_label != second_label
-    np.add.at(width, first_label, highest[out])
-    np.add.at(width, second_label[apart], highest[out][apart])
-    around = np.where(plan.kept, width[plan.label[graph.ends[:, 0]]], np.inf)
-    lower = np.maximum(probability - around, least) - rounding
-    upper = np.minimum(probability + around, highest) + rounding
+    bounds[1] = 1.0
+    bound_pairs(graph, weights, free, np.flatnonzero(wide), np.empty((3, 2 * len(first))), bounds)
+    faint = bounds[1] < FAINT
+    rest = np.flatnonzero(~faint)
+    part = pair_graph(first[rest], second[rest], sizes)
+    parted = _without_some(part, weight[rest], bounds[:, rest], sizes[0], most)
+    lost = _touching(parted.label, graph.ends[faint], bounds[1, faint], len(parted.width))
+    around = np.full(len(first), np.inf)
+    around[rest] = np.where(parted.kept, (parted.width + lost)[parted.label[part.ends[:, 0]]], np.inf)
+    # of a faint pair, as if its ends were apart
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        by_end = parted.unpaired / free
+        probability = np.nan_to_num(weights * by_end[graph.ends[:, 0]] * by_end[graph.ends[:, 1]])
+    probability[rest] = parted.probability
+    lower = np.maximum(probability - around, bounds[0]) - rounding
+    upper = np.minimum(probability + around, bounds[1]) + rounding
     return PairIntervals(np.clip(probability, lower, upper), np.maximum(lower, 0.0), np.minimum(upper, 1.0))
+
+
+class _Parted(NamedTuple):
+    """Estimates for E edges and V vertices where clusters are summed without some edges."""
+
+    probability: Floats
+    """(E,)."""
+    unpaired: Floats
+    """(V,)."""
+    kept: Array
+    """Edges that are summed, (E,)."""
+    label: Array
+    """Cluster of each vertex, (V,)."""
+    width: Floats
+    """How far the edges left out move the probabilities of each cluster at most."""
+
+
+def _without_some(graph: PairGraph, weight: Floats, bounds: Floats, rows: int, most: int) -> _Parted:
+    """Leave out the least likely edges until all clusters can be summed, and sum."""
+    count, vertices = len(weight), graph.ptr.size - 1
+    with np.errstate(divide="ignore"):
+        plan = plan_clusters(graph.graph, np.log(bounds[1]), most, True)
+    log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight, ~plan.kept))
+    weights, left = reduced(graph, weight, plan.kept, log_free, rows)
+    probability, alone = np.zeros(count), np.ones(vertices)
+    sum_clusters(plan, weights, left, np.inf, probability, alone)
+    paired = np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), vertices)
+    unpaired = np.clip(1.0 - paired, 0.0, 1.0)
+    # edges left out, by their replacements at the first list's end
+    out = np.flatnonzero(~plan.kept)
+    first = graph.ends[out, 0]
+    index = np.empty(count, dtype=np.int64)
+    index[graph.edge[: graph.ptr[rows]]] = np.arange(graph.ptr[rows])
+    probability[out] = unpaired[first] * np.exp(log_part[index[out]] - log_free[first])
+    width = np.bincount(plan.label, -unpaired * np.expm1(-log_free))
+    width += _touching(plan.label, graph.ends[out], bounds[1, out], len(width))
+    return _Parted(probability, unpaired * np.exp(-log_free), plan.kept, plan.label, width)
+
+
+def _touching(label: Array, ends: Array, upper: Floats, clusters: int) -> Floats:
+    """Sum of these edges' values at each cluster that they touch."""
+    first, second = label[ends].T
+    apart = first != second
+    return np.bincount(first, upper, clusters) + np.bincount(second[apart], upper[apart], clusters)
 
 
 def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from assoc._system.compiled import njit
 from assoc._types import Array, Ints
 from assoc.ranking.sweep import Graph
 
@@ -27,13 +28,25 @@ class PairGraph(NamedTuple):
 
 def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph:
     """Graph of the pairs of members (from 0) of two lists of these sizes."""
-    count = len(first)
     ends = np.stack([first, sizes[0] + second], axis=1).astype(np.int64)
-    vertex = ends.T.reshape(-1)
-    order = np.argsort(vertex, kind="stable")
-    ptr = np.zeros(sum(sizes) + 1, dtype=np.int64)
-    np.cumsum(np.bincount(vertex, minlength=sum(sizes)), out=ptr[1:])
-    index = np.empty(2 * count, dtype=np.int64)
-    index[order] = np.arange(2 * count)
-    edge = order % max(count, 1)
-    return PairGraph(ends, ptr, edge, index[(order + count) % max(2 * count, 1)], Graph(ends, ptr, edge))
+    ptr, edge, mate = _listed(ends, sum(sizes))
+    return PairGraph(ends, ptr, edge, mate, Graph(ends, ptr, edge))
+
+
+@njit
+def _listed(ends: Ints, vertices: int) -> tuple[Ints, Ints, Ints]:
+    """The edges of each vertex: the fields of a `PairGraph` after the first."""
+    ptr, count = np.zeros(vertices + 1, np.int64), len(ends)
+    for e in range(count):
+        ptr[ends[e, 0] + 1] += 1
+        ptr[ends[e, 1] + 1] += 1
+    for v in range(vertices):
+        ptr[v + 1] += ptr[v]
+    free, edge, mate = ptr.copy(), np.empty(2 * count, np.int64), np.empty(2 * count, np.int64)
+    for e in range(count):
+        x, y = free[ends[e, 0]], free[ends[e, 1]]
+        edge[x] = edge[y] = e
+        mate[x], mate[y] = y, x
+        free[ends[e, 0]] += 1
+        free[ends[e, 1]] += 1
+    return ptr, edge, mate

@@ -9,7 +9,7 @@ The equation turns upper bounds on all messages into lower bounds, and lower int
 the first round gives lower bounds, the second upper, the third lower. (A fourth round would return to vertices that
 have been removed, so that it gives no bounds.) Rounds until convergence are belief propagation, exact on trees.
 
-Messages are logarithms.
+Messages of belief propagation are logarithms.
 
 References
 ----------
@@ -35,6 +35,8 @@ _ROUNDS, _SETTLED = 400, 1e-10
 """Belief propagation ends after so many messages of each vertex of a cluster, or when they change by less than this."""
 _FAINT = 1e-290
 """Sums relative to their largest term below this have lost digits."""
+_FULL = 1e17
+"""Odds above this are a probability of 1 in floats."""
 
 
 @inner_njit
@@ -77,34 +79,57 @@ def _log_one_and(
     return top + math.log(total)
 
 
-@njit
-def log_bounds(graph: PairGraph, log_weight: Floats, vertices: Ints, work: Floats, bounds: Floats) -> None:
-    """Lower and upper bounds on the logarithms of pairs' probabilities, (2, K), those of some whole clusters.
+@inner_njit
+def _reply(graph: PairGraph, weights: Floats, v: int, free: float, incoming: Floats, outgoing: Floats) -> None:
+    """Compute the outgoing messages of a vertex, not logarithms: 1 / (free + terms of the other edges)."""
+    total = free
+    for x in range(graph.ptr[v], graph.ptr[v + 1]):
+        outgoing[x] = total
+        total += weights[graph.edge[x]] * incoming[graph.mate[x]]
+    total = 0.0
+    for x in range(graph.ptr[v + 1] - 1, graph.ptr[v] - 1, -1):
+        others = outgoing[x] + total
+        total += weights[graph.edge[x]] * incoming[graph.mate[x]]
+        outgoing[x] = 1.0 / others if others > 0.0 else np.inf
 
-    ``work`` has room for five values of each edge end, (5, 2 K).
+
+@njit
+def bound_pairs(graph: PairGraph, weights: Floats, free: Floats, vertices: Ints, work: Floats, bounds: Floats) -> None:
+    """Lower and upper bounds on pairs' probabilities, (2, K), those of some whole clusters.
+
+    ``weights`` (K,) and ``free`` (V,) are reduced weights of the edges and of leaving each vertex alone, at most about
+    1, which multiplies a vertex' messages by its ``free``. ``work`` has room for three values of each edge end.
     """
-    incoming, low, high, last, term = work[0], work[1], work[2], work[3], work[4]
-    for v in vertices:
-        incoming[graph.ptr[v] : graph.ptr[v + 1]] = 0.0
-    for here, there in ((incoming, low), (low, high), (high, low), (low, last)):
-        for v in vertices:
-            _send(graph, log_weight, v, here, there, term)
+    incoming, low, high = work[0], work[1], work[2]
+    # numbers that have lost digits are replaced by what they are at most, and at least
+    most, least = np.maximum(weights, _FAINT), np.where(weights > _FAINT, weights, 0.0)
     for v in vertices:
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
-            bounds[0, graph.edge[x]], bounds[1, graph.edge[x]] = -np.inf, 0.0
+            incoming[x] = 1.0 / free[v] if free[v] > _FAINT else np.inf
+    for v in vertices:
+        _reply(graph, most, v, max(free[v], _FAINT), incoming, low)
+    for v in vertices:
+        _reply(graph, least, v, free[v] if free[v] > _FAINT else 0.0, low, high)
+    for v in vertices:
+        _reply(graph, most, v, max(free[v], _FAINT), high, low)
+    last = incoming
+    for v in vertices:
+        _reply(graph, least, v, free[v] if free[v] > _FAINT else 0.0, low, last)
+    for v in vertices:
+        for x in range(graph.ptr[v], graph.ptr[v + 1]):
+            bounds[0, graph.edge[x]], bounds[1, graph.edge[x]] = 0.0, 1.0
     for v in vertices:
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             e, y = graph.edge[x], graph.mate[x]
-            # a message is minus the logarithm of one and the terms of the other edges
-            bounds[0, e] = max(bounds[0, e], _log_share(log_weight[e] + low[y], -low[x]))
-            bounds[1, e] = min(bounds[1, e], _log_share(log_weight[e] + high[y], -last[x]))
+            # a message is the reciprocal of the terms of the other edges
+            bounds[0, e] = max(bounds[0, e], _share(least[e] * low[y] * low[x]))
+            bounds[1, e] = min(bounds[1, e], _share(most[e] * high[y] * last[x]))
 
 
 @inner_njit
-def _log_share(own: float, others: float) -> float:
-    """Logarithm of exp(own) / (exp(own) + exp(others))."""
-    top = max(own, others)
-    return own - top - math.log(math.exp(own - top) + math.exp(others - top))
+def _share(odds: float) -> float:
+    """The probability with these odds, also if they are infinite."""
+    return odds / (1.0 + odds) if odds < _FULL else 1.0
 
 
 @njit

@@ -34,25 +34,28 @@ def without_permutations(
     have more than ``states`` sets, the least likely pairs are left as they are.
     """
     share = np.array(probability, dtype=np.float64)
+    likely = np.flatnonzero(share >= _LEAST)
     # without a measurement in the gates of two tracks nothing can be permuted
-    if len(share) and np.bincount(second).max() > 1:
-        graph, weight = pair_graph(first, second, sizes), np.ascontiguousarray(log_weight, dtype=np.float64)
-        weights = reduced(graph, weight, share > 0.0, np.zeros(sum(sizes)), sizes[0])
-        _permuted(graph, *weights, sizes[0], max(4, int(states).bit_length() - 1), share)
+    if len(likely) and np.bincount(second[likely]).max() > 1:
+        graph, weight = pair_graph(first[likely], second[likely], sizes), np.asarray(log_weight, np.float64)[likely]
+        weights = reduced(graph, weight, np.ones(len(likely), np.bool_), np.zeros(sum(sizes)), sizes[0])
+        shares = share[likely]
+        _permuted(graph, *weights, sizes[0], max(4, int(states).bit_length() - 1), shares)
+        share[likely] = shares
     return share
 
 
 @njit
 def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: int, share: Floats) -> None:
     """Replace the probabilities of the pairs; the first `rows` vertices are tracks."""
-    kept = share >= _LEAST
+    kept, bit, found = np.ones(share.size, np.bool_), np.zeros(free.size, np.int64), np.zeros(share.size)
     label, members = np.full(free.size, -1, np.int64), np.empty(free.size, np.int64)
     limit = np.full(free.size, _LEAST)
     for v in range(rows):
         while label[v] < 0:
             own = members[: cluster(graph.graph, kept, v, v, label, members)]
             if own.size <= most:
-                _permute(graph, weights, free, kept, np.sort(own), rows, share)
+                _permute(graph, (weights, free), kept, np.sort(own), rows, share, (bit, found))
                 break
             level = _STEP * limit[own].max()
             for u in own:
@@ -65,9 +68,13 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
 
 @inner_njit
 def _permute(
-    graph: PairGraph, weights: Floats, free: Floats, kept: Array, members: Ints, rows: int, share: Floats
-) -> None:
+    graph: PairGraph, reduced: tuple[Floats, Floats], kept: Array, members: Ints, rows: int, share: Floats,
+    work: tuple[Ints, Floats],
+) -> None:  # fmt: skip
     """Replace the probabilities of a cluster's pairs; `members` are its vertices, sorted.
+
+    ``reduced`` are weights of edges and of unmatched vertices; ``work`` is room for as many numbers of each, the
+    latter zeros.
 
     A set of vertices is a number with a bit for each, those of tracks above. Its best permutation, and the sum over
     all, follow from the sets without its last track.
@@ -75,7 +82,8 @@ def _permute(
     size, tracks = members.size, np.searchsorted(members, rows)
     if tracks < 2 or size - tracks < 2:
         return
-    bit = np.zeros(free.size, np.int64)
+    weights, free = reduced
+    bit, found = work
     for i in range(size):
         bit[members[i]] = 1 << ((i - tracks) % size)
     best, total, last = np.zeros(1 << size), np.zeros(1 << size), np.empty(1 << size, np.int64)
@@ -90,7 +98,6 @@ def _permute(
                     total[n] += weights[e] * total[s]
                     if weights[e] * best[s] > best[n]:
                         best[n], last[n] = weights[e] * best[s], e
-    found = np.zeros(weights.size)
     for s in range(best.size):
         if best[s] > 0.0:
             weight, left = total[s], s
@@ -110,3 +117,4 @@ def _permute(
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             if kept[graph.edge[x]] and new > 0.0:
                 share[graph.edge[x]] = found[graph.edge[x]] * old / new
+            found[graph.edge[x]] = 0.0

@@ -58,6 +58,10 @@ Permutations = Literal["best", "all"]
 
 _SURE = 30.0
 """Scores are clipped here: exp(-30) is below the accuracy of the probabilities."""
+_LEAST_SHARE = 1e-10
+"""For pairs with a smaller share a track's state counts as predicted, not as corrected: most pairs of a wide gate. With
+n pairs in the gate, a squared distance g, this moves the mean of a track that exists with probability p by at most
+n sqrt(g) / p times this, in its deviations as predicted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,12 +249,19 @@ def _take_in(
     tracks: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
 ) -> tuple[TrackBatch, Array]:
     """Tracks after a sensor's scan, and which of them were detected with probability above 0.5."""
-    count = len(tracks)
-    if not count:
+    if not len(tracks):
         return tracks, np.zeros(0, dtype=np.bool_)
-    target = np.concatenate([pairs.track, np.arange(count)])
-    weights = np.concatenate([share, update.missed]) / update.after[target]
-    states = merged(concatenate([pairs.correct(np.arange(len(share))), tracks.states]), target, weights, count)
+    # given that the target exists
+    weight = share / update.after[pairs.track]
+    counts = share >= _LEAST_SHARE
+    used, faint = np.flatnonzero(counts), np.flatnonzero(~counts)
+    changed = np.bincount(pairs.track[used], minlength=len(tracks)) > 0
+    old, same = np.flatnonzero(changed), np.flatnonzero(~changed)
+    stays = update.missed / update.after + np.bincount(pairs.track[faint], weight[faint], len(tracks))
+    row = np.concatenate([np.searchsorted(old, pairs.track[used]), np.arange(len(old))])
+    weights = np.concatenate([weight[used], stays[old]])
+    states = merged(concatenate([pairs.correct(used), tracks.states[old]]), row, weights, len(old))
+    states = concatenate([states, tracks.states[same]])[np.argsort(np.concatenate([old, same]))]
     hit = update.detected > 0.5
     return tracks.scored(states, update.odds - tracks.existence, np.where(hit, time, np.nan)), hit
 
