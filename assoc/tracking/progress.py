@@ -51,12 +51,12 @@ class Work:
         self.next_id += count
         return ids
 
-    def assign(self, problem: AssignmentProblem) -> Solution:
-        """Solve an assignment problem with the tracker's solver."""
+    def assign(self, problem: AssignmentProblem, effort: float = 1.0) -> Solution:
+        """Solve an assignment problem with the tracker's solver; `effort` is a share of the default limits."""
         self.solver_calls += 1
         # seeded by scan and call, so that a restored tracker continues identically
         seed = np.random.SeedSequence((self.settings.seed, self.scan))
-        options = solver_options(self.settings, problem.num_tuples)
+        options = solver_options(self.settings, problem.num_tuples, effort)
         solution = assign(problem, self.settings.solver, seed=seed, advise=False, **options)
         if solution.status != "optimal":
             self.leave(solution.gap / max(1.0, abs(solution.cost)))
@@ -67,11 +67,12 @@ class Work:
         self.gap = max(self.gap, gap)
 
 
-def solver_options(settings: TrackerSettings, tuples: int) -> dict[str, Any]:
+def solver_options(settings: TrackerSettings, tuples: int, effort: float = 1.0) -> dict[str, Any]:
     """Time limit and parameters of the solver for a problem with this many tuples."""
     options = {"time_limit": settings.time_limit, **settings.solver_parameters}
     if settings.solver == "exact" and settings.time_limit is None:
-        options = {"nodes": max(_LEAST_NODES, _VISITS // max(tuples, 1)), "patience": 0, "gap": _GAP} | options
+        nodes = int(effort * max(_LEAST_NODES, _VISITS // max(tuples, 1)))
+        options = {"nodes": max(nodes, 1), "patience": 0, "gap": _GAP} | options
     return options
 
 

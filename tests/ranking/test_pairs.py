@@ -10,7 +10,7 @@ import pytest
 
 from assoc import AssignmentProblem, marginals
 from assoc.packing.run import Run
-from assoc.ranking.pairs.events import pair_probabilities, reduced
+from assoc.ranking.pairs.events import FAINT, pair_probabilities, reduced
 from assoc.ranking.pairs.graph import pair_graph
 from assoc.ranking.pairs.messages import bound_pairs, log_beliefs
 from assoc.ranking.pairs.permutations import without_permutations
@@ -88,6 +88,20 @@ def test_pairs_left_out_are_missed_by_little():
         widest = max(widest, (found.upper - found.lower).max(initial=0.0))
     assert widest > 0.1
     assert np.mean(wrong) < 0.005 and np.mean(wrong) < 0.1 * np.mean(alone)
+
+
+def test_faint_pairs_between_clusters_are_in_the_intervals():
+    """Small clusters, all joined by pairs that are left out first: wrong by what they weigh, and no more is claimed."""
+    first, second = (one.reshape(-1) for one in np.indices((12, 12)))
+    rng = np.random.default_rng(11)
+    log_weight = np.where(first // 2 == second // 2, rng.normal(0.0, 1.0, 144), rng.uniform(-26.0, -23.5, 144))
+    exact = pair_probabilities(first, second, log_weight, (12, 12), WIDE)
+    assert (exact.upper - exact.lower).max() < 1e-10
+    found = pair_probabilities(first, second, log_weight, (12, 12), 16)
+    assert (found.lower <= exact.probability).all() and (exact.probability <= found.upper).all()
+    faint = exact.probability < FAINT
+    assert faint.any() and (found.upper - found.lower).max() < 40 * FAINT
+    np.testing.assert_allclose(found.probability[faint], exact.probability[faint], rtol=1e-6)
 
 
 @pytest.mark.parametrize("size", [6, 9])

@@ -54,6 +54,7 @@ def test_the_work_is_less_for_large_problems(scene):
     for one in (settings, settings.nursery):
         found = [solver_options(one, count) for count in (0, 10, 10_000, 10_000_000)]
         assert [each.pop("nodes") for each in found] == [500_000, 50_000, 50, 10]
+        assert [solver_options(one, count, 0.05)["nodes"] for count in (0, 10_000, 10_000_000)] == [25_000, 2, 1]
         assert all(each == {"time_limit": None, "patience": 0, "gap": 1e-3} for each in found)
 
 

@@ -120,7 +120,7 @@ def _without_some(graph: PairGraph, weight: Floats, bounds: Floats, rows: int, m
     index = np.empty(count, dtype=np.int64)
     index[graph.edge[: graph.ptr[rows]]] = np.arange(graph.ptr[rows])
     probability[out] = unpaired[first] * np.exp(log_part[index[out]] - log_free[first])
-    width = np.bincount(plan.label, -unpaired * np.expm1(-log_free))
+    width = np.asarray(np.bincount(plan.label, -unpaired * np.expm1(-log_free)), dtype=np.float64)
     width += _touching(plan.label, graph.ends[out], bounds[1, out], len(width))
     return _Parted(probability, unpaired * np.exp(-log_free), plan.kept, plan.label, width)
 
@@ -129,7 +129,9 @@ def _touching(label: Array, ends: Array, upper: Floats, clusters: int) -> Floats
     """Sum of these edges' values at each cluster that they touch."""
     first, second = label[ends].T
     apart = first != second
-    return np.bincount(first, upper, clusters) + np.bincount(second[apart], upper[apart], clusters)
+    return np.asarray(
+        np.bincount(first, upper, clusters) + np.bincount(second[apart], upper[apart], clusters), dtype=np.float64
+    )
 
 
 def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:

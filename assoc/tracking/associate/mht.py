@@ -40,6 +40,10 @@ from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.tracker import Tracker
 
+_EFFORT = 0.05
+"""Share of a tracker's usual limits for the solver: gaps of first scans of ghosts do not close within these either, and
+later scans decide what is still open."""
+
 
 class Trees(NamedTuple):
     """B branches without their scores and states."""
@@ -219,7 +223,7 @@ def _solved(progress: Progress, tree: Array, score: Array, history: Array) -> Ar
         used = np.unique(column[column > 0])
         tuples[:, c + 1] = np.where(column > 0, np.searchsorted(used, column) + 1, 0)
         sizes.append(len(used))
-    solution = progress.work.assign(AssignmentProblem(tuples, -score[rows], sizes))
+    solution = progress.work.assign(AssignmentProblem(tuples, -score[rows], sizes), _EFFORT)
     chosen[rows[solution.indices[solution.indices < len(rows)]]] = True
     return chosen
 
