@@ -259,9 +259,13 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
             table[size : 2 * size] = 0.0
             size *= 2
         elif kind == USE:
-            for i in range(size):
-                if not i & bits:
-                    table[i | bits] += weights[what] * table[i]
+            # entries without these bits, in stretches up to the lowest of them
+            stretch, start, weight = bits & -bits, 0, weights[what]
+            passed = bits | (stretch - 1)
+            while start < size:
+                for i in range(start, start + stretch):
+                    table[i + bits] += weight * table[i]
+                start = ((start | passed) + 1) & ~passed
         elif kind == KEEP or free[what] > 0.0:
             for i in range(size // 2):
                 before[used + i] = table[_without(i, bits)]
@@ -286,15 +290,18 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
             m = n - 1
             while steps[m, 0] == USE:
                 m -= 1
-            bit = steps[m, 2]
-            by_it = 0.0
-            for i in range(size // 2):
-                j = _without(i, bit)
-                if not j & bits:
-                    value = table[j | bits]
-                    by_it += before[used - size // 2 + i] * value
-                    table[j] += weights[what] * value
-            probability[what] = min(weights[what] * by_it / total, 1.0) if total > _SMALL else np.nan
+            bit, weight = steps[m, 2], weights[what]
+            stretch, start, by_it = bits & -bits, 0, 0.0
+            passed = bits | (stretch - 1)
+            while start < size:
+                # where the copy has the entry: its vertex' bit is left out
+                shift = used - size // 2 + ((start & (bit - 1)) | ((start >> 1) & ~(bit - 1))) - start
+                for i in range(start, start + stretch):
+                    value = table[i + bits]
+                    by_it += before[i + shift] * value
+                    table[i] += weight * value
+                start = ((start | passed) + 1) & ~passed
+            probability[what] = min(weight * by_it / total, 1.0) if total > _SMALL else np.nan
         elif kind == KEEP:
             used -= size // 2
         else:

@@ -43,7 +43,7 @@ from assoc.ranking.pairs.messages import log_beliefs
 from assoc.ranking.sums import plan_clusters, sum_clusters
 from assoc.ranking.sweep import most_steps, new_work, planned, room, swept
 
-WIDTHS = (16, 9, 12)
+WIDTHS = (16, 12)
 # vertices of the largest window tried, for each open one
 _SIZE = 8
 # a vertex whose bounds are this close needs no further window
@@ -51,10 +51,11 @@ _NARROW = 1e-3
 # vertices between two checks of the time: some ten milliseconds
 _AT_ONCE = 50
 # entries of tables filled, after which no window is added: about a second
-_WORK = 3e8
+_WORK = 1e9
 # reduced weights of unmatched vertices below this leave windows no digits; events of smaller probability may be lost
 _LIGHTEST, _FAINT = 1e-100, 1e-50
 _ROUNDING = 1e-11
+_EPSILON = 4.0 * float(np.finfo(float).eps)
 
 
 def window_bounds(
@@ -135,6 +136,7 @@ def _bound(
     # weights of unmatched vertices, and probabilities of pairs and unmatched vertices, where as much as possible of the
     # border in the first list has a partner outside and as little as possible of that in the second; and the reverse
     left, pair, alone = np.empty((2, vertices)), np.empty((2, weights.size)), np.empty((2, vertices))
+    sums, at_b = _sums(graph, weights, free), np.zeros(vertices)
     done = 0.0
     for centre in centres:
         width = 0.0
@@ -162,10 +164,14 @@ def _bound(
                 side = 1 if v == ends[edge[ptr[v]], 1] else 0
                 left[:, v] = free[v]
                 for x in range(ptr[v], ptr[v + 1]):
+                    at_b[ends[edge[x], 0] + ends[edge[x], 1] - v] = weights[edge[x]] / free[v]
+                for x in range(ptr[v], ptr[v + 1]):
                     if not kept[edge[x]]:
-                        low[x], high[x] = _outside(graph, weights, free, inside, v, edge[x])
+                        low[x], high[x] = _outside(graph, weights, free, sums, inside, v, edge[x], at_b)
                         left[side, v] += high[x]
                         left[1 - side, v] += low[x]
+                for x in range(ptr[v], ptr[v + 1]):
+                    at_b[ends[edge[x], 0] + ends[edge[x], 1] - v] = 0.0
             buffer = np.empty(room(steps[:length]))
             for side in range(2):
                 alone[side, own] = 1.0
@@ -190,34 +196,42 @@ def _bound(
 
 
 @inner_njit
+def _sums(graph: PairGraph, weights: Floats, free: Floats) -> Floats:
+    """At least the sum in 1 / P(v) of each vertex, whatever of the graph is gone."""
+    total = free.copy()
+    for v in range(free.size):
+        for x in range(graph.ptr[v], graph.ptr[v + 1]):
+            total[v] += weights[graph.edge[x]] / free[graph.ends[graph.edge[x], 0] + graph.ends[graph.edge[x], 1] - v]
+        # rounding of the sum, and of the differences that `_outside` takes
+        total[v] *= 1.0 + _EPSILON * (graph.ptr[v + 1] - graph.ptr[v] + 8)
+    return total
+
+
+@inner_njit
 def _outside(
-    graph: PairGraph, weights: Floats, free: Floats, inside: NDArray[np.bool_], b: int, e: int
-) -> tuple[float, float]:
-    """Bounds on the term of an edge from a window's vertex to a vertex outside, whatever else of the window is gone."""
+    graph: PairGraph, weights: Floats, free: Floats, sums: Floats, inside: NDArray[np.bool_], b: int, e: int,
+    at_b: Floats,
+) -> tuple[float, float]:  # fmt: skip
+    """Bounds on the term of an edge from a window's vertex to a vertex outside, whatever else of the window is gone.
+
+    ``sums`` are `_sums`, ``at_b`` the terms of b in them, of each vertex.
+    """
     ptr, edge, ends = graph.ptr, graph.edge, graph.ends
     u = ends[e, 0] + ends[e, 1] - b
     # the sum in 1 / P(u), at least without the rest of the window in the list of b, and at most with it
     least = most = free[u]
     for y in range(ptr[u], ptr[u + 1]):
-        k = ends[edge[y], 0] + ends[edge[y], 1] - u
+        k, weight = ends[edge[y], 0] + ends[edge[y], 1] - u, weights[edge[y]]
         if k == b:
             continue
-        others, some = free[k], free[k]
+        some = free[k]
         for z in range(ptr[k], ptr[k + 1]):
             m = ends[edge[z], 0] + ends[edge[z], 1] - k
-            if m == u:
-                continue
-            others += weights[edge[z]] / free[m]
-            if not inside[m]:
-                last = free[m]
-                for t in range(ptr[m], ptr[m + 1]):
-                    n = ends[edge[t], 0] + ends[edge[t], 1] - m
-                    if n != k and n != b:
-                        last += weights[edge[t]] / free[n]
-                some += weights[edge[z]] / last
-        most += weights[edge[y]] / some
+            if m != u and not inside[m]:
+                some += weights[edge[z]] / (sums[m] - weights[edge[z]] / free[k] - at_b[m])
+        most += weight / some
         if not inside[k]:
-            least += weights[edge[y]] / others
+            least += weight / (sums[k] - weight / free[u])
     return weights[e] / most, weights[e] / least
 
 
