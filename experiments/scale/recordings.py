@@ -5,9 +5,10 @@
 500 aircraft at a time within 250 km, each for half an hour, turns of 4 s, P_d 0.9, 5 % false plots, altitudes and
 codes: a CSV file, tracked by the program `assoc track` in a process of its own. Plots a second of processor time, all
 of it: reading, grouping, tracking, writing. A first run on a short recording loads the kernels. Memory at the peak is
-that of the process; that of the longer recording says whether it grows. Two processes track slices of 400 s: the wall
-time of one process without slices over theirs, and their processor time over its. A day of three radars, each tracked
-from its own files, is extrapolated from these slices.
+that of the process; that of the longer recording says whether it grows. Two processes track slices of 400 s of the
+longest recording (a short one has too few to share them out evenly): the wall time of one process without slices over
+theirs, and their processor time over its. A day of three radars, each tracked from its own files, is extrapolated from
+these slices.
 """
 
 import os
@@ -105,7 +106,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
                     Claim(f"{words}: plots a second", "1/s", ours=rate, band=(GOALS[tracker], None), source=GOAL),
                     Claim(f"{words}: memory", "MB", ours=found.peak, band=(None, 1_000.0), source=GOAL),
                 ]
-        size = 10_000 if quick else 100_000
+        size = 10_000 if quick else max(files)
         one, two = (track(files[size], "nearest-neighbour", *more) for more in ((), ("--jobs", "2", "--slice", "400")))
         claims.append(Claim("two processes: wall time", "", ours=one.wall / two.wall, band=(1.7, None), source=GOAL))
         claims.append(Claim("two processes: processor time", "", ours=two.processor / one.processor, source=GOAL))
