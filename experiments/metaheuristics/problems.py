@@ -43,6 +43,8 @@ def _radars(noise: float, false_alarms: float) -> Callable[[int], AssignmentProb
 PROBLEMS: dict[str, Callable[[int], AssignmentProblem]] = {
     **{f"ghosts {targets}": _ghosts(targets) for targets in (10, 20, 40, 60, 100)},
     "wide gaps 36": _wide_gap,
+    # one component of about 1,000 rows, too large for dives
+    "wide gates 350": lambda seed: synthetic.wide_gates(350, seed, 1.0),
     "Grundel-Pardalos 30": _known(30),
     "Grundel-Pardalos 50": _known(50),
     "noisy radars": _radars(200.0, 10.0),
