@@ -8,11 +8,11 @@ from scipy.optimize import linprog
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.root import root_with_cuts
+from assoc.packing.branching.short_search import remainder_of
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, Effort, bound_of, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, weight_limit
-from assoc.packing.simplex.remainder import remainder_of
 from tests.oracles import axial_problem
 from tests.packing.test_trial import packings, program_with_cuts, solved
 

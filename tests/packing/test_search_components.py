@@ -11,9 +11,9 @@ import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components import closing, search
+from assoc.packing.components.component import split_component, split_components
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
-from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.components.team import Team
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare

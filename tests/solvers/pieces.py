@@ -6,7 +6,7 @@ import numpy as np
 
 import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components.splitting import split_components
+from assoc.packing.components.component import split_components
 from assoc.packing.prepare import prepare
 from assoc.simulation import simulate
 from experiments.common.instances.synthetic import axial_random

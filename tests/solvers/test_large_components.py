@@ -6,7 +6,7 @@ import pytest
 import assoc
 from assoc._system import memory
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components.splitting import split_components
+from assoc.packing.components.component import split_components
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.exact.regions import close_by_regions

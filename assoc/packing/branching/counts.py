@@ -230,7 +230,7 @@ def _best_split(counted: _Counted, part: _Part, goal: float, pays: float) -> lis
         if is_over(counted.effort.deadline):
             return None
         ranges = part.counts.within(k, least, below), part.counts.within(k, below + 1, most)
-        sides = [counted.part(one, part) for one in ranges]
+        sides = [counted.part(kept, part) for kept in ranges]
         trees = sum(max((goal - side.leaf.bound) / (goal - bound), 0.0) ** _POWER for side in sides)
         if trees < best:
             best, chosen = trees, sides

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components.component import Component
-from assoc.packing.components.splitting import give_covers, split_components
+from assoc.packing.components.component import Component, give_covers, split_components
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run

@@ -10,9 +10,8 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.components.closing import close
-from assoc.packing.components.component import Component
+from assoc.packing.components.component import Component, split_component, split_components
 from assoc.packing.components.parameters import SearchParameters
-from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.components.team import Make, Team
 from assoc.packing.components.turns import Turns, complete_greedily
 from assoc.packing.packing import Packing

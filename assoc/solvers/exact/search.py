@@ -12,8 +12,7 @@ from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.branching.compiling import compile_branching_ahead
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.components.closing import Branching
-from assoc.packing.components.component import Component
-from assoc.packing.components.splitting import split_component
+from assoc.packing.components.component import Component, split_component
 from assoc.packing.components.turns import Turns
 from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
