@@ -23,7 +23,7 @@ from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import WIDE_GAPS
 from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run
+from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
 from experiments.common.peers import by_milp
 
@@ -120,11 +120,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the measurement; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    add_only(parser, list(KINDS))
-    chosen = parser.parse_args(arguments)
-    kinds = chosen.only or list(KINDS)
-    return run(parser, chosen, lambda quick, _: experiment(quick, kinds), __doc__)
+    return main_of_parts(NAME, list(KINDS), experiment, __doc__, arguments)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from assoc.ranking.columns import price_all_columns
 from assoc.simulation import simulate
 from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run
+from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
 from experiments.probabilities import timed, two_lists
 
@@ -220,11 +220,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the comparison; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    add_only(parser, list(KINDS))
-    chosen = parser.parse_args(arguments)
-    kinds = chosen.only or list(KINDS)
-    return run(parser, chosen, lambda quick, _: experiment(quick, kinds), __doc__)
+    return main_of_parts(NAME, list(KINDS), experiment, __doc__, arguments)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,20 @@ def main(
     return run(parser, parser.parse_args(arguments), experiment, about, figure)
 
 
+def main_of_parts(
+    name: str,
+    parts: list[str],
+    experiment: Callable[[bool, list[str]], Any],
+    about: str,
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """As `main`, of an experiment that takes the names of its parts that are to run."""
+    parser = make_parser(name, about)
+    add_only(parser, parts)
+    chosen = parser.parse_args(arguments)
+    return run(parser, chosen, lambda quick, _: experiment(quick, chosen.only or parts), about)
+
+
 def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse.ArgumentParser:
     """Return the parser of the options that the experiments share; an experiment may add its own."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=about.split("\n")[0])
