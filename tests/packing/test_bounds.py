@@ -56,7 +56,7 @@ def check_proof(problem, duals, bound):
 
 
 @pytest.mark.parametrize("with_dummies", [True, False])
-@few_or_all("number", 200, 1500)
+@few_or_all("number", 100, 1500)
 def test_thousands_of_random_problems(number, with_dummies):
     """The bound of arbitrary, poor and good multipliers is valid, rectangular and gated."""
     rng = np.random.default_rng(1)

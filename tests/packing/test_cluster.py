@@ -39,7 +39,7 @@ def _searched(problem, steps, size, rng):
     return total
 
 
-@few_or_all("count", 60, 300)
+@few_or_all("count", 30, 300)
 def test_whole_problem_is_solved(count):
     rng = np.random.default_rng(0)
     for problem in small_problems(count, seed=4):

@@ -23,7 +23,7 @@ def drawn(rng):
     return AssignmentProblem(tuples, rng.normal(-rng.choice([0.0, 1.0, 4.0]) * size, rng.choice([0.3, 2.0])), sizes)
 
 
-@few_or_all("count", 60, 2_000)
+@few_or_all("count", 30, 2_000)
 def test_bounds_contain_the_truth(count):
     rng = np.random.default_rng(71)
     narrow = 0

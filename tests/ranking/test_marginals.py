@@ -31,7 +31,7 @@ def enumerable(count, seed, limit=4000):
             yield problem, found
 
 
-@few_or_all("count", 40, 160)
+@few_or_all("count", 16, 160)
 def test_intervals_contain_the_truth(count):
     widths = []
     for number, (problem, found) in enumerate(enumerable(count, 61)):

@@ -22,7 +22,7 @@ def clear_of_sensors(scene, one, target, scale):
     )
 
 
-@few_or_all("count", 50, 250)
+@few_or_all("count", 25, 250)
 def test_everything_is_finite(count):
     for number in range(count):
         scene, _, _ = draw(11, number)
@@ -40,7 +40,7 @@ def test_everything_is_finite(count):
         assert associate(scene).solutions[0].status == "optimal", number
 
 
-@few_or_all("count", 60, 250)
+@few_or_all("count", 30, 250)
 def test_the_fit_is_no_worse_than_the_truth(count):
     """From a millimetre to a million kilometres: the position found explains the measurements best."""
     judged = 0

@@ -26,7 +26,7 @@ def made(tmp_path_factory):
     return files
 
 
-@few_or_all("count", 120, 500)
+@few_or_all("count", 60, 500)
 def test_hundreds_of_spoiled_files(count, made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     faults = [run_case(77, number, made, tmp_path) for number in range(count)]

@@ -109,7 +109,7 @@ def folder(tmp_path):
     return folder
 
 
-@few_or_all("edits", 2, len(NEW))
+@few_or_all("edits", 1, len(NEW))
 def test_what_is_compiled_anew_after_an_edit(folder, edits):
     assert run(folder) == [[17.0, 2.0], [1, 1]]
     for one in NOTHING_NEW:
