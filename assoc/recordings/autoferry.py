@@ -85,8 +85,8 @@ def read_autoferry(
     if not frames:
         raise InvalidInputError(f"{detections}: holds no frames")
     order = sorted(range(len(frames)), key=lambda k: frames[k][0])
-    start, own = frames[order[0]][0], {frames[k][0]: frames[k][2] for k in order}
-    platform = Platform(np.array([*own]) - start, np.array([*own.values()]))
+    start, poses = frames[order[0]][0], {frames[k][0]: frames[k][2] for k in order}
+    platform = Platform(np.array([*poses]) - start, np.array([*poses.values()]))
     number = {SENSORS[name][0]: s for s, name in enumerate(given)}
     placed = [_sensor(name, changes, platform) for name, changes in given.items()]
     last = np.full(len(placed), -math.inf)
@@ -104,7 +104,7 @@ def read_autoferry(
         if boats is not None:
             there = [_boat(truth, k, boat) for boat in boats[k]]
             ids.append(np.array([i for i, _ in there], dtype=np.int64))
-            places.append(np.array([place for _, place in there]).reshape(-1, 3))
+            places.append(np.array([position for _, position in there]).reshape(-1, 3))
     spots = platform.positions[:, :2]
     reach = max([float(sensor.field_of_view.max()) for sensor in placed if sensor.dim == 2], default=500.0)
     region = np.vstack(

@@ -68,7 +68,7 @@ class Problem:
         limits = chi_square_quantiles(_LIMIT, 3 * len(self.sensors))
         scene = self.scene(epochs, biases)
         by_sensor = biases_of_sensors(self.sensors, self.terms, biases)
-        clocks = np.array([one.get("time", 0.0) for one in by_sensor])
+        clocks = np.array([known.get("time", 0.0) for known in by_sensor])
         tuples = tuple_arrays(scene, epochs, chosen, clocks)
         sensors = sensor_arrays(scene)
         if noise is not None:

@@ -101,8 +101,8 @@ class OnlineRegistration:
             return list(measurements)
         by_sensor = biases_of_sensors(self.sensors, self.terms, self.biases)
         return [
-            corrected_measurements(sensor, z, own)
-            for sensor, z, own in zip(self.sensors, checked, by_sensor, strict=True)
+            corrected_measurements(sensor, z, biases)
+            for sensor, z, biases in zip(self.sensors, checked, by_sensor, strict=True)
         ]
 
     def after(self, time: float, measurements: Sequence[Array]) -> OnlineRegistration:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any
@@ -17,13 +16,12 @@ import numpy as np
 
 from assoc._system.compile_time import announcement
 from assoc._system.compiled import wait_for_kernels
-from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
 from assoc.packing import prepare as packing_form
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.compiling import compile_all_branching_ahead
-from assoc.packing.components.splitting import split_components
+from assoc.packing.components.component import split_components
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
@@ -43,29 +41,8 @@ _BRANCHING = ("exact", "aco", "genetic", "tabu")
 _WITH_EXACT = ("genetic", "tabu")
 
 
-@door
-def warm_up(solvers: Iterable[str] | None = None) -> float:
-    """Compile the kernels of solvers, or load them, so that no later call of ``assign`` has to.
-
-    Call it once after installation, when it takes up to a minute and uses two processes. Afterwards it takes a second
-    or two, and can be called at the start of a program with time limits. On a terminal it shows progress on stderr.
-
-    Parameters
-    ----------
-    solvers : iterable of str, optional
-        Names of solvers; by default all but ``milp``, which compiles little itself.
-
-    Returns
-    -------
-    float
-        Seconds that the call took.
-
-    Raises
-    ------
-    InvalidInputError
-        A name is not that of a solver.
-    """
-    started = time.perf_counter()
+def warm_up(solvers: Iterable[str] | None = None) -> None:
+    """Compile the kernels of solvers, or load them; see `assoc.warm_up`."""
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:
         registry.parameters(name)
@@ -89,7 +66,6 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
         wait_for_kernels()
         # only large problems use this sort, and their time limits are the hardest to keep
         ascending(np.zeros(10_000))
-    return time.perf_counter() - started
 
 
 class _Line:

@@ -203,16 +203,16 @@ def _read_parquet(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFr
         rows, packed = file.metadata.num_rows, os.path.getsize(path)
         groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
         columns = [group.column(k) for group in groups for k in range(group.num_columns)]
-        held = sum(one.total_uncompressed_size for one in columns if one.path_in_schema in wanted)
+        held = sum(chunk.total_uncompressed_size for chunk in columns if chunk.path_in_schema in wanted)
         check_unpacked(path, held + 8 * rows * len(wanted), packed)
         table = file.read(wanted)
-    for place, name in enumerate(wanted):
+    for index, name in enumerate(wanted):
         column = table[name]
         if pa.types.is_dictionary(column.type):
             longest = (pc.max(pc.binary_length(chunk.dictionary)).as_py() or 0 for chunk in column.chunks)
             held += rows * max(longest, default=0)
             check_unpacked(path, held + 8 * rows * len(wanted), packed)
-            table = table.set_column(place, name, column.cast(column.type.value_type))
+            table = table.set_column(index, name, column.cast(column.type.value_type))
     return table.to_pandas(ignore_metadata=True), chosen
 
 
