@@ -108,7 +108,7 @@ def _overlap(centre: Array, spread: Array, n: int, m: int, limit: float, tall: b
     return plane + off * off / rest <= limit * (1.0 + 1e-9)
 
 
-@njit
+@inner_njit
 def _twice_as_long(pairs: Array) -> Array:
     longer = np.empty((2 * len(pairs), 2), np.int32)
     for k in range(len(pairs)):

@@ -28,7 +28,7 @@ from assoc.sensors.kernels.records import TURN, Converted, Information, Six, Thr
 from assoc.sensors.radar import NEAREST
 
 
-@njit
+@inner_njit
 def linearise(code: int, dim: int, position: Array, x: float, y: float, z: float, h: Array, H: Array) -> None:
     """Write the noise-free measurement of a position into h (d,) and its derivatives into H (d, 3)."""
     H[:dim, :3] = 0.0
@@ -63,7 +63,7 @@ def measure(code: int, dim: int, position: Array, x: float, y: float, z: float, 
         h[2] = z
 
 
-@njit
+@inner_njit
 def measure_moving(position: Array, state: Array, columns: Array, h: Array) -> None:
     """Write range, azimuth, elevation and range rate of a state into h (4,).
 
@@ -80,7 +80,7 @@ def measure_moving(position: Array, state: Array, columns: Array, h: Array) -> N
     h[3] = along / max(h[0], NEAREST)
 
 
-@njit
+@inner_njit
 def linearise_moving(position: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
     """Write range, azimuth, elevation and range rate into h (4,), and their derivatives by the columns into H (4, c).
 

@@ -30,8 +30,7 @@ from assoc.packing.bounds.dual_ascent import (
     spread,
 )
 from assoc.packing.bounds.priced import TOLERANCE
-from assoc.packing.components.component import Component
-from assoc.packing.components.splitting import split_components
+from assoc.packing.components.component import Component, split_components
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.cover import Cover
@@ -356,7 +355,7 @@ def _cover_weights(packing: PackingArrays, owner: NDArray[np.int32]) -> Floats:
     return result
 
 
-@njit
+@inner_njit
 def best_of_both(
     cols: NDArray[np.int32],
     weights: Floats,

@@ -11,12 +11,12 @@ the prices.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
@@ -27,6 +27,18 @@ VISITS = 20_000
 
 GAP, VAST = 1e-3, 2000
 """Relative gap that groups of so many trees may keep."""
+
+
+class _Branches(NamedTuple):
+    """The branches of positive score, tree by tree, and the measurements that are in use."""
+
+    rows: NDArray[np.int64]
+    """Rows of the branches, those of a tree by loss."""
+    start: NDArray[np.int64]
+    """Where each tree begins in ``rows``, and the last one ends."""
+    history: NDArray[np.int32]
+    known: Priced
+    used: NDArray[np.bool_]
 
 
 @njit
@@ -62,7 +74,7 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
     group = np.empty(num, np.int64)
     for t in range(num):
         group[t] = _root(parent, t)
-    used = np.zeros(known.measurements.size, np.bool_)
+    branches = _Branches(good, start, history, known, np.zeros(known.measurements.size, np.bool_))
     order = order_of(group)
     begin, gap = 0, 0.0
     while begin < num:
@@ -71,9 +83,9 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
             end += 1
         trees = order[begin:end]
         if trees.size * (trees.size - 1) // 2 <= visits:
-            settled = _search(trees, good, start, history, known, used, visits, chosen) >= 0
+            settled = _search(branches, trees, visits, chosen) >= 0
         else:
-            lost, total = _descend(trees, good, start, history, known, used, score, chosen)
+            lost, total = _descend(branches, trees, score, chosen)
             settled = trees.size >= VAST and lost <= GAP * total
             if settled:
                 gap = max(gap, lost / total)
@@ -84,7 +96,7 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
     return chosen, doubtful, gap
 
 
-@njit
+@inner_njit
 def _root(parent: NDArray[np.int64], t: int) -> int:
     while parent[t] != t:
         parent[t] = parent[parent[t]]
@@ -92,8 +104,9 @@ def _root(parent: NDArray[np.int64], t: int) -> int:
     return t
 
 
-@njit
-def _fits(history: NDArray[np.int32], first: NDArray[np.int64], used: NDArray[np.bool_], row: int) -> bool:
+@inner_njit
+def _fits(branches: _Branches, row: int) -> bool:
+    history, first, used = branches.history, branches.known.first, branches.used
     for c in range(first.size - 1):
         m = history[row, c]
         if m > 0 and used[first[c] + m - 1]:
@@ -101,61 +114,49 @@ def _fits(history: NDArray[np.int32], first: NDArray[np.int64], used: NDArray[np
     return True
 
 
-@njit
-def _mark(history: NDArray[np.int32], first: NDArray[np.int64], used: NDArray[np.bool_], row: int, value: bool) -> None:
+@inner_njit
+def _mark(branches: _Branches, row: int, value: bool) -> None:
+    history, first, used = branches.history, branches.known.first, branches.used
     for c in range(first.size - 1):
         m = history[row, c]
         if m > 0:
             used[first[c] + m - 1] = value
 
 
-@njit
-def _left_over(
-    trees: NDArray[np.int64],
-    taken: NDArray[np.int64],
-    good: NDArray[np.int64],
-    start: NDArray[np.int64],
-    history: NDArray[np.int32],
-    known: Priced,
-    used: NDArray[np.bool_],
-) -> float:
+@inner_njit
+def _left_over(branches: _Branches, trees: NDArray[np.int64], taken: NDArray[np.int64]) -> float:
     """Sum the prices of the group's measurements that a complete choice does not use."""
+    rows, start, history, known, used = branches
     total = 0.0
     for i in range(trees.size):
         for k in range(start[trees[i]], start[trees[i] + 1]):
             for c in range(history.shape[1]):
-                m = history[good[k], c]
+                m = history[rows[k], c]
                 if m > 0 and not used[known.first[c] + m - 1] and known.measurements[known.first[c] + m - 1] > 0.0:
                     total += known.measurements[known.first[c] + m - 1]
                     used[known.first[c] + m - 1] = True
     for i in range(trees.size):
         for k in range(start[trees[i]], start[trees[i] + 1]):
-            _mark(history, known.first, used, good[k], False)
+            _mark(branches, rows[k], False)
     for i in range(trees.size):
         if taken[i] >= 0:
-            _mark(history, known.first, used, taken[i], True)
+            _mark(branches, taken[i], True)
     return total
 
 
-@njit
+@inner_njit
 def _descend(
-    trees: NDArray[np.int64],
-    good: NDArray[np.int64],
-    start: NDArray[np.int64],
-    history: NDArray[np.int32],
-    known: Priced,
-    used: NDArray[np.bool_],
-    score: Floats,
-    chosen: NDArray[np.bool_],
+    branches: _Branches, trees: NDArray[np.int64], score: Floats, chosen: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """The first descent of `_search`, without its bounds; how far it is below the prices, at most, and its score."""
+    rows, start, known = branches.rows, branches.start, branches.known
     taken = np.full(trees.size, -1, np.int64)
     trees = trees[order_of(-known.trees[trees])]
     lost = total = 0.0
     for i in range(trees.size):
         for k in range(start[trees[i]], start[trees[i] + 1]):
-            if _fits(history, known.first, used, good[k]):
-                taken[i] = good[k]
+            if _fits(branches, rows[k]):
+                taken[i] = rows[k]
                 break
         if taken[i] < 0:
             lost += known.trees[trees[i]]
@@ -163,30 +164,22 @@ def _descend(
         lost += max(known.loss[taken[i]], 0.0)
         total += score[taken[i]]
         chosen[taken[i]] = True
-        _mark(history, known.first, used, taken[i], True)
-    lost += _left_over(trees, taken, good, start, history, known, used)
+        _mark(branches, taken[i], True)
+    lost += _left_over(branches, trees, taken)
     for i in range(trees.size):
         if taken[i] >= 0:
-            _mark(history, known.first, used, taken[i], False)
+            _mark(branches, taken[i], False)
     return lost, total
 
 
-@njit
-def _search(
-    trees: NDArray[np.int64],
-    good: NDArray[np.int64],
-    start: NDArray[np.int64],
-    history: NDArray[np.int32],
-    known: Priced,
-    used: NDArray[np.bool_],
-    left: int,
-    chosen: NDArray[np.bool_],
-) -> int:
+@inner_njit
+def _search(branches: _Branches, trees: NDArray[np.int64], left: int, chosen: NDArray[np.bool_]) -> int:
     """Choose the branches of one group; return the visits left, negative if the limit was exceeded."""
+    rows, start, known = branches.rows, branches.start, branches.known
     depth = trees.size
     # trees with high prices first: leaving one of them out costs most
     trees = trees[order_of(-known.trees[trees])]
-    place = np.empty(depth + 1, np.int64)
+    at = np.empty(depth + 1, np.int64)
     taken = np.full(depth, -1, np.int64)
     best = np.full(depth, -1, np.int64)
     lost = np.zeros(depth + 1)
@@ -196,45 +189,45 @@ def _search(
         total += known.trees[t]
     margin = 1e-12 * (total + 1.0)
     i = 0
-    place[0] = start[trees[0]]
+    at[0] = start[trees[0]]
     while i >= 0:
         if i == depth:
             total = lost[i]
             if total < least:
-                total += _left_over(trees, taken, good, start, history, known, used)
+                total += _left_over(branches, trees, taken)
             if total < least - margin:
                 least = total
                 copy_to(best, taken)
             i -= 1
             continue
         if taken[i] >= 0:
-            _mark(history, known.first, used, taken[i], False)
+            _mark(branches, taken[i], False)
             taken[i] = -1
         end = start[trees[i] + 1]
         # the next branch that fits; after the last one, none
-        while place[i] < end and not _fits(history, known.first, used, good[place[i]]):
-            place[i] += 1
+        while at[i] < end and not _fits(branches, rows[at[i]]):
+            at[i] += 1
             left -= 1
         # branches are sorted by loss: the later ones are no better
-        if place[i] < end and lost[i] + known.loss[good[place[i]]] >= least - margin:
-            place[i] = end
-        if place[i] > end or (place[i] == end and lost[i] + known.trees[trees[i]] >= least - margin):
+        if at[i] < end and lost[i] + known.loss[rows[at[i]]] >= least - margin:
+            at[i] = end
+        if at[i] > end or (at[i] == end and lost[i] + known.trees[trees[i]] >= least - margin):
             i -= 1
             continue
-        if place[i] < end:
-            taken[i] = good[place[i]]
+        if at[i] < end:
+            taken[i] = rows[at[i]]
             lost[i + 1] = lost[i] + max(known.loss[taken[i]], 0.0)
-            _mark(history, known.first, used, taken[i], True)
+            _mark(branches, taken[i], True)
         else:
             lost[i + 1] = lost[i] + known.trees[trees[i]]
-        place[i] += 1
+        at[i] += 1
         bound = lost[i + 1]
         for j in range(i + 1, depth):
             more = known.trees[trees[j]]
             for k in range(start[trees[j]], start[trees[j] + 1]):
                 left -= 1
-                if _fits(history, known.first, used, good[k]):
-                    more = min(more, max(known.loss[good[k]], 0.0))
+                if _fits(branches, rows[k]):
+                    more = min(more, max(known.loss[rows[k]], 0.0))
                     break
             bound += more
         if left < 0 and least < np.inf:
@@ -242,10 +235,10 @@ def _search(
         if bound < least - margin:
             i += 1
             if i < depth:
-                place[i] = start[trees[i]]
+                at[i] = start[trees[i]]
     for i in range(depth):
         if taken[i] >= 0:
-            _mark(history, known.first, used, taken[i], False)
+            _mark(branches, taken[i], False)
         if best[i] >= 0:
             chosen[best[i]] = True
     return left

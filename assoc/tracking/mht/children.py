@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
@@ -121,7 +121,7 @@ def next_hypotheses(
     return used[:size], found, after - after[0]
 
 
-@njit
+@inner_njit
 def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
     """Rank the children of all parents: parent (C,), choice (C, n) and weight (C,), the largest first.
 
@@ -176,7 +176,7 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
     return nodes.parent[found], nodes.choice[found], -nodes.cost[found]
 
 
-@njit
+@inner_njit
 def _room(tracks: int, count: int, pairs: int) -> Any:
     return _Work(
         np.zeros(count + 1, np.int64), np.empty(pairs + count, np.int64), np.empty(pairs + count),
@@ -185,7 +185,7 @@ def _room(tracks: int, count: int, pairs: int) -> Any:
     )  # fmt: skip
 
 
-@njit
+@inner_njit
 def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
     """Lower bound on the cost of a parent's best child: each measurement takes its best choice."""
     cost = -parents.weight[h]
@@ -198,7 +198,7 @@ def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
     return cost
 
 
-@njit
+@inner_njit
 def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
     """Find the best child of a node, and lower bounds on the cost of changing it; infinite where there is none."""
     first, track, gain, birth = meanings

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.kernels.sorting import order_of
@@ -90,7 +90,7 @@ def priced(tree: NDArray[np.int64], score: Floats, history: NDArray[np.int32]) -
     return Priced(number, first, price[:trees].copy(), price[trees:].copy(), loss)
 
 
-@njit
+@inner_njit
 def _numbered(tree: NDArray[np.int64]) -> Any:
     """Number the trees from 0; return the number of each branch's tree, and how many trees there are."""
     order = order_of(tree)
@@ -103,7 +103,7 @@ def _numbered(tree: NDArray[np.int64]) -> Any:
     return number, trees + (1 if tree.size else 0)
 
 
-@njit
+@inner_njit
 def _price(
     number: NDArray[np.int64],
     score: Floats,

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats
 from assoc.packing.kernels.sorting import order_of
 
 
-@njit
+@inner_njit
 def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) -> Array:
     """Rows of the branches that matter to good global hypotheses, ordered by tree, then loss.
 
