@@ -57,7 +57,7 @@ def test_a_short_run_of_each_tracker(kind):
     assert len(watch.steps) == 10 and min(watch.unchanging) > 0.0
 
 
-@few_or_all("count", 15, 350)
+@few_or_all("count", 50, 350)
 def test_a_short_run_of_the_solvers(count):
     claims, watch = long_runs.solve(count, np.random.default_rng(1))
     assert claims[-1].holds and len(watch.steps) == 10
