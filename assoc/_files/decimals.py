@@ -7,6 +7,7 @@ R. Giulietti, The Schubfach way to render doubles, 2020: figure 7 with the table
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,9 @@ def _by_repr(values: Array, powers: Array) -> Array:
     return np.frombuffer("\n".join([*texts, ""]).encode(), dtype=np.uint8)
 
 
-def _write_lines(values: Array, powers: Array) -> Array:
+# Python's own texts serve until the kernel is compiled
+@partial(njit, small=2_000_000, stand_in=_by_repr)
+def _lines(values: Array, powers: Array) -> Array:
     """The texts, each with an end of line, as bytes."""
     text = np.empty(_WIDTH * len(values), dtype=np.uint8)
     bits = values.view(np.uint64)
@@ -176,7 +179,3 @@ def _upper(a: Any, b: Any) -> Any:
     cross = a0 * b1
     middle = a1 * b0 + ((a0 * b0) >> _HALF) + (cross & _LOW)
     return a1 * b1 + (middle >> _HALF) + (cross >> _HALF)
-
-
-# Python's own texts serve until the kernel is compiled
-_lines = njit(_write_lines, small=2_000_000, stand_in=_by_repr)
