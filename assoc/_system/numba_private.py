@@ -41,7 +41,8 @@ COMPLETE = all(
         registry.CPUDispatcher: "_compile_for_args _insert enable_caching get_call_template typeof_pyval",
         options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper",
         _CODEGEN.JITCPUCodegen: "magic_tuple",
-        _CODEGEN.JITCodeLibrary: "_optimize_final_module enable_object_caching",
+        _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
+        " enable_object_caching",
         _COMPILER.Compiler: "compile_extra",
     }.items()
     for name in names.split()
@@ -189,6 +190,8 @@ def _temporary_place(function: Any, file: str) -> Any:
     return locator
 
 
+# how numba names what a kernel that calls itself refers to
+_UNRESOLVED = ".numba.unresolved$"
 NEEDED = {"avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse4.2", "xsave"}
 """The features of x86-64-v3, as LLVM names them."""
 
@@ -210,10 +213,25 @@ def _usual_settings() -> bool:
 
 
 class _InnerLibrary(_CODEGEN.JITCodeLibrary):  # type: ignore[misc]
-    """The code of an inner kernel, optimised only within the kernels that call it."""
+    """The code of an inner kernel, optimised and made into machine code only within the kernels that call it."""
+
+    _final_module: Any
 
     def _optimize_final_module(self) -> None:
         pass
+
+    def _finalize_final_module(self) -> None:
+        whole = self._final_module
+        if not any(one.name.startswith(_UNRESOLVED) for one in whole.global_variables):
+            # callers link the whole; this process has use for its variables alone
+            self._finalized = True
+            self._get_module_for_linking()
+            self._finalized = False
+            self._final_module = whole.clone()
+            for function in self._final_module.functions:
+                if not function.is_declaration:
+                    function.linkage = "available_externally"
+        super()._finalize_final_module()
 
 
 class _InnerCompiler(_COMPILER.Compiler):  # type: ignore[misc]
