@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING, Any
 
-from assoc._files.decimals import texts_of
+import numpy as np
+
 from assoc._files.output import FilePath, written_gradually
 from assoc._text.plain import spreadsheet_text
+from assoc._types import Array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,13 +24,13 @@ _ROWS, _TEXTS = 50_000, 10_000
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
-    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index, in a fraction of its time."""
+    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index, in half its time."""
     columns: list[list[str]] = []
     for name in frame:
         values = frame[name]
         kind = values.dtype.kind
         if kind == "f":
-            texts = texts_of(values.to_numpy())
+            texts = _floats(values.to_numpy())
         elif kind in "iub":
             texts = [*map(str, values.tolist())]
         else:
@@ -38,6 +40,12 @@ def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
     lines = map(",".join, zip(*columns, strict=True))
     first = [",".join(map(_cell, map(str, frame.columns)))] if header else []
     return "\n".join([*first, *lines, ""])
+
+
+def _floats(values: Array) -> list[str]:
+    """The shortest texts that are read as these numbers; empty for NaN."""
+    texts = [*map(repr, values.tolist())]
+    return ["" if text == "nan" else text for text in texts] if np.isnan(values).any() else texts
 
 
 def _cell(text: str) -> str:
