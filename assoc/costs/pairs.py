@@ -193,12 +193,17 @@ def _near_within(
     return found[:count]
 
 
-def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[tuple[Array, float]]:
-    """Blocks of coarse pairs, each with the share of the search that is done after it."""
+def _coarse(
+    sensors: SensorArrays, scan: ScanArrays, limits: Array, *, brute: int = _BRUTE, block: int = _BLOCK
+) -> Iterator[tuple[Array, float]]:
+    """Blocks of coarse pairs, each with the share of the search that is done after it.
+
+    Up to ``brute`` combinations each is tried; ``block`` combinations are looked at for a block (more for some rows).
+    """
     total = len(scan.z)
     later = total - scan.start[scan.owner + 1]
     work = np.concatenate([[0], np.cumsum(later)])
-    if work[-1] <= _BRUTE or (sensors.code == BEARING).all():
+    if work[-1] <= brute or (sensors.code == BEARING).all():
         low = 0
         while low < total and work[low] < work[-1]:
             high = max(low + 1, int(np.searchsorted(work, work[low] + _BRUTE, side="right")) - 1)
@@ -208,7 +213,7 @@ def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[
     done = 0.0
     for s, t in itertools.combinations(range(len(sensors.dim)), 2):
         size = float(np.diff(scan.start)[[s, t]].prod())
-        for pairs, share in _between(sensors, scan, s, t, float(limits[s, t])):
+        for pairs, share in _between(sensors, scan, s, t, float(limits[s, t]), block):
             yield pairs, (done + share * size) / work[-1]
         done += size
 
@@ -225,7 +230,9 @@ class _Windows(NamedTuple):
     """others[first : last] of each row, (K,)."""
 
 
-def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> Iterator[tuple[Array, float]]:
+def _between(
+    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float, block: int
+) -> Iterator[tuple[Array, float]]:
     """Blocks of the near pairs of sensors s and t, each with the share of them that is done after it."""
     if sensors.code[s] == BEARING:
         # windows are those of located measurements, where there are any
@@ -238,12 +245,12 @@ def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
         k = 0
         while k < len(window.rows):
             so_far = counts[k - 1] if k else 0
-            stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
+            stop = max(k + 1, int(np.searchsorted(counts, so_far + block, side="right")))
             first, last = window.first[k:stop], window.last[k:stop]
             low, high = first.min(), last.max()
-            block = window.rows[k:stop], window.others[low:high], first - low, last - low
+            some = window.rows[k:stop], window.others[low:high], first - low, last - low
             share = len(others) / len(every) * stop / len(window.rows)
-            yield _near_within(sensors, scan, t, *block, limit), done + share
+            yield _near_within(sensors, scan, t, *some, limit), done + share
             k = stop
         done += len(others) / len(every)
 

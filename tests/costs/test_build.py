@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from assoc._system import memory
-from assoc.costs import build_problem, pairs, positions_and_covariances, tuple_costs
+from assoc.costs import build_problem, positions_and_covariances, tuple_costs
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene import Scene
 from assoc.sensors import PositionSensor
@@ -48,13 +48,11 @@ def found_candidates(problem):
     }
 
 
-@sample("brute", [False, True], every=2)
 @sample("probability", [0.9, 0.999, 1.0], every=3)
 @pytest.mark.parametrize(
     "kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb", "hhr", "hb"]
 )
-def test_candidates_are_those_of_an_exhaustive_search(kinds, probability, brute, monkeypatch):
-    monkeypatch.setattr(pairs, "_BRUTE", 10**9 if brute else -1)
+def test_candidates_are_those_of_an_exhaustive_search(kinds, probability):
     for seed in range(4):
         scene, _ = make_scene(kinds, seed, targets=4 if len(kinds) < 4 else 2)
         expected = expected_candidates(scene, probability)

@@ -86,19 +86,18 @@ def test_a_split_without_time_is_one_part_and_its_bound_holds(packing):
     assert leaf.bound <= best + 1e-9
 
 
-def test_time_that_ends_while_parts_are_solved_again_leaves_those_of_before(packing, monkeypatch):
+def test_parts_that_there_is_no_time_to_solve_again_stay_as_they_were(packing):
     best = min(packing.weights[one].sum() for one in solutions(packing))
-    expected = len(split(packing))
-    over = []
-    part = counts._Counted.part
-
-    def spy(self, ranges, start=None):
-        # the first part of a program with only some counts
-        over.append(start is None and bool(over))
-        return part(self, ranges, start)
-
-    monkeypatch.setattr(counts._Counted, "part", spy)
-    monkeypatch.setattr(counts, "is_over", lambda deadline: any(over))
-    leaves = split(packing)
-    assert len(leaves) == expected and min(leaf.bound for leaf in leaves) <= best + 1e-9
-    assert len({leaf.root.slack.size for leaf in leaves}) == 1
+    root, everything = plain_root(packing, dual_bound(packing)), counts._counts_of(packing)
+    counted = counts._Counted(root, everything, np.inf, np.inf)
+    parts = counts._split(counted, everything, counted.effort.cutoff, np.inf)
+    assert len(parts) > 1
+    used = np.arange(len(everything.times)) < 1
+    fewer = counts._Counted(root, everything.only(used), np.inf, np.inf)
+    # in time, each has fewer rows, and a bound that is as good
+    again = counts._solved_again(fewer, parts, used, np.inf)
+    assert {leaf.root.slack.size for leaf in again} == {root.slack.size + 2}
+    leaves = counts._solved_again(fewer, parts, used, -1.0)
+    assert {leaf.root.slack.size for leaf in leaves} == {root.slack.size + 2 * len(used)}
+    assert min(leaf.bound for leaf in leaves) <= best + 1e-9
+    assert [leaf.bound for leaf in leaves] == [part.leaf.bound for part in parts]

@@ -222,7 +222,7 @@ def test_small_components_are_bounded_before_they_are_searched(solver):
     assert solution.iterations == 2
 
 
-def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeypatch):
+def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts):
     """Even if its cover is better by less than the tolerance: no other would ever be found or proved."""
     one, _ = ghosts
     one.refinement = "full"
@@ -231,7 +231,7 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
     class Ended:
         nodes = 7
 
-        def __init__(self, *_, **__):
+        def __init__(self):
             self.columns, self.weight = one.best_columns().astype(np.int32), weight
 
         @property
@@ -241,9 +241,10 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
         def run(self, nodes):
             pass
 
-    monkeypatch.setattr(closing, "BranchAndBound", Ended)
     one.weight = weight + 0.5 * one.tolerance
-    assert closing.Branching(one, Run(0)).advance(10) == 0
+    branching = closing.Branching(one, Run(0))
+    branching.search = Ended()
+    assert branching.advance(10) == 0
     assert one.closed and one.weight == weight
 
 
@@ -268,25 +269,9 @@ def _optimal_columns(one):
 
 
 @pytest.mark.parametrize("columns, most", [(30, 50), (5_000, 4), (10**6, 1)])
-def test_few_nodes_at_a_time_where_each_takes_long(columns, most, ghosts, monkeypatch):
+def test_few_nodes_at_a_time_where_each_takes_long(columns, most):
     """Ctrl-C does not interrupt kernels."""
-    one, _ = ghosts
-    asked = []
-
-    class Counting:
-        done, nodes, lower_bound, weight = False, 0, -np.inf, np.inf
-
-        def __init__(self, *_, **__):
-            pass
-
-        def run(self, nodes):
-            asked.append(nodes)
-            self.done = True
-
-    monkeypatch.setattr(closing, "BranchAndBound", Counting)
-    monkeypatch.setattr(type(one.packing), "num_columns", columns)
-    closing.close(one, Run(0))
-    assert asked == [most]
+    assert closing.nodes_at_once(columns) == most
 
 
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
 import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.prepare import prepare
+from assoc.packing.run import Run
 from assoc.solvers.aco import paper
+from assoc.solvers.aco.parameters import AcoParameters
 from tests.solvers.pieces import is_complete, problems, rows_of
 
 PROBLEMS = problems()
@@ -148,15 +152,16 @@ def test_tours_are_complete_where_sensors_have_unequal_numbers_and_no_dummies():
         assert np.count_nonzero(first > 1e-12) >= 4
 
 
-def test_ants_that_do_not_walk_for_want_of_time_end_the_search(monkeypatch):
+def test_ants_that_do_not_walk_for_want_of_time_end_the_search():
     """A deadline may be early by what another process took of the processor; the time is then not over yet."""
-    cycle = paper._cycle
 
-    def cut(nodes, value, greedy, starts, tours, lengths, rng, deadline):
-        owners = cycle(nodes, value, greedy, starts, tours, lengths, rng, deadline)
-        lengths[-1], owners[-1] = 0, -1
-        return owners
+    class Early(Run):
+        def deadline(self):
+            return time.monotonic() + 0.005
 
-    monkeypatch.setattr(paper, "_cycle", cut)
-    solution = assoc.assign(PROBLEMS["mixed"], "aco", mode="paper", ants=5)
-    assert solution.iterations == 1
+    packing = prepare(PROBLEMS["mixed"]).packing
+    # compile first
+    paper.solve_as_in_the_paper(packing, AcoParameters(mode="paper", ants=5), Run(0))
+    # so many take longer than that
+    found = paper.solve_as_in_the_paper(packing, AcoParameters(mode="paper", ants=10_000), Early(0))
+    assert found.iterations == 1

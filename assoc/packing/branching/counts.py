@@ -107,16 +107,21 @@ def split_on_counts(
         used |= (part.counts.least > everything.least) | (part.counts.most < everything.most)
     # rows of counts that no leaf restricts would only make programs larger
     counted = _Counted(root, everything.only(used), cutoff, deadline)
+    leaves = _solved_again(counted, parts, used, deadline)
+    return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
+
+
+def _solved_again(counted: _Counted, parts: list[_Part], used: NDArray[np.bool_], deadline: float) -> list[Leaf]:
+    """The leaves of parts with a mask of the counts alone; as they were if time is over before the last of them."""
     leaves = []
     for part in parts:
         if is_over(deadline):
             # each takes a factorisation; the earlier bounds are valid, too
-            leaves = [part.leaf for part in parts]
-            break
+            return [part.leaf for part in parts]
         again = counted.part(part.counts.only(used)).leaf
         # a second solution of the program may end below the first one's bound
         leaves.append(again._replace(bound=max(again.bound, part.leaf.bound)))
-    return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
+    return leaves
 
 
 def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None) -> tuple[OpenNodes, Work]:

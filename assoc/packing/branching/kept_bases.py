@@ -40,10 +40,10 @@ def kept_memory(rows: float) -> float:
     return 8.0 * min(_BASES * rows * rows, _ELEMENTS)
 
 
-def no_kept_bases(program: Program) -> KeptBases:
-    """Allocate kept bases of a program, fewer where they are large."""
+def no_kept_bases(program: Program, elements: int = _ELEMENTS) -> KeptBases:
+    """Allocate kept bases of a program, fewer where they are large: at most so many elements of all their inverses."""
     size = program.sides.size
-    count = min(_BASES, _ELEMENTS // max(size * size, 1))
+    count = min(_BASES, elements // max(size * size, 1))
     return KeptBases(
         np.full((count, size), -1, np.int32), np.empty((count, size, size)), np.empty((count, size)),
         np.zeros(count, np.int64), np.zeros(1, np.int64),

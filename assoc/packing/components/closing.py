@@ -58,10 +58,14 @@ def close(component: Component, run: Run) -> None:
     if component.closed or run.should_stop():
         return
     branching = Branching(component, run)
-    # Ctrl-C does not interrupt kernels: few nodes at a time where each takes long
-    at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
+    at_once = nodes_at_once(component.packing.num_columns)
     while not branching.search.done and branching.search.nodes < _NODES and not run.should_stop():
         branching.advance(at_once, gives=False)
+
+
+def nodes_at_once(columns: int) -> int:
+    """Nodes between two checks for a stop: few where each takes long, since Ctrl-C does not interrupt kernels."""
+    return min(max(_AT_ONCE // columns, 1), 50)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:
