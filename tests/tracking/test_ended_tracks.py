@@ -6,9 +6,10 @@ import pytest
 
 from assoc import track
 from assoc.errors import LimitExceededError
-from assoc.recordings import read_plots, write_plots
+from assoc.recordings import fixed_groups, radar_of, read_plots, write_plots
 from assoc.simulation import simulate_recording
-from assoc.tracking import TrackTable
+from assoc.tracking import TRACKERS, TrackTable
+from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
 from assoc.tracking.offline.ended_tracks import EndedTracks
 
@@ -118,3 +119,19 @@ def test_a_track_is_written_when_it_has_ended_and_not_before():
     table.finish()
     assert parts.ids == [1, 2, 2, 2, 2, 3, 3, 3]
     assert len(table) == 8 and table.confirmed_ids() == {1, 2, 3}
+
+
+def test_a_track_that_may_return_has_not_ended():
+    """In a multiple hypothesis tracker tracks leave the best hypothesis, and come back."""
+    recording = simulate_recording("rotating-radar", 0, aircraft=20, duration=300.0).recording
+    recording = recording.take(np.random.default_rng(0).random(len(recording)) < 0.6)
+    radar = radar_of(recording, range_noise=300.0, azimuth_noise=2e-3)
+    tracker = TRACKERS["mht"]([radar], make_filter("ekf", [radar], None, 0))
+    listed, seen, ended, left = set(), set(), set(), set()
+    for followed in plots.follow(tracker, fixed_groups(recording, 3.0)):
+        before, listed = listed, {*followed.listed(False)[0].track_id.tolist()}
+        assert not listed & ended
+        left |= before - listed
+        seen |= listed
+        ended |= seen - plots.may_return(tracker)
+    assert left - ended and ended
