@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import secrets
@@ -67,61 +68,100 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
     InvalidInputError.
     """
     check_writable(path)
-    number = 1 if path == STDOUT else _standard_stream(path)
-    if number is not None or is_stream(path):
-        _write_stream(path, number, writer)
+    if _standard_stream(path) is None and not is_stream(path):
+        with _naming(path, unchanged=True), _replacing(path) as file:
+            writer(file)
         return
-    with _replacing(path) as file:
-        writer(file)
+    content = io.BytesIO()
+    writer(content)
+    with _stream(path) as stream:
+        stream.write(content.getbuffer())
 
 
 @contextmanager
 def written_gradually(path: FilePath) -> Iterator[IO[bytes]]:
     """A binary file to write to bit by bit: it takes its name at the end, and after an error nothing is left behind.
 
-    A pipe or device gets the content at once. Errors are those of `write_atomically`.
+    A pipe or device gets the content at once. Errors of writing are those of `write_atomically`; others pass as they
+    are.
     """
     check_writable(path)
-    number = 1 if path == STDOUT else _standard_stream(path)
-    if number is None and not is_stream(path):
-        with _replacing(path) as file:
-            yield file
-        return
-    stream = sys.stdout if number == 1 else sys.stderr
-    if number is not None and stream is not None:
-        stream.flush()
-    with open(path, "wb", 0) if number is None else os.fdopen(os.dup(number), "wb", 0) as file:
+    with _replacing(path) if _standard_stream(path) is None and not is_stream(path) else _stream(path) as file:
         yield file
+
+
+@contextmanager
+def _naming(path: FilePath, unchanged: bool = False) -> Iterator[None]:
+    """Turn errors of the system into one line that names the file."""
+    try:
+        yield
+    except AssocError:
+        raise
+    except Exception as error:
+        # on a full disk closing an archive fails, too; the disk's error is that error's context
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, OSError):
+            cause = cause.__context__
+        broken = isinstance(cause, BrokenPipeError)
+        if cause is None or (broken and _standard_stream(path) == 1):
+            raise  # the reader of stdout closed it
+        why = "its reader has gone" if broken else cause.strerror or cause
+        rest = "; what was there before is unchanged" if unchanged else ""
+        raise InvalidInputError(f"{path}: cannot be written ({why}){rest}") from error
+
+
+class _Whole(io.FileIO):
+    """Writes all of what it is given, or raises an error that names the file."""
+
+    def __init__(self, opened: FilePath | int, path: FilePath, unchanged: bool = False) -> None:
+        super().__init__(opened, "wb")
+        self._errors = path, unchanged
+
+    def write(self, content: Any) -> int:
+        rest = memoryview(content).cast("B")
+        size = len(rest)
+        with _naming(*self._errors):
+            while rest:
+                # the system may write a part; a stream that does not block may refuse all
+                done: int | None = super().write(rest)
+                if done is None:
+                    raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+                rest = rest[done:]
+        return size
+
+
+@contextmanager
+def _stream(path: FilePath) -> Iterator[IO[bytes]]:
+    """A pipe or device, written at once."""
+    number = _standard_stream(path)
+    stream = sys.stdout if number == 1 else sys.stderr
+    with _naming(path):
+        if number is not None and stream is not None:
+            stream.flush()
+        # opening the file again would write from its start
+        opened = _Whole(path if number is None else os.dup(number), path)
+    with opened:
+        yield opened
 
 
 @contextmanager
 def _replacing(path: FilePath) -> Iterator[IO[bytes]]:
     """A new file beside another one, which it replaces when it is written."""
     target = os.path.realpath(path)
-    name = ""
-    try:
+    with _naming(path, unchanged=True):
         handle, name = _create(target)
-        with os.fdopen(handle, "wb") as file:
+    try:
+        with io.BufferedWriter(_Whole(handle, path, unchanged=True)) as file:
             yield file
             # flush before the renaming: after a crash of the machine the name must not stand for an empty file
             file.flush()
-            os.fsync(file.fileno())
-        with temporary.lock:
+            with _naming(path, unchanged=True):
+                os.fsync(file.fileno())
+        with _naming(path, unchanged=True), temporary.lock:
             os.replace(name, target)
             temporary.forget(name)
-    except BaseException as error:
-        if name:
-            temporary.remove(name)
-        if isinstance(error, AssocError):
-            raise
-        # on a full disk closing the archive fails, too; the disk's error is that error's context
-        cause: BaseException | None = error
-        while cause is not None and not isinstance(cause, OSError):
-            cause = cause.__context__
-        if cause is not None and isinstance(error, Exception):
-            raise InvalidInputError(
-                f"{path}: cannot be written ({cause.strerror or cause}); what was there before is unchanged"
-            ) from error
+    except BaseException:
+        temporary.remove(name)
         raise
     _sync_folder(os.path.dirname(target))
 
@@ -175,35 +215,15 @@ def _create(target: str) -> tuple[int, str]:
 
 
 def _standard_stream(path: FilePath) -> int | None:
-    """Return 1 or 2 if a path is this process's stdout or stderr (/dev/stdout, or the same file)."""
+    """Return 1 or 2 if a path is this process's stdout or stderr (-, /dev/stdout, or the same file)."""
+    if path == STDOUT:
+        return 1
     found = _status(path)
     for number in (1, 2):
         with suppress(OSError):
             if found is not None and os.path.samestat(found, os.fstat(number)):
                 return number
     return None
-
-
-def _write_stream(path: FilePath, number: int | None, writer: Callable[[IO[bytes]], object]) -> None:
-    content = io.BytesIO()
-    writer(content)
-    try:
-        if number is None:
-            with open(path, "wb") as file:
-                file.write(content.getbuffer())
-            return
-        stream = sys.stdout if number == 1 else sys.stderr
-        if stream is not None:
-            stream.flush()
-        # opening the file again would write from its start
-        with os.fdopen(os.dup(number), "wb") as file:
-            file.write(content.getbuffer())
-    except BrokenPipeError:
-        if number == 1:
-            raise  # the reader of stdout closed it
-        raise InvalidInputError(f"{path}: cannot be written (its reader has gone)") from None
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def _sync_folder(folder: str) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from assoc._files.output import write_atomically, write_text
+from assoc._files.output import write_atomically, write_text, written_gradually
 from assoc.errors import InvalidInputError
 from assoc.sweeps import load
 from tests.reliability.writers import outcome, writers
@@ -150,6 +150,40 @@ def test_threads_write_with_the_mode_that_was_asked_for(tmp_path):
         assert os.umask(0o027) == 0o027
     finally:
         os.umask(before)
+
+
+PARTS = """
+import resource
+from assoc._files.output import written_gradually
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+with written_gradually("-") as file:
+    file.write(bytes(1500))
+"""
+
+
+def test_a_stream_that_takes_a_part_is_an_error(tmp_path):
+    with open(tmp_path / "out", "wb") as file:
+        done = subprocess.run([sys.executable, "-c", PARTS], stdout=file, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and "InvalidInputError: -: cannot be written (File too large)" in done.stderr
+    with pytest.raises(InvalidInputError, match="No space left"), written_gradually("/dev/full") as file:
+        file.write(b"x")
+    os.mkfifo(tmp_path / "pipe")
+    reader = threading.Thread(target=lambda: os.close(os.open(tmp_path / "pipe", os.O_RDONLY)))
+    reader.start()
+    with (
+        pytest.raises(InvalidInputError, match="pipe: cannot be written .its reader has gone"),
+        written_gradually(tmp_path / "pipe") as file,
+    ):
+        reader.join(100)
+        file.write(b"x")
+
+
+@pytest.mark.parametrize("other", [FileNotFoundError(2, "No such file"), BrokenPipeError(32, "Broken pipe")])
+def test_errors_of_other_files_are_not_blamed_on_what_is_written(tmp_path, other):
+    with pytest.raises(OSError) as raised, written_gradually(tmp_path / "out") as file:
+        file.write(b"x")
+        raise other
+    assert raised.value is other and os.listdir(tmp_path) == []
 
 
 INTERRUPTED = """
