@@ -76,6 +76,11 @@ class Update(Generic[S]):
         parts["nis"], parts["log_likelihood"] = rest[S : S + B], rest[S + B :]
         return parts[name]
 
+    def __getstate__(self) -> dict[str, Any]:
+        # taken apart before it goes to another process
+        names = ("state", "innovation", "covariance", "nis", "log_likelihood")
+        return {name: getattr(self, name) for name in names}
+
     def __repr__(self) -> str:
         return f"Update({self.state!r})"
 
@@ -325,6 +330,11 @@ class Filter(ABC, Generic[S]):
     def prior(self, predicted: S, corrected: S) -> tuple[Array, Array]:
         """Mean and covariance of the prediction as it was corrected; adaptive filters change it."""
         return predicted.mean, predicted.covariance
+
+
+def as_in(filter: Filter[Any], base: type, *names: str) -> bool:
+    """Whether a filter's class has these methods as its base class has them, none of its own."""
+    return all(getattr(type(filter), name) is getattr(base, name) for name in names)
 
 
 def measured_array(measured: object, batch: int | None, dim: int, what: str = "measured") -> Array:

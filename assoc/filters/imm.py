@@ -7,6 +7,7 @@ exp(Q dt), Q the rates per second, so that four seconds are four seconds, in one
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, reduce
@@ -238,11 +239,13 @@ class InteractingMultipleModel(Filter[Mixture]):
 
         All modes are one batch where they see alike.
         """
-        if not self._alike:
-            each = [run(model, state.component(j), 1) for j, model in enumerate(self.filters)]
-            return [np.stack(parts, axis=1) for parts in zip(*each, strict=True)]
-        B, m, _ = state.means.shape
-        return [array.reshape(B, m, *array.shape[1:]) for array in run(self.filters[0], _flat(state), m)]
+        if self._alike:
+            B, m, _ = state.means.shape
+            # what is wrong with a target is told below, where rows are targets
+            with suppress(InvalidInputError):
+                return [array.reshape(B, m, *array.shape[1:]) for array in run(self.filters[0], _flat(state), m)]
+        each = [run(model, state.component(j), 1) for j, model in enumerate(self.filters)]
+        return [np.stack(parts, axis=1) for parts in zip(*each, strict=True)]
 
     def update(self, state: Mixture, measured: Array, sensor: Measurement) -> Update[Mixture]:
         """Correct each model and its probability; see `Filter.update`."""

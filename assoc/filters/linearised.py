@@ -15,6 +15,7 @@ from assoc.filters.base import (
     Fit,
     History,
     Update,
+    as_in,
     check_dimension,
     complain,
     measured_array,
@@ -171,14 +172,19 @@ class GaussianFilter(Filter[Gaussian]):
 
     def sees_like(self, other: Filter[Any]) -> bool:
         """Whether this filter corrects states just as the other does."""
-        own, mine, its = type(self), self.motion, other.motion
-        plain = own is type(other) and own.update is GaussianFilter.update and self.kind == other.kind
-        return plain and (mine.dim, mine.position) == (its.dim, its.position)
+        mine, its, alike = self.motion, other.motion, type(self) is type(other) and self.kind == other.kind
+        return alike and self._as_here and (mine.dim, mine.position) == (its.dim, its.position)
+
+    @property
+    def _as_here(self) -> bool:
+        """Whether states are corrected as this class does, not as a child class may."""
+        return as_in(self, GaussianFilter, "update", "correct", "expected", "observe")
 
     def positions_alone(self, state: Gaussian) -> tuple[Filter[Any], Any]:
         """A filter of positions alone, and the positions of these states; see `Filter.positions_alone`."""
+        check_dimension(state, self.motion.dim)
         motion = self.motion
-        if self.kind != PLAIN or type(self).update is not GaussianFilter.update or len(motion.position) == motion.dim:
+        if self.kind != PLAIN or not self._as_here or len(motion.position) == motion.dim:
             return self, state
         axes = list(motion.position)
         if self._still is None:
@@ -189,8 +195,8 @@ class GaussianFilter(Filter[Gaussian]):
 
     def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
         """How well measurements fit, without correcting anything; see `Filter.fit`."""
-        o, own = self.observe(sensor), type(self)
-        if o.code < 0 or self.kind != PLAIN or own.update is not GaussianFilter.update:
+        o = self.observe(sensor)
+        if o.code < 0 or self.kind != PLAIN or not self._as_here:
             return None
         found = _empty((2, len(rows)))
         status = fits(state.mean, state.covariance, rows, measured, o.packed, found)

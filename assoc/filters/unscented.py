@@ -10,7 +10,7 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Filter, PointFilter, Update, check_dimension, complain, update_of
+from assoc.filters.base import Filter, PointFilter, Update, as_in, check_dimension, complain, update_of
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.points import moments, sigma_points, unscented
@@ -87,6 +87,8 @@ class UnscentedKalmanFilter(PointFilter[Gaussian]):
     def sees_like(self, other: Filter[Any]) -> bool:
         """Whether this filter corrects states just as the other does."""
         if type(self) is not type(other) or not isinstance(other, UnscentedKalmanFilter):
+            return False
+        if not as_in(self, UnscentedKalmanFilter, "update", "expected", "observe", "_correct", "_points"):
             return False
         return self.motion.position == other.motion.position and np.array_equal(self.weights, other.weights)
 

@@ -1,5 +1,8 @@
 """IMM, ensemble, smoother, motion models, the UAV and consistency: each against something independent."""
 
+import dataclasses
+import pickle
+
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec, solve_ivp
@@ -424,6 +427,57 @@ def test_modes_as_one_batch_and_one_by_one_agree(sensor):
     np.testing.assert_allclose(corrected.state.mean, one.state.mean[:, :3], rtol=1e-9)
     again, full = still.update(corrected.state, z, sensor), together.update(one.state, z, sensor)
     np.testing.assert_allclose(again.log_likelihood, full.log_likelihood, rtol=1e-9)
+
+
+class _Doubting(ExtendedKalmanFilter):
+    """A user's filter, whose noise is `factor` times the sensor's."""
+
+    def __init__(self, motion, factor):
+        super().__init__(motion)
+        self.factor = factor
+
+    def correct(self, state, measured, o, scale=None):
+        return super().correct(state, measured, o, np.full(len(state), self.factor))
+
+
+class _DoubtingUnscented(UnscentedKalmanFilter):
+    def __init__(self, motion, factor):
+        super().__init__(motion)
+        self.factor = factor
+
+    def update(self, state, measured, sensor):
+        return super().update(state, measured, dataclasses.replace(sensor, noise=sensor.noise * self.factor**0.5))
+
+
+@pytest.mark.parametrize("kind", [_Doubting, _DoubtingUnscented])
+def test_modes_of_ones_own_classes_correct_as_they_say(kind):
+    models = [kind(MOTION, 1.0), kind(MOTION, 4.0)]
+    imm = InteractingMultipleModel(models, np.array([[0.9, 0.1], [0.2, 0.8]]))
+    states = imm.start(random_state(3, np.random.default_rng(1)))
+    z = RADAR.measure(states.mean[:, :3] + 20.0)
+    found = imm.update(states, z, RADAR).state
+    for j, model in enumerate(models):
+        alone = model.update(states.component(j), z, RADAR)
+        np.testing.assert_allclose(found.means[:, j], alone.state.mean, rtol=1e-12)
+    assert imm.positions_alone(states)[0] is imm
+
+
+def test_errors_of_a_mixture_name_the_target():
+    imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
+    states = imm.start(random_state(3, np.random.default_rng(2)))
+    z = RADAR.measure(states.mean[:, :3])
+    z[2, 0] = np.nan
+    with pytest.raises(InvalidInputError, match="row 2 is not"):
+        imm.update(states, z, RADAR)
+
+
+def test_an_update_goes_to_another_process():
+    imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
+    states = imm.start(random_state(3, np.random.default_rng(3)))
+    done = imm.update(states, RADAR.measure(states.mean[:, :3]), RADAR)
+    sent = pickle.loads(pickle.dumps(done))
+    for name in ("innovation", "covariance", "nis", "log_likelihood"):
+        np.testing.assert_array_equal(getattr(sent, name), getattr(done, name))
 
 
 def test_a_mixture_on_both_sides_of_the_azimuth_pi():

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from assoc import filters
 from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LatePlots
 from tests.sizes import sample
@@ -177,3 +179,39 @@ def test_tracks_of_the_past_keep_their_ids_when_names_are_forgotten(scene):
         known.append([track.track_id for track in late.tracks])
         assert [[track.track_id for track in late.past_tracks(j)] for j in range(k + 1)] == known
     assert not set(known[0]) <= set(known[-1])
+
+
+def dense_scans(rng):
+    """Twelve scans of three targets and two sensors with forty false alarms each, P_d 0.7."""
+    position, velocity = rng.uniform(-1_500.0, 1_500.0, (3, 3)), rng.normal(0.0, 40.0, (3, 3))
+    for k in range(12):
+        scan = []
+        for _ in range(2):
+            seen = rng.random(3) < 0.7
+            hits = (position + velocity * k)[seen] + rng.normal(0.0, 20.0, (int(seen.sum()), 3))
+            scan.append(np.concatenate([hits, rng.uniform(-3e3, 3e3, (rng.poisson(40), 3))]))
+        yield scan
+
+
+@sample("seed", [7, 2, 30], every=3)
+def test_confirmed_tracks_keep_their_ids_where_tentative_ones_turn_out_to_be_others(seed):
+    """A late measurement may let a tentative track begin anew, or not any more: the confirmed one keeps its id."""
+    rng, view = np.random.default_rng(seed), ((-3e3, 3e3),) * 3
+    sensor = PositionSensor(
+        position=(0, 0, 0), noise=(20.0,) * 3, detection_probability=0.7, false_alarm_rate=40.0, field_of_view=view
+    )
+    motion = filters.KalmanFilter(filters.ConstantVelocity(2.0))
+    late = LatePlots(TRACKERS["multi-sensor"]([sensor, sensor], motion, region=np.array(view)), 100.0)
+    held = []
+    for k, scan in enumerate([*dense_scans(rng)]):
+        come = [rng.random(len(z)) < 0.85 for z in scan]
+        held.append([z[~mask] for z, mask in zip(scan, come, strict=True)])
+        now = [z[mask] for z, mask in zip(scan, come, strict=True)]
+        late.step(float(k), now, [np.full(len(z), float(k)) for z in now])
+    for k, scan in enumerate(held[:8]):
+        before = {track.track_id: track.mean for track in late.tracks if track.confirmed}
+        late.step(11.0, scan, [np.full(len(z), k - 1e-6) for z in scan])
+        after = {track.track_id: track.mean for track in late.tracks if track.confirmed}
+        for i in before.keys() - after.keys():
+            near = [np.linalg.norm(before[i][:3] - after[j][:3]) for j in after.keys() - before.keys()]
+            assert min(near, default=np.inf) > 60.0

@@ -1,5 +1,6 @@
 """The problem of tracks of uncertain existence against Bayes' rule over all that may be the case."""
 
+import dataclasses
 import itertools
 import math
 
@@ -9,6 +10,7 @@ import pytest
 import assoc
 from assoc import InvalidInputError, filters
 from assoc.filters import Gaussian
+from assoc.sensors import Platform
 from assoc.tracking import track_problem
 from tests.tracking import plain
 
@@ -81,9 +83,16 @@ def test_no_track_and_no_measurement():
     assert track_problem(FILTER, empty, SENSORS, [[], [[1.0, 2.0, 3.0]]]).sizes.tolist() == [0, 0, 1]
 
 
+ON_A_SHIP = dataclasses.replace(SENSORS[1], platform=Platform([0.0, 1.0], [[0.0] * 3, [10.0] * 3]))
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        ({"sensors": [SENSORS[0], ON_A_SHIP]}, "sensors: number 2 is on a platform"),
+        ({"sensors": [], "measurements": []}, "sensors: expected at least one"),
+        ({"states": np.zeros((2, 6))}, "states: expected states of 6 components"),
+        ({"states": Gaussian(np.zeros((2, 4)), np.stack([np.eye(4)] * 2))}, "states: expected states of 6 components"),
         ({"existence": [0.5, 0.0]}, "existence: expected probabilities above 0"),
         ({"existence": [0.5, 0.5, 0.5]}, "existence: expected one number, or one for each of 2 tracks"),
         ({"measurements": [[[1.0, 2.0, 3.0]]]}, "measurements: expected those of 2 sensors"),
@@ -92,6 +101,7 @@ def test_no_track_and_no_measurement():
 )
 def test_bad_arguments_are_refused(change, text):
     mean, cov, z = close_tracks(0)
-    arguments = {"measurements": z, "existence": 0.5} | change
+    states = Gaussian(mean, np.stack([cov] * 2))
+    arguments = {"states": states, "sensors": SENSORS, "measurements": z, "existence": 0.5} | change
     with pytest.raises(InvalidInputError, match=text):
-        track_problem(FILTER, Gaussian(mean, np.stack([cov] * 2)), SENSORS, **arguments)
+        track_problem(FILTER, **arguments)

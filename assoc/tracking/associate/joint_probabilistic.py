@@ -283,7 +283,8 @@ class JointProbabilisticTracker(Tracker):
         As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
     max_events : int
         Largest table of partially summed joint events for a cluster of tracks and measurements (4096). Where a cluster
-        would need more entries, its least likely pairs are left out: larger tables give narrower intervals.
+        would need more entries, its least likely pairs are left out: larger tables give narrower intervals. With
+        `all_sensors` nothing is left out of such a cluster: its probabilities are estimates, within wide bounds.
     permutations : "best" or "all"
         Which joint events that detect the same tracks by the same measurements determine the states: the best one
         (JPDA*), or all (JPDA, which draws tracks side by side together). Existence and `probabilities` always come

@@ -17,6 +17,7 @@ from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.costs.views import Views, log_missed
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
+from assoc.filters.imm import InteractingMultipleModel, Mixture
 from assoc.problem import AssignmentProblem
 from assoc.sensors import Sensor
 from assoc.sensors.arrays import numbers
@@ -45,12 +46,13 @@ def track_problem(
     states
         States of the filter, predicted to the scan; T of them.
     sensors : sequence of Sensor
+        At least one, each standing; of one on a platform give it as it stands at the scan.
     measurements : sequence of array_like (n_s, d_s)
         Of each sensor, of one instant.
     existence : array_like (T,) or float
         Probability that each track is a target, above 0 and at most 1.
     gate_probability : float
-        Share of true measurements inside the gate, above 0 and below 1; tuples outside have no probability.
+        Share of true measurements inside the gate, above 0, at most 1; tuples outside have no probability.
     max_tuples : int
 
     Raises
@@ -73,6 +75,18 @@ def track_problem(
     D. Musicki, R. Evans, Joint integrated probabilistic data association: JIPDA, IEEE Trans. Aerospace and Electronic
     Systems 40, 2004.
     """
+    mean = getattr(states, "mean", None)
+    if (
+        not isinstance(mean, np.ndarray)
+        or mean.shape[1:] != (filter.motion.dim,)
+        or (isinstance(filter, InteractingMultipleModel) is not isinstance(states, Mixture))
+    ):
+        raise InvalidInputError(f"states: expected states of {filter.motion.dim} components as the filter makes them")
+    if not len(sensors):
+        raise InvalidInputError("sensors: expected at least one")
+    for s, sensor in enumerate(sensors):
+        if sensor.platform is not None:
+            raise InvalidInputError(f"sensors: number {s + 1} is on a platform, expected one that stands at a position")
     chance = numbers(existence, "existence")
     if chance.shape not in ((), (1,), (len(states),)):
         raise InvalidInputError(f"existence: expected one number, or one for each of {len(states)} tracks, "

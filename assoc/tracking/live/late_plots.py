@@ -203,7 +203,7 @@ class LatePlots:
         try:
             moves, refused = self._insert(checked, stamps, codes, on_time)
             if moves:
-                self._again(min(move.scan for move in moves))
+                self._again(min(move.scan for move in moves), confirmed)
             new, new_stamps, new_codes = (
                 None if arrays is None else [array[mask] for array, mask in zip(arrays, on_time, strict=True)]
                 for arrays in (checked, stamps, codes)
@@ -246,12 +246,14 @@ class LatePlots:
                 self.past[k] = self.past[k].with_late(s, z[late], times[late], late_codes)
         return moves, refused
 
-    def _again(self, first: int) -> None:
-        """Process the scans from index `first` on again, and match the tracks to their ids."""
+    def _again(self, first: int, confirmed: set[int]) -> None:
+        """Process the scans from index `first` on again, and match the tracks to their ids, `confirmed` ones first."""
         tracker = self.tracker
         tracker.state = self.past[first].before
-        # tracks that began since then have new internal ids
-        names = {inner: outer for inner, outer in self.names.items() if inner < tracker.state.next_id}
+        # tracks that began since then have new internal ids; tentative ones may turn out to be other tracks
+        doubtful = _tentative(tracker.state)
+        older = {inner: outer for inner, outer in self.names.items() if inner < tracker.state.next_id}
+        names = {inner: outer for inner, outer in older.items() if inner not in doubtful}
         votes: Counter[tuple[int, int]] = Counter()
         steps = []
         for k, past in enumerate(self.past[first:], start=first):
@@ -261,7 +263,8 @@ class LatePlots:
             for new, old in zip(step.assigned, past.assigned, strict=True):
                 votes.update(zip(new[: len(old)].tolist(), old.tolist(), strict=True))
         taken = set(names.values())
-        for (inner, outer), _ in sorted(votes.items(), key=lambda vote: (-vote[1], vote[0])):
+        order = sorted(votes.items(), key=lambda vote: (vote[0][1] not in confirmed, -vote[1], vote[0]))
+        for inner, outer in [*(pair for pair, _ in order), *older.items()]:
             if inner and outer and inner not in names and outer not in taken:
                 names[inner] = outer
                 taken.add(outer)
@@ -327,3 +330,11 @@ def _ids(state: TrackerState) -> set[int]:
     """Ids of the tracks that live or may be taken up again, those in the nursery included."""
     ids = set(state.tracks.track_id.tolist()) | set(state.lost.track_id.tolist())
     return ids if state.nursery is None else ids | set(state.nursery.state.tracks.track_id.tolist())
+
+
+def _tentative(state: TrackerState) -> set[int]:
+    """Ids of the living tracks that are not confirmed, those in the nursery included."""
+    young = [] if state.nursery is None else [state.nursery.state.tracks]
+    batches = [state.tracks, *young]
+    sure = {i for batch in batches for i in batch.track_id[batch.confirmed].tolist()}
+    return {i for batch in batches for i in batch.track_id.tolist()} - sure
