@@ -75,7 +75,7 @@ def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
     return answer, 1e3 * (time.thread_time() - begin)
 
 
-def measured(packing: Packing) -> dict[str, float]:
+def measured(packing: Packing, peer: Callable[[Packing, Any], float] = highs) -> dict[str, float]:
     """Milliseconds and ratios of one program, the same bounds asserted."""
     everything = np.ones(packing.num_columns, dtype=np.bool_)
     program, relaxed = LinearProgram(packing), None
@@ -84,7 +84,7 @@ def measured(packing: Packing) -> dict[str, float]:
         return program.solve(duals=dual_bound(packing))
 
     relaxed, own = _timed(ours)
-    least, theirs = _timed(lambda: highs(packing, everything))
+    least, theirs = _timed(lambda: peer(packing, everything))
     check(relaxed.bound, least)
     program.mark()
     used = np.flatnonzero((relaxed.primal > 1e-6) & (relaxed.primal < 1.0 - 1e-6))[:MASKED]
@@ -95,7 +95,7 @@ def measured(packing: Packing) -> dict[str, float]:
         columns[j] = False
         program.back()
         warm, spent = _timed(lambda columns=columns: program.solve(columns=columns))
-        cold, others = _timed(lambda columns=columns: highs(packing, columns))
+        cold, others = _timed(lambda columns=columns: peer(packing, columns))
         check(warm.bound, cold)
         again.append(spent)
         anew.append(others / spent)

@@ -59,6 +59,12 @@ def unchanging() -> float:
     return time.process_time() - started
 
 
+def living() -> int:
+    """Number of the objects that Python's collector knows."""
+    gc.collect()
+    return len(gc.get_objects())
+
+
 @dataclass
 class Watch:
     """What is seen on the way; one entry for each look."""
@@ -68,13 +74,14 @@ class Watch:
     objects: list[int] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     unchanging: list[float] = field(default_factory=list)
+    count: Callable[[], int] = living
 
     def look(self, step: int, seconds: float, unchanging: float) -> None:
         """Note the memory, and the processor time (s) of a step and of the unchanging work since the last look."""
-        gc.collect()
+        living = self.count()
         with open("/proc/self/statm", encoding="ascii") as file:
             self.resident.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20)
-        self.objects.append(len(gc.get_objects()))
+        self.objects.append(living)
         self.steps.append(step)
         self.seconds.append(seconds)
         self.unchanging.append(unchanging)
@@ -151,11 +158,11 @@ def scans(count: int, rng: np.random.Generator) -> Iterator[tuple[float, tuple[A
             yield float(when), tuple(scene.measurements[k]), places[k]
 
 
-def track(kind: str, steps: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
-    """Let a tracker run, and watch it."""
+def track(kind: str, steps: int, rng: np.random.Generator, looks: int = WATCHED) -> tuple[list[Claim], Watch]:
+    """Let a tracker run, and look at it so often."""
     tracker: Tracker = TRACKERS[kind](sensors(), region=REGION, time_limit=None)
     watch = Watch()
-    clock = Clock(watch, max(steps // WATCHED, 1))
+    clock = Clock(watch, max(steps // looks, 1))
     least, asymmetry = np.inf, 0.0
     spread: list[float] = []
     errors: list[float] = []
@@ -197,8 +204,8 @@ def drawn(rng: np.random.Generator) -> AssignmentProblem:
     return AssignmentProblem(tuples, rng.normal(-3.0, 5.0, len(tuples)), [10, 10, 10])
 
 
-def solve(count: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
-    """Solve one problem after the other, and watch."""
+def solve(count: int, rng: np.random.Generator, looks: int = WATCHED) -> tuple[list[Claim], Watch]:
+    """Solve one problem after the other, and look so often."""
     others: list[Callable[[AssignmentProblem], object]] = [
         (lambda problem, name=name: kbest(problem, 3) if name == "kbest" else assign(problem, name)) for name in OTHERS
     ]
@@ -206,7 +213,7 @@ def solve(count: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
         # what they import and compile is no growth
         other(drawn(rng))
     watch, wrong = Watch(), 0
-    clock = Clock(watch, max(count // WATCHED, 1))
+    clock = Clock(watch, max(count // looks, 1))
     for number in range(1, count + 1):
         problem = drawn(rng)
         started = time.process_time()

@@ -34,7 +34,7 @@ class Ranking(NamedTuple):
     costs: list[float]
 
 
-def run(seeds: int | None, log: Callable[[str], None]) -> list[Row]:
+def run(seeds: int | None, log: Callable[[str], None], spatial_k: int = SPATIAL_K) -> list[Row]:
     """Time both goals' instances."""
     from assoc.costs import build_problem
 
@@ -44,7 +44,7 @@ def run(seeds: int | None, log: Callable[[str], None]) -> list[Row]:
     for seed in range(FIRST_SEED, FIRST_SEED + (seeds or 5)):
         planar = synthetic.planar_random(100, seed)
         spatial = build_problem(scenes.gated(3, 20, seed), 0)
-        for size, problem, k in ((PLANAR, planar, PLANAR_K), (SPATIAL, spatial, SPATIAL_K)):
+        for size, problem, k in ((PLANAR, planar, PLANAR_K), (SPATIAL, spatial, spatial_k)):
             ways = {"kbest": _kbest, "exact": _exact}
             if size == PLANAR and importlib.util.find_spec("pytcl") is not None:
                 ways[PEER] = _murty_peer

@@ -10,24 +10,23 @@ from experiments.common.claims import Claim, load_json
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
 
-def result_file(name: str) -> Path:
+def result_file(name: str, folder: Path = RESULTS) -> Path:
     """Path of the result file of ``python -m experiments.NAME``."""
-    return RESULTS / f"{name}.json"
+    return folder / f"{name}.json"
 
 
 class Results:
     """The claims of a result file by their quantity."""
 
-    def __init__(self, name: str) -> None:
-        path = result_file(name)
-        self.name = name
+    def __init__(self, name: str, folder: Path = RESULTS) -> None:
+        self.path = path = result_file(name, folder)
         self.claims: list[Claim] = load_json(path)
         self.head: dict[str, Any] = {k: v for k, v in json.loads(path.read_text()).items() if k != "claims"}
         self._by_quantity = {claim.quantity: claim for claim in self.claims}
 
     def __getitem__(self, quantity: str) -> Claim:
         if quantity not in self._by_quantity:
-            raise KeyError(f"{result_file(self.name)}: no claim {quantity!r}")
+            raise KeyError(f"{self.path}: no claim {quantity!r}")
         return self._by_quantity[quantity]
 
     def __contains__(self, quantity: str) -> bool:
@@ -37,7 +36,7 @@ class Results:
         """Claims whose quantity begins so, at least one."""
         found = [claim for claim in self.claims if claim.quantity.startswith(words)]
         if not found:
-            raise KeyError(f"{result_file(self.name)}: no claim begins with {words!r}")
+            raise KeyError(f"{self.path}: no claim begins with {words!r}")
         return found
 
 

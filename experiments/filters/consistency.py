@@ -37,14 +37,14 @@ class Case:
     sensor: Sensor
 
 
-def linear_case(count: int, rng: np.random.Generator) -> Case:
+def linear_case(count: int, rng: np.random.Generator, steps: int = STEPS) -> Case:
     """Nearly constant velocity, positions measured, the start drawn from the prior: all assumptions hold."""
     F, Q = (one[0] for one in ConstantVelocity(NOISE).matrices(1.0))
     P = np.diag([1e4, 1e4, 1e4, 100.0, 100.0, 100.0])
     mean = np.tile(np.array([5e3, 4e3, 1e3, -50.0, 20.0, 0.0]), (count, 1))
     states = [mean + rng.standard_normal((count, 6)) @ np.sqrt(P)]
     root = np.kron(np.array([[0.5, 0.0], [1.0, 0.0]]), np.eye(3)) * NOISE
-    for _ in range(STEPS):
+    for _ in range(steps):
         states.append(states[-1] @ F.T + rng.standard_normal((count, 6)) @ root.T)
     assert np.allclose(root @ root.T, Q)
     sensor = PositionSensor(position=np.zeros(3), noise=np.full(3, 50.0), field_of_view=np.array([[-1e6, 1e6]] * 3))

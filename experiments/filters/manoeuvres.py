@@ -72,6 +72,7 @@ NEW_SCENARIOS: dict[str, Flight] = {
         (25_240.0, 18_070.0, 6_370.0), 376.0, math.radians(226.0),
     ),
 }  # fmt: skip
+EVERY_SCENARIO = {**SCENARIOS, **NEW_SCENARIOS}
 """Drawn once (`random_flights(3, np.random.default_rng(20_261_122))`, rounded) and written down when everything else
 was settled: nothing was tuned or chosen on them."""
 

@@ -16,6 +16,7 @@ these parts alone, so that the whole table can be measured in several runs.
 
 import argparse
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval
 from experiments.common.claims import Claim, load_json, print_table, save_json
 from experiments.common.command import add_publish, publish
-from experiments.common.results import result_file
+from experiments.common.results import RESULTS, result_file
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS, problem
 from experiments.metaheuristics.running import log, run
@@ -94,9 +95,9 @@ def prefix(name: str, seconds: float) -> str:
     return f"{name}, {seconds:g} s"
 
 
-def merged(new: list[Claim], name: str = NAME, of: Callable[[Claim], str] | None = None) -> list[Claim]:
+def merged(new: list[Claim], *, folder: Path = RESULTS, of: Callable[[Claim], str] | None = None) -> list[Claim]:
     """The published claims, those of the same problems, budgets and solvers (or what else ``of`` names) replaced."""
-    path = result_file(name)
+    path = result_file(NAME, folder)
     old = load_json(path) if path.exists() else []
     subject = of or _subject
     measured_anew = {subject(claim) for claim in new}

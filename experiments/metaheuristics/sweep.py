@@ -17,7 +17,7 @@ The gallery draws the published figures: mean excess over alpha and beta, and ov
 import argparse
 import itertools
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -38,7 +38,8 @@ from experiments.metaheuristics.running import UNLIMITED, log
 
 NAME = "metaheuristics.sweep"
 TITLE = "Settings of the ant colony where problems are not easy"
-GRID: dict[str, tuple[float, ...]] = {
+Grid = Mapping[str, tuple[float, ...]]
+GRID: Grid = {
     "alpha": (0.0, 1.0, 2.0),
     "beta": (1.0, 2.0, 4.0),
     "rho": (0.3, 0.9),
@@ -75,9 +76,9 @@ CASES = (
 )
 
 
-def settings() -> list[dict[str, Any]]:
+def settings(grid: Grid = GRID) -> list[dict[str, Any]]:
     """All settings, in the order of the arrays."""
-    made = [dict(zip(GRID, values, strict=True)) for values in itertools.product(*GRID.values())]
+    made = [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
     return [one | {"ants": int(one["ants"])} for one in made]
 
 
@@ -90,9 +91,9 @@ def _setting(how: str, one: dict[str, Any]) -> Setting:
     return Setting("aco", {**one, **more})
 
 
-def excesses(case: Case, problems: Sequence[AssignmentProblem], optima: Floats, seed: int) -> Floats:
+def excesses(case: Case, problems: Sequence[AssignmentProblem], optima: Floats, seed: int, grid: Grid = GRID) -> Floats:
     """Excess of every setting on every problem, percent."""
-    made = [_setting(case.how, one) for one in settings()]
+    made = [_setting(case.how, one) for one in settings(grid)]
     sources = [StudySource(one, f"{number:03d}") for number, one in enumerate(problems)]
     # what an answer proves is not asked for: it would take longer than the ants
     without = mock.patch.object(search, "close", lambda component, run: None)
@@ -109,9 +110,9 @@ def optima_of(problems: Sequence[AssignmentProblem]) -> tuple[Floats, int]:
     return np.array([one.cost for one in found]), sum(one.status == "optimal" for one in found)
 
 
-def claims_of(case: Case, excess: Floats) -> list[Claim]:
+def claims_of(case: Case, excess: Floats, grid: Grid = GRID) -> list[Claim]:
     """The claims of one case; excess (settings, problems)."""
-    every = settings()
+    every = settings(grid)
 
     def claim(words: str, values: Floats) -> Claim:
         interval = mean_interval(values[:, None])
@@ -119,7 +120,7 @@ def claims_of(case: Case, excess: Floats) -> list[Claim]:
 
     found = []
     for names in SURFACES:
-        for values in itertools.product(*(GRID[name] for name in names)):
+        for values in itertools.product(*(grid[name] for name in names)):
             chosen = [all(one[n] == v for n, v in zip(names, values, strict=True)) for one in every]
             words = ", ".join(f"{name} {value:g}" for name, value in zip(names, values, strict=True))
             found.append(claim(words, excess[chosen].mean(axis=0)))
@@ -162,21 +163,21 @@ def draw(figure: Any, shown: tuple[list[Case], dict[str, Claim]]) -> None:
             figure.colorbar(picture, ax=ax, label="mean excess, %")
 
 
-def pictures(claims: list[Claim]) -> dict[str, tuple[Any, tuple[float, float]]]:
+def pictures(claims: list[Claim], every: Sequence[Case] = CASES) -> dict[str, tuple[Any, tuple[float, float]]]:
     """Return what `draw` shows of each kind of problem in the claims, and its size in inches, by the picture's name."""
     by_name = {claim.quantity: claim for claim in claims}
     found = {}
-    for kind in dict.fromkeys(case.problems for case in CASES):
-        cases = [case for case in CASES if case.problems == kind and f"{case.name}: worst setting" in by_name]
+    for kind in dict.fromkeys(case.problems for case in every):
+        cases = [case for case in every if case.problems == kind and f"{case.name}: worst setting" in by_name]
         if cases:
             found[f"surfaces-{kind.replace(' ', '-')}"] = ((cases, by_name), (9.0, 3.2 * len(cases)))
     return found
 
 
-def program(arguments: Sequence[str] | None = None) -> int:
+def program(arguments: Sequence[str] | None = None, *, cases: Sequence[Case] = CASES, grid: Grid = GRID) -> int:
     """Run the experiment; returns its exit code."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
-    names = [case.name for case in CASES]
+    names = [case.name for case in cases]
     parser.add_argument("--quick", action="store_true", help="two problems a case, for a first look")
     parser.add_argument("--cases", nargs="+", default=names, metavar="NAME", help="; ".join(names))
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the ants (default 0)")
@@ -190,7 +191,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
         parser.error("--publish needs the full run, got --quick")
     claims: list[Claim] = []
     known: dict[str, tuple[list[AssignmentProblem], Floats]] = {}
-    for case in CASES:
+    for case in cases:
         if case.name not in chosen.cases:
             continue
         if case.problems not in known:
@@ -204,7 +205,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
             interval = mean_interval(excess[:, None])
             claims.append(Claim(f"{case.problems}, greedy: excess", "%", None, float(excess.mean()), interval))
         problems, optima = known[case.problems]
-        claims += claims_of(case, excesses(case, problems[: case.count], optima[: case.count], chosen.seed))
+        claims += claims_of(case, excesses(case, problems[: case.count], optima[: case.count], chosen.seed, grid), grid)
         log(f"{case.name}: done")
     if chosen.publish and result_file(NAME).exists():
         groups = {claim.quantity.split(": ")[0] for claim in claims}

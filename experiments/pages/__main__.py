@@ -7,7 +7,7 @@ and those of the benchmark set; a test fails where a table and they differ.
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from assoc._files.output import write_text
@@ -27,17 +27,23 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a table is out of date")
     chosen = parser.parse_args(arguments)
-    stale = 0
     files = {FOLDER / f"{name}.md": make for name, make in TABLES.items()}
     files |= {FOLDER.parent / f"{name}.md": make for name, make in PAGES.items()}
+    stale = refresh(files, check=chosen.check)
+    return int(chosen.check and stale > 0)
+
+
+def refresh(files: Mapping[Path, Callable[[], str]], *, check: bool) -> int:
+    """Write the files that are out of date, or only name them; returns their number."""
+    stale = 0
     for path, make in files.items():
         fresh = f"{make()}\n"
         if not path.exists() or path.read_text(encoding="utf-8") != fresh:
             stale += 1
-            if not chosen.check:
+            if not check:
                 write_text(path, fresh)
-            print(f"{path.relative_to(FOLDER.parent.parent)}: {'out of date' if chosen.check else 'written'}")
-    return int(chosen.check and stale > 0)
+            print(f"{'/'.join(path.parts[-2:])}: {'out of date' if check else 'written'}")
+    return stale
 
 
 if __name__ == "__main__":

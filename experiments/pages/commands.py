@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,10 +47,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     about = (__doc__ or "").split("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m experiments.pages.commands", description=about)
     parser.add_argument("--folder", metavar="FOLDER", help="the thesis's tables as CSV files")
-    folder = parser.parse_args(arguments).folder
-    failed = run = 0
+    return int(run(commands(), parser.parse_args(arguments).folder) > 0)
+
+
+def run(every: Mapping[str, int], folder: str | None) -> int:
+    """Run commands, of which each is named by so many rows; returns how many fail."""
+    failed = count = 0
     with tempfile.TemporaryDirectory() as scratch:
-        for command, rows in commands().items():
+        for command, rows in every.items():
             words = small(command, folder and str(Path(folder).resolve()), Path(scratch))
             if words is None:
                 print(f"left out  {rows:3} rows         {command}", flush=True)
@@ -60,13 +64,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             start = time.perf_counter()
             env = {**os.environ, "PYTHONPATH": str(ROOT)}
             done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False, env=env)
-            failed, run = failed + (done.returncode != 0), run + 1
+            failed, count = failed + (done.returncode != 0), count + 1
             word = "failed" if done.returncode else "done"
             print(f"{word:9} {rows:3} rows {time.perf_counter() - start:6.0f} s {command}", flush=True)
             if done.returncode:
                 print(done.stdout[-2000:], done.stderr[-2000:], flush=True)
-    print(f"{run} commands run, {failed} failed")
-    return 1 if failed else 0
+    print(f"{count} commands run, {failed} failed")
+    return failed
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
 
+from pathlib import Path
+
 from experiments.common.claims import Claim
-from experiments.common.results import Results, number, result_file, table
+from experiments.common.results import RESULTS, Results, number, result_file, table
 
 SCENARIOS = tuple("CDEFGH")
 _FOR = {
@@ -266,11 +268,11 @@ def large_components() -> str:
     return table(["problems", *what], rows)
 
 
-def first_call() -> str:
+def first_call(folder: Path = RESULTS) -> str:
     """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
-    if not result_file("cold_start").exists():
+    if not result_file("cold_start", folder).exists():
         return "`make bench-cold` measures the seconds on your machine."
-    r = Results("cold_start")
+    r = Results("cold_start", folder)
     labels = [c.quantity.removesuffix(": fresh clone, wall") for c in r.claims if c.quantity.endswith("clone, wall")]
     rows = []
     for label in labels:
@@ -284,11 +286,11 @@ def first_call() -> str:
     return table(["first scan / all, s", "fresh clone", "wheel", "again", "clone, CPU time", "goal, clone"], rows)
 
 
-def sizes() -> str:
+def sizes(folder: Path = RESULTS) -> str:
     """What an installation takes on the disk, and what each package is for."""
-    if not result_file("installation").exists():
+    if not result_file("installation", folder).exists():
         return "`python -m experiments.installation WHEEL` weighs the packages on your machine."
-    r = Results("installation")
+    r = Results("installation", folder)
     names = [c.quantity.removeprefix("installed, ") for c in r.starting("installed, ")]
     named = [name for name in names if name.split()[0] in _FOR]
     kept = [name for name in names if name.split()[0] not in _SPARED]

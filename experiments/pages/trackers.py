@@ -1,7 +1,10 @@
 """Tables of measured trackers: docs/tracking_measured.md, and biased radars for docs/registration.md."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from experiments.common.claims import Claim
-from experiments.common.results import Results, number, table
+from experiments.common.results import RESULTS, Results, number, table
 
 SHOWN = {
     "oracle": "oracle",
@@ -215,11 +218,11 @@ def registration() -> str:
     return with_size(r, table(["traffic", "biases", *heads], rows, lambda column: column > 1))
 
 
-def goals() -> str:
+def goals(names: Sequence[str] = GOALS, folder: Path = RESULTS) -> str:
     """Every goal: measured, goal, met or not."""
     rows = []
-    for name in GOALS:
-        for claim in Results(f"trackers.{name}").starting("goal: "):
+    for name in names:
+        for claim in Results(f"trackers.{name}", folder).starting("goal: "):
             assert claim.band is not None
             low, high = claim.band
             words = f"at least {low:.4g}" if low is not None else f"at most {high:.4g}"

@@ -49,8 +49,7 @@ Stream = list[tuple[datetime, set[Any]]]
 
 START = datetime(2026, 1, 1)
 REGION = np.array([[-5e3, 5e3], [-5e3, 5e3], [0.0, 0.0]])
-TARGETS, SCANS, INTERVAL = 10, 30, 2.0
-P_D, CLUTTER = 0.9, 8.0
+INTERVAL, P_D = 2.0, 0.9
 RANGE_NOISE, BEARING_NOISE = 30.0, 0.015
 POSITION, PROCESS = (0, 2), (1.0, 1.0)
 CUTOFF = 500.0
@@ -62,9 +61,22 @@ VIEWS = [
     )
     for place in PLACES
 ]
-# scans until tracks count, whatever the way
-SETTLED = 9
 PARTS = ("distance", "localisation", "missed", "false")
+
+
+@dataclass(frozen=True)
+class Size:
+    """Of a scene."""
+
+    targets: int = 10
+    scans: int = 30
+    clutter: float = 8.0
+    """False alarms a scan."""
+    settled: int = 9
+    """Scans until tracks count, whatever the way."""
+
+
+USUAL = Size()
 
 
 class MissingRadar(RadarBearingRange):  # type: ignore[misc]
@@ -96,7 +108,7 @@ WAYS = (
 )
 
 
-def simulate(seed: int) -> tuple[Stream, set[Any], list[MissingRadar]]:
+def simulate(seed: int, size: Size = USUAL) -> tuple[Stream, set[Any], list[MissingRadar]]:
     """Run Stone Soup's simulators once: detections by time and radar, truth paths, radars."""
     seeds = np.random.default_rng(seed).integers(2**31, size=8).tolist()
     motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(q) for q in PROCESS], seed=seeds[0])
@@ -105,11 +117,11 @@ def simulate(seed: int) -> tuple[Stream, set[Any], list[MissingRadar]]:
         transition_model=motion,
         initial_state=GaussianState(StateVector(np.zeros(4)), spread, timestamp=START),
         timestep=timedelta(seconds=INTERVAL),
-        number_steps=SCANS,
+        number_steps=size.scans,
         birth_rate=0.0,
         death_probability=0.0,
         seed=seeds[3],
-        initial_number_targets=TARGETS,
+        initial_number_targets=size.targets,
     )
     radars, platforms = [], []
     for place, number in zip(PLACES, seeds[4:], strict=False):
@@ -120,7 +132,7 @@ def simulate(seed: int) -> tuple[Stream, set[Any], list[MissingRadar]]:
             noise_covar=np.diag([BEARING_NOISE, RANGE_NOISE]) ** 2,
             max_range=100e3,
             seed=number,
-            clutter_model=ClutterModel(CLUTTER, noise.uniform, tuple(map(tuple, REGION[:2])), seed=noise),
+            clutter_model=ClutterModel(size.clutter, noise.uniform, tuple(map(tuple, REGION[:2])), seed=noise),
         )
         at = GaussianState(StateVector([place[0], 0, place[1], 0]), np.eye(4), timestamp=START)
         platforms.append(FixedPlatform(states=at, position_mapping=POSITION, sensors=[radar]))
@@ -186,21 +198,21 @@ def tune() -> None:
             print(f"{way.name}: {points} points, distance {distance:g}, {patience} scans: {mean:.1f} m", flush=True)
 
 
-def compare(seeds: list[int], ways: tuple[Way, ...] = WAYS) -> tuple[Array, Array]:
+def compare(seeds: list[int], size: Size = USUAL) -> tuple[Array, Array]:
     """GOSPA (way, seed, scan, part) and processor time in seconds (way, seed)."""
     values, seconds = [], []
     for seed in seeds:
-        stream, paths, radars = simulate(seed)
-        runs = [track(way, stream, radars) for way in ways]
+        stream, paths, radars = simulate(seed, size)
+        runs = [track(way, stream, radars) for way in WAYS]
         values.append([gospa(tracks, paths) for tracks, _ in runs])
         seconds.append([took for _, took in runs])
     return np.array(values).swapaxes(0, 1), np.array(seconds).T
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator, size: Size = USUAL) -> tuple[list[Claim], Any]:
     """Compare the ways on the same scenes."""
     seeds = rng.integers(2**31, size=2 if quick else 10).tolist()
-    values, seconds = compare(seeds)
+    values, seconds = compare(seeds, size)
     claims = []
     for way, mine in zip(WAYS, values, strict=True):
         for p, part in enumerate(PARTS):
@@ -208,17 +220,18 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
             name = "GOSPA" if part == "distance" else f"GOSPA, {part}"
             claims.append(Claim(f"{way.name}: {name}", "m", None, by_seed.mean(), mean_interval(by_seed)))
     # first over all scans, then from when tracks count
-    for first, words, band in ((0, "GOSPA", (None, 0.0)), (SETTLED, f"GOSPA from {SETTLED * INTERVAL:g} s on", None)):
+    later = f"GOSPA from {size.settled * INTERVAL:g} s on"
+    for first, words, band in ((0, "GOSPA", (None, 0.0)), (size.settled, later, None)):
         mean = values[:, :, first:, 0].mean(axis=2)
         for way, mine in zip(WAYS[1:], mean[1:], strict=True):
             gain = mine - mean[0]
             what, source = f"{way.name} less {WAYS[0].name}: {words}", "chosen by us" if band else ""
             claims.append(Claim(what, "m", None, gain.mean(), mean_interval(gain), band, source=source))
     for way, took in zip(WAYS, seconds, strict=True):
-        claims.append(Claim(f"{way.name}: time of a scan", "ms", None, 1e3 * float(np.median(took)) / SCANS))
+        claims.append(Claim(f"{way.name}: time of a scan", "ms", None, 1e3 * float(np.median(took)) / size.scans))
     for way, took in zip(WAYS[1:], seconds[1:], strict=True):
         claims.append(Claim(f"{WAYS[0].name} / {way.name}: time", "", None, float(np.median(seconds[0] / took))))
-    return claims, (values[:, :, :, 0], simulate(seeds[0]))
+    return claims, (values[:, :, :, 0], simulate(seeds[0], size))
 
 
 def draw(figure: Any, shown: Any) -> None:
@@ -239,7 +252,7 @@ def draw(figure: Any, shown: Any) -> None:
         left.plot(line[:, 0], line[:, 1], color="black", linewidth=1.2, label="truth" if i == 0 else None)
     left.set(xlabel="x (km)", ylabel="y (km)", xlim=(-6, 6), ylim=(-6, 6), aspect="equal", title="one scene")
     left.legend(fontsize=8, loc="lower left")
-    times = INTERVAL * np.arange(SCANS)
+    times = INTERVAL * np.arange(gospas.shape[-1])
     for way, mine, style in zip(WAYS, gospas, ("o-", "s-", "x--"), strict=True):
         right.plot(times, mine.mean(axis=0), style, markersize=4, label=way.name)
         right.fill_between(times, *np.transpose([mean_interval(scan) for scan in mine.T]), alpha=0.2)

@@ -166,15 +166,10 @@ def test_wilsons_interval():
 
 
 @pytest.mark.slow
-def test_the_program(tmp_path, monkeypatch, capsys):
+def test_the_experiment():
     # every method on one short recording
-    monkeypatch.setattr(traffic, "judge", lambda *_, judge=traffic.judge: judge(1, 1, np.random.default_rng(0), 150.0))
-    monkeypatch.setattr(pairs, "TRAFFIC", ("crossing",))
-    monkeypatch.setattr(pairs, "DURATION", 200.0)
-    monkeypatch.setattr(pairs, "judge", lambda runs, rng, judge=pairs.judge: judge(1, rng))
-    monkeypatch.setattr(false_start, "judge", lambda runs, rng, judge=false_start.judge: judge(1, rng))
-    assert experiment.program(["--quick", "--json", str(tmp_path / "a.json")]) == 0
-    claims = {c.quantity: c for c in load_json(tmp_path / "a.json")}
+    size = experiment.Size(1, 1, 150.0, pairs_of_each=1, kinds=("crossing",), pair_duration=200.0, false_starts=1)
+    claims = {c.quantity: c for c in experiment.judge(size, np.random.default_rng(0))}
     # the thesis's tracker is Reid's with Murty's: its figures stand beside that one, and in no quick run it is missing
     assert claims["CT, Reid's MHT, CTW"].paper == 87.66 and claims["CT, MHT, CTW"].paper is None
     assert {claims[f"CT, Reid's MHT, {cell}"].ours > 0 for cell in (

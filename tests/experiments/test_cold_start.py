@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from experiments import cold_start
-from experiments.common import results
 from experiments.common.claims import save_json
 from experiments.pages.measured import first_call
 
@@ -39,9 +38,8 @@ def test_what_is_no_wheel_is_refused(tmp_path, capsys):
     assert ended.value.code == 2 and "expected a file that ends with .whl" in capsys.readouterr().err
 
 
-def test_the_table_has_every_command_and_marks_what_misses_its_goal(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "RESULTS", tmp_path)
-    assert "make bench-cold" in first_call()
+def test_the_table_has_every_command_and_marks_what_misses_its_goal(tmp_path):
+    assert "make bench-cold" in first_call(tmp_path)
     claims = []
     for label, goal in cold_start.GOALS.items():
         for way, wall in (("fresh clone", 16.0), ("again", 1.25), ("wheel", 2.5)):
@@ -49,7 +47,7 @@ def test_the_table_has_every_command_and_marks_what_misses_its_goal(tmp_path, mo
             claims += [cold_start._claim(f"{label}: {way}, wall", [wall - 1, wall, wall + 1], most)]
             claims += [cold_start._claim(f"{label}: {way}, cpu", [30.0], None)]
     save_json(str(tmp_path / "cold_start.json"), claims, "cold_start", 0, "")
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in first_call().splitlines()[2:]]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in first_call(tmp_path).splitlines()[2:]]
     assert [row[0] for row in rows] == [*cold_start.COMMANDS]
     for row in rows:
         missed = cold_start.GOALS[row[0]] < 16

@@ -2,12 +2,14 @@
 
 import inspect
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 
 from assoc.simulation.dubins.paths import Pose, path, shortest
 from experiments.common.claims import load_json
+from experiments.common.command import main
 from experiments.common.results import Results
 from experiments.filters import benchmark, consistency, manoeuvres
 from experiments.filters.b1 import Setting
@@ -20,19 +22,19 @@ from experiments.papers.modified_ekf import beyond
 from tests.sizes import few_or_all
 
 
-def test_what_the_papers_leave_open_in_small(monkeypatch):
+def test_what_the_papers_leave_open_in_small():
     rng = np.random.default_rng(0)
     judged = beyond.about_samples(20_000, rng) + beyond.about_filters(40, rng) + beyond.about_matrices(rng)
     assert [claim.quantity for claim in judged if claim.holds is False] == []
     # without noise an aircraft that steers by its estimate stays on its path
-    for name in ("Q", "R"):
-        monkeypatch.setattr(along_path, name, np.full(3, 1e-6))
-    squares = along_path.fly(shortest(flight_paths.FIRST, flight_paths.LAST, 100.0), None, rng)
+    little = np.full(3, 1e-6)
+    straight = shortest(flight_paths.FIRST, flight_paths.LAST, 100.0)
+    squares = along_path.fly(straight, None, rng, disturbed=little, measured=little)
     assert squares.max() < 1.0
     fine = other_models.GRIDS["Singer"]
-    monkeypatch.setattr(other_models, "GRIDS", {"Singer": fine[:2], "jerk": other_models.GRIDS["jerk"][:2]})
-    monkeypatch.setattr(other_models, "SCENARIOS", {})
-    found = {claim.quantity: claim.ours for claim in other_models.experiment(True, rng)}
+    grids = {"Singer": fine[:2], "jerk": other_models.GRIDS["jerk"][:2]}
+    claims = other_models.experiment(True, rng, grids=grids, scenarios=manoeuvres.NEW_SCENARIOS)
+    found = {claim.quantity: claim.ours for claim in claims}
     assert found["Singer: standard deviation"] == fine[0][1] and len(found) == 10
 
 
@@ -90,11 +92,12 @@ def test_beta_of_b1():
 
 
 @pytest.mark.slow
-def test_fuzzy_experiment(tmp_path, monkeypatch):
-    monkeypatch.setattr(fuzzy_ekf, "SCENARIOS", {"C": manoeuvres.SCENARIOS["C"]})
-    monkeypatch.setattr(fuzzy_ekf, "NEW_SCENARIOS", {})
+def test_fuzzy_experiment(tmp_path):
+    name, experiment, about = fuzzy_ekf.program.args
     file = str(tmp_path / "f.json")
-    assert fuzzy_ekf.program(["--quick", "--json", file, "--figure", str(tmp_path / "f.png")]) == 0
+    words = ["--quick", "--json", file, "--figure", str(tmp_path / "f.png")]
+    of_c = partial(experiment, scenarios={"C": manoeuvres.SCENARIOS["C"]})
+    assert main(name, of_c, about, words, **fuzzy_ekf.program.keywords) == 0
     by_name = {c.quantity: c for c in load_json(file)}
     assert by_name["C: tuned rules / best fixed EKF"].holds
     assert by_name["C: RMSE, IMM"].ours < by_name["C: RMSE, raw measurements"].ours
@@ -146,12 +149,11 @@ def test_tuning_never_sees_the_reports_flights():
         )
 
 
-def test_consistency_of_the_exact_filters(tmp_path, monkeypatch):
+def test_consistency_of_the_exact_filters():
     import numpy as np
 
-    monkeypatch.setattr(consistency, "STEPS", 40)
     rng = np.random.default_rng(0)
-    case = consistency.linear_case(60, rng)
+    case = consistency.linear_case(60, rng, steps=40)
     from assoc.filters import KalmanFilter, bounds
 
     values, nis = consistency.run(KalmanFilter(consistency.ConstantVelocity(1.0)), case)

@@ -3,7 +3,6 @@
 import sys
 
 from experiments import installation
-from experiments.common import results
 from experiments.common.claims import Claim, save_json
 from experiments.pages import measured
 
@@ -16,9 +15,8 @@ def test_packages_are_weighed_with_and_without_bytecode():
     assert not any(name.startswith("installed, pip ") for name in weights)
 
 
-def test_the_table_says_what_each_package_is_for_and_what_is_left_without_two(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "RESULTS", tmp_path)
-    assert "experiments.installation" in measured.sizes()
+def test_the_table_says_what_each_package_is_for_and_what_is_left_without_two(tmp_path):
+    assert "experiments.installation" in measured.sizes(tmp_path)
     sizes = {
         "scipy 1": (50.0, 40.0),
         "ortools 9": (30.0, 30.0),
@@ -29,7 +27,7 @@ def test_the_table_says_what_each_package_is_for_and_what_is_left_without_two(tm
     kinds = enumerate(("installed", "without bytecode"))
     claims = [Claim(f"{kind}, {name}", "MB", ours=size[k]) for k, kind in kinds for name, size in sizes.items()]
     save_json(tmp_path / "installation.json", claims, "installation", 0)
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in measured.sizes().splitlines()[2:]]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in measured.sizes(tmp_path).splitlines()[2:]]
     assert rows[1] == ["ortools 9", measured._FOR["ortools"], "30.0", "30.0"]
     assert [row[0] for row in rows] == ["scipy 1", "ortools 9", "rich 2", "2 others", *(row[0] for row in rows[4:])]
     assert [row[2:] for row in rows[3:]] == [["3.00", "1.50"], ["86.0", "73.5"], ["54.0", "42.5"]]

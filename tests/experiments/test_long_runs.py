@@ -7,17 +7,10 @@ from experiments import long_runs
 from tests.sizes import few_or_all
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Ten looks instead of a hundred, which do not go through all objects of the process that tests."""
-    monkeypatch.setattr(long_runs, "WATCHED", 10)
-    monkeypatch.setattr(long_runs.gc, "collect", lambda: 0)
-    monkeypatch.setattr(long_runs.gc, "get_objects", list)
-
-
 def watched(seconds=lambda place: 1.0, unchanging=lambda place: 1.0):
     """Return a watch of a hundred looks, with the times of a step and of the unchanging work by the look's number."""
-    watch = long_runs.Watch()
+    # not through all objects of the process that tests
+    watch = long_runs.Watch(count=lambda: 0)
     for place in range(100):
         watch.look(place + 1, seconds(place), unchanging(place))
     return watch
@@ -49,7 +42,7 @@ def test_memory_that_grows_is_seen():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(long_runs.KINDS))
 def test_a_short_run_of_each_tracker(kind):
-    claims, watch = long_runs.track(kind, 40, np.random.default_rng(1))
+    claims, watch = long_runs.track(kind, 40, np.random.default_rng(1), looks=10)
     sound = {claim.quantity: claim for claim in claims}
     assert sound[f"{kind}: least eigenvalue of a correlation matrix"].holds
     assert sound[f"{kind}: largest asymmetry"].holds
@@ -59,5 +52,5 @@ def test_a_short_run_of_each_tracker(kind):
 
 @few_or_all("count", 50, 350)
 def test_a_short_run_of_the_solvers(count):
-    claims, watch = long_runs.solve(count, np.random.default_rng(1))
+    claims, watch = long_runs.solve(count, np.random.default_rng(1), looks=10)
     assert claims[-1].holds and len(watch.steps) == 10

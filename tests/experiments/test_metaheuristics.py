@@ -141,35 +141,34 @@ def test_workers_are_published_apart_from_the_parts():
     assert len(names) == 3 and all(name.startswith("ghosts 40, 2 s, workers: ") for name in names)
 
 
-def test_published_results_of_other_problems_and_solvers_stay(tmp_path, monkeypatch):
-    path = tmp_path / "file.json"
-    monkeypatch.setattr(ablation, "result_file", lambda name: path)
+def test_published_results_of_other_problems_and_solvers_stay(tmp_path):
+    path = tmp_path / f"{ablation.NAME}.json"
     first = [
         Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=1.0),
         Claim("a, 1 s: tabu, all parts, above the best found", ours=2.0),
         Claim("b, 1 s: aco, all parts, above the best found", ours=3.0),
     ]
-    ablation.save_json(path, ablation.merged(first), ablation.NAME, 0)
-    again = ablation.merged([
+    ablation.save_json(path, ablation.merged(first, folder=tmp_path), ablation.NAME, 0)
+    new = [
         Claim("a, 1 s: aco, all parts, above the best found", ours=9.0),
         Claim("a, 2 s: tabu, all parts, above the best found", ours=8.0),
-    ])  # fmt: skip
+    ]
+    again = ablation.merged(new, folder=tmp_path)
     assert [one.ours for one in again] == [2.0, 3.0, 9.0, 8.0]
     # of a run with --parts only the same rows are replaced
     part = [Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=7.0)]
-    assert [one.ours for one in ablation.merged(part, of=lambda claim: claim.quantity)] == [2.0, 3.0, 7.0]
+    replaced = ablation.merged(part, folder=tmp_path, of=lambda claim: claim.quantity)
+    assert [one.ours for one in replaced] == [2.0, 3.0, 7.0]
 
 
 @pytest.mark.slow
-def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
+def test_sweep_finds_the_best_setting(tmp_path, capsys):
     grid = {"alpha": (1.0, 2.0), "beta": (1.0,), "rho": (0.3, 0.9), "ants": (5, 15)}
-    monkeypatch.setattr(sweep, "GRID", grid)
     cases = tuple(sweep.Case("ghosts 10", 2, how) for how in sweep.HOW)
-    monkeypatch.setattr(sweep, "CASES", cases)
     file = tmp_path / "results.json"
-    assert sweep.program(["--json", str(file)]) == 0
+    assert sweep.program(["--json", str(file)], cases=cases, grid=grid) == 0
     capsys.readouterr()
-    assert list(sweep.pictures(load_json(file))) == ["surfaces-ghosts-10"]
+    assert list(sweep.pictures(load_json(file), cases)) == ["surfaces-ghosts-10"]
     claims = {one["quantity"]: one["ours"] for one in json.loads(file.read_text())["claims"]}
     # the same runs by hand
     one = problem("ghosts 10", 0)

@@ -13,7 +13,7 @@ from experiments.__main__ import programs
 from experiments.common.claims import Claim
 from experiments.common.results import RESULTS, Results, number
 from experiments.pages import commands, prose, verdicts
-from experiments.pages.__main__ import FOLDER, TABLES, main
+from experiments.pages.__main__ import FOLDER, TABLES, main, refresh
 from tests.release import licences
 
 BY_HAND = ("choosing", "dependencies", "registration")
@@ -197,17 +197,14 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monke
         assert given == {tuple(usage.rpartition("]")[2].split())}, module
 
 
-def test_the_commands_of_the_rows_are_run_small(monkeypatch, capsys, tmp_path):
+def test_the_commands_of_the_rows_are_run_small(capsys, tmp_path):
     assert len(commands.commands()) > 25 and sum(commands.commands().values()) > 110
     folder = "python -m experiments.papers.clustering_time_window.tables FOLDER"
     quick = commands.small("python -m experiments.papers.modified_ekf", None, tmp_path)
     assert commands.small(folder, None, tmp_path) is None and commands.small(folder, "x", tmp_path)[-1] == "x"
     assert quick[1:] == ["-m", "experiments.papers.modified_ekf", "--quick"]
-    monkeypatch.setattr(
-        commands, "commands", lambda: {"pytest tests/sizes.py": 1, "python -m experiments": 2, folder: 9}
-    )
     # no test is collected, the list of experiments knows no --quick
-    assert commands.main([]) == 1
+    assert commands.run({"pytest tests/sizes.py": 1, "python -m experiments": 2, folder: 9}, None) == 2
     assert re.findall(r"^(failed|left out) +(\d)", capsys.readouterr().out, re.MULTILINE) == [
         ("failed", "1"), ("failed", "2"), ("left out", "9"),
     ]  # fmt: skip
@@ -233,14 +230,13 @@ def test_verdicts_say_no_more_than_the_intervals():
     assert verdicts.at_the_edge(sure) == "none at the edge"
 
 
-def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("experiments.pages.__main__.FOLDER", tmp_path)
-    monkeypatch.setattr("experiments.pages.__main__.TABLES", {"x": lambda: "| a |"})
-    monkeypatch.setattr("experiments.pages.__main__.PAGES", {})
-    (tmp_path / "x.md").write_text("old\n")
-    assert main(["--check"]) == 1 and (tmp_path / "x.md").read_text() == "old\n"
-    assert main([]) == 0 and (tmp_path / "x.md").read_text() == "| a |\n"
-    assert main(["--check"]) == 0
+def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, capsys):
+    path = tmp_path / "x.md"
+    path.write_text("old\n")
+    files = {path: lambda: "| a |"}
+    assert refresh(files, check=True) == 1 and path.read_text() == "old\n"
+    assert refresh(files, check=False) == 1 and path.read_text() == "| a |\n"
+    assert refresh(files, check=True) == 0
     capsys.readouterr()
 
 

@@ -1,28 +1,27 @@
 """The comparison inside Stone Soup, at a small size: its programs run, and the figures mean what they say."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 pytest.importorskip("stonesoup")
 
 from experiments.common.claims import load_json
+from experiments.common.command import main
 from experiments.common.results import Results
 from experiments.trackers import fusion_in_stone_soup as fusion
 from experiments.trackers import in_stone_soup
 
-
-@pytest.fixture
-def small(monkeypatch):
-    monkeypatch.setattr(fusion, "SCANS", 6)
-    monkeypatch.setattr(fusion, "SETTLED", 3)
-    monkeypatch.setattr(fusion, "TARGETS", 3)
-    monkeypatch.setattr(fusion, "CLUTTER", 1.0)
+SMALL = fusion.Size(targets=3, scans=6, clutter=1.0, settled=3)
 
 
 @pytest.mark.slow
-def test_program(small, tmp_path):
+def test_experiment(tmp_path):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
-    assert fusion.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
+    words = ["--quick", "--json", files[0], "--figure", files[1]]
+    experiment = partial(fusion.experiment, size=SMALL)
+    assert main(fusion.NAME, experiment, fusion.__doc__, words, (fusion.draw, (11, 4.6))) == 0
     claims = {c.quantity: c for c in load_json(files[0])}
     assert len(claims) == 3 * 4 + 2 + 2 + 3 + 2
     for way in fusion.WAYS:
@@ -32,16 +31,16 @@ def test_program(small, tmp_path):
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_gospa_without_any_track_is_that_of_all_targets_missed(small):
-    _, paths, _ = fusion.simulate(0)
+def test_gospa_without_any_track_is_that_of_all_targets_missed():
+    _, paths, _ = fusion.simulate(0, SMALL)
     values = fusion.gospa(set(), paths)
     expected = np.sqrt(3 * fusion.CUTOFF**2 / 2)
     np.testing.assert_allclose(values, [[expected, 0.0, expected, 0.0]] * 6)
 
 
-def test_same_seed_same_scene(small):
+def test_same_seed_same_scene():
     def vectors(seed):
-        stream, _, _ = fusion.simulate(seed)
+        stream, _, _ = fusion.simulate(seed, SMALL)
         return [sorted(np.asarray(d.state_vector, float).ravel().tolist() for d in found) for _, found in stream]
 
     assert vectors(4) == vectors(4) != vectors(5)

@@ -13,6 +13,8 @@ beside it. Full size: 12 recordings (6 for Reid's MHT), 100 pairs of each kind (
 false starts; the IDs are judged by the majority of 6 plots.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -22,11 +24,32 @@ from experiments.common.command import main
 from experiments.papers.clustering_time_window import false_start, pairs, traffic
 
 
+@dataclass(frozen=True)
+class Size:
+    """Recordings (of Reid's MHT fewer) and their seconds; pairs of each kind and their seconds; false starts."""
+
+    recordings: int = 12
+    slow_recordings: int = 6
+    duration: float = traffic.DURATION
+    pairs_of_each: int = 100
+    kinds: Sequence[str] = pairs.TRAFFIC
+    pair_duration: float = pairs.DURATION
+    false_starts: int = 100
+
+
+QUICK = Size(2, 2, 300.0, pairs_of_each=3, false_starts=6)
+
+
+def judge(size: Size, rng: np.random.Generator) -> list[Claim]:
+    """Judge windows, stamps and hypotheses on S1, then pairs and false starts."""
+    results = traffic.judge(size.recordings, size.slow_recordings, rng, size.duration)
+    about_pairs = pairs.judge(size.pairs_of_each, rng, kinds=size.kinds, duration=size.pair_duration)
+    return [*traffic.claims(results), *about_pairs, *false_start.judge(size.false_starts, rng)]
+
+
 def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
-    """Judge windows, stamps and hypotheses on S1, then pairs and false starts; --quick has fewer and shorter runs."""
-    results = traffic.judge(2 if quick else 12, 2 if quick else 6, rng, 300.0 if quick else traffic.DURATION)
-    about_pairs = pairs.judge(3 if quick else 100, rng)
-    return [*traffic.claims(results), *about_pairs, *false_start.judge(6 if quick else 100, rng)]
+    """Judge all; --quick has fewer and shorter runs."""
+    return judge(QUICK if quick else Size(), rng)
 
 
 program = partial(main, "papers.clustering_time_window", experiment, __doc__)

@@ -1,5 +1,7 @@
 """Two aircraft that cross, fly in parallel or meet head-on: do their tracks stay theirs?"""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from assoc._types import Array
@@ -18,15 +20,17 @@ FIGURES = {"crossing": "4.18", "parallel": "4.20", "head-on": "4.22"}
 SOURCE = "figure {}: no switch in its one pair; 95 % chosen by us"
 
 
-def judge(runs: int, rng: np.random.Generator) -> list[Claim]:
-    """Identity switches over seeds."""
+def judge(
+    runs: int, rng: np.random.Generator, *, kinds: Sequence[str] = TRAFFIC, duration: float = DURATION
+) -> list[Claim]:
+    """Identity switches over seeds, of recordings of so many seconds."""
     claims = []
-    for traffic in TRAFFIC:
+    for traffic in kinds:
         without: dict[str, list[bool]] = {}
         astray: list[int] = []
         for _ in range(runs):
             seed = int(rng.integers(2**31))
-            recording = simulate_recording("rotating-radar", seed, traffic=traffic, duration=DURATION).recording
+            recording = simulate_recording("rotating-radar", seed, traffic=traffic, duration=duration).recording
             windows = clustering_time_window(recording, ROTATION)
             hypotheses = HypothesisTracker(radar_of(recording))
             run(hypotheses, windows)

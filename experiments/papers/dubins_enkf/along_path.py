@@ -34,8 +34,8 @@ FILTERS = {"EKF": None, "N 10": 10, "N 100": 100, "N 300": 300}
 class Steered(ForwardDifference):
     """[x, y, heading] at constant speed; `turn` (rad/s) is the control of the step."""
 
-    def __init__(self) -> None:
-        super().__init__(np.diag(Q**2), 3, (0, 1))
+    def __init__(self, disturbed: Array) -> None:
+        super().__init__(np.diag(disturbed**2), 3, (0, 1))
         self.turn = 0.0
 
     def rates(self, states: Array) -> Array:
@@ -50,22 +50,25 @@ class Steered(ForwardDifference):
         return J
 
 
-def fly(path: Path, size: int | None, rng: np.random.Generator) -> Array:
-    """Mean squares of a flight: estimate from the path, aircraft from the path, estimate from the aircraft, m^2."""
-    motion = Steered()
+def fly(path: Path, size: int | None, rng: np.random.Generator, *, disturbed: Array = Q, measured: Array = R) -> Array:
+    """Mean squares of a flight: estimate from the path, aircraft from the path, estimate from the aircraft, m^2.
+
+    Each step is disturbed and measured with these sigmas.
+    """
+    motion = Steered(disturbed)
     filter_ = ExtendedKalmanFilter(motion) if size is None else EnsembleKalmanFilter(motion, size, rng)
-    sensor = LinearMeasurement(np.eye(3), np.diag(R**2))
+    sensor = LinearMeasurement(np.eye(3), np.diag(measured**2))
     first = path.segments[0].start
     truth = np.array([[first.x, first.y, first.heading]])
-    state, found = filter_.start(Gaussian(truth, np.diag(Q**2))), []
+    state, found = filter_.start(Gaussian(truth, np.diag(disturbed**2))), []
     ends = np.cumsum([segment.length for segment in path.segments])
     for k in range(int(path.length / (SPEED * DT))):
         across, angle = beside(path, k * SPEED * DT, state.mean[0])
         piece = path.segments[min(int(np.searchsorted(ends, k * SPEED * DT)), len(ends) - 1)]
         motion.turn = SPEED * piece.curvature - GAINS[0] * across - GAINS[1] * angle
-        truth = motion.propagate(truth, DT) + rng.standard_normal((1, 3)) * Q
+        truth = motion.propagate(truth, DT) + rng.standard_normal((1, 3)) * disturbed
         state = filter_.predict(state, DT)
-        state = filter_.update(state, truth + rng.standard_normal((1, 3)) * R, sensor).state
+        state = filter_.update(state, truth + rng.standard_normal((1, 3)) * measured, sensor).state
         now = (k + 1) * SPEED * DT
         off = np.linalg.norm(state.mean[0, :2] - truth[0, :2])
         found.append((beside(path, now, state.mean[0])[0], beside(path, now, truth[0])[0], off))

@@ -14,7 +14,7 @@ a grid: no filter fixed in advance could be better. Accepted, chosen by us befor
 the best fixed EKF and at most 1.08 of the IMM; both smoothed over 2 steps too.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -35,7 +35,7 @@ from experiments.common.claims import Claim
 from experiments.common.command import main, rmse, rmse_interval
 from experiments.filters.b1 import ratio_interval
 from experiments.filters.kinds import fuzzy_filter, imm
-from experiments.filters.manoeuvres import NEW_SCENARIOS, SCENARIOS, Batch, Flight, errors, smoothed_errors
+from experiments.filters.manoeuvres import EVERY_SCENARIO, SCENARIOS, Batch, Flight, errors, smoothed_errors
 from experiments.papers.fuzzy_ekf import figures, published
 
 LAG = 2
@@ -68,12 +68,14 @@ def straight_flight(flight: Flight, settled: float = 5.0) -> Array:
     return straight
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(
+    quick: bool, rng: np.random.Generator, scenarios: Mapping[str, Flight] = EVERY_SCENARIO
+) -> tuple[list[Claim], Any]:
     """Compare fixed EKFs, the paper's rules, the tuned rules and the IMM on C to H; --quick has fewer runs, no less."""
     count = 40 if quick else 400
     claims: list[Claim] = []
     example = None
-    for name, flight in {**SCENARIOS, **NEW_SCENARIOS}.items():
+    for name, flight in scenarios.items():
         batch = Batch.draw([flight], count, rng)
         claims += judge(name, flight, batch, rng)
         example = example or batch

@@ -6,9 +6,10 @@ One EKF of each model, without rules; each is tuned once, on the 50 random fligh
 a grid of standard deviations and correlation times. Full size: 100 runs of each scenario.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from assoc.filters import ConstantAcceleration, ExtendedKalmanFilter, Jerk, Sing
 from experiments.common.claims import Claim
 from experiments.common.command import main, rmse
 from experiments.filters.b1 import ratio_interval
-from experiments.filters.manoeuvres import NEW_SCENARIOS, SCENARIOS, Batch, errors, random_flights
+from experiments.filters.manoeuvres import EVERY_SCENARIO, Batch, Flight, errors, random_flights
 from experiments.filters.tune import score
 from experiments.papers.fuzzy_ekf import published
 from experiments.papers.fuzzy_ekf.tuned_once import NOISES
@@ -28,14 +29,20 @@ GRIDS = {
 """Model, standard deviation (m/s^2, m/s^3), correlation time (s)."""
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
+def experiment(
+    quick: bool,
+    rng: np.random.Generator,
+    *,
+    grids: Mapping[str, Sequence[tuple[Any, float, float]]] = GRIDS,
+    scenarios: Mapping[str, Flight] = EVERY_SCENARIO,
+) -> list[Claim]:
     """Tune each model, then compare on C to H; --quick has fewer runs."""
     flights = np.random.default_rng(published.tuned()["seed"])
     batch = Batch.draw(random_flights(50, flights), 1, flights)
     noise = min(NOISES, key=lambda one: score(lambda: ExtendedKalmanFilter(ConstantAcceleration(one)), batch))
     makers: dict[str, Callable[[], ExtendedKalmanFilter]] = {}
     claims = []
-    for name, grid in GRIDS.items():
+    for name, grid in grids.items():
         found = [lambda one=one: ExtendedKalmanFilter(one[0](*one[1:])) for one in grid]
         values = [score(make, batch) for make in found]
         makers[name] = found[int(np.argmin(values))]
@@ -43,7 +50,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
         unit = "m/s^2" if name == "Singer" else "m/s^3"
         for what, value, of in (("standard deviation", sigma, unit), ("correlation time", seconds, "s")):
             claims.append(Claim(f"{name}: {what}", of, None, value, source="chosen by us on random flights"))
-    for scenario, flight in {**SCENARIOS, **NEW_SCENARIOS}.items():
+    for scenario, flight in scenarios.items():
         drawn = Batch.draw([flight], 20 if quick else 100, rng)
         plain = errors(ExtendedKalmanFilter(ConstantAcceleration(noise)), drawn)
         for name, make in makers.items():
