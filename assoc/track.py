@@ -11,8 +11,8 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from contextlib import closing as closing_of
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -101,12 +101,13 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     if len(given["files"]) > 1 and not all(_has_plots(one) for one in given["files"]):
         raise InvalidInputError(f"{given['files'][1]}: only recorded plots may be in several files")
     of = _of_radars if file.lower().endswith(".toml") else _of_scene if _is_npz(file) else _of_plots
-    found = of(file, given, settings)
-    compiling = compile_seconds() - compiled
-    elapsed = time.perf_counter() - started - compiling
-    if given["verbose"]:
-        print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
-    write_and_print(found, given, elapsed, compiling)
+    with ExitStack() as outputs:
+        found = of(file, given, settings, outputs)
+        compiling = compile_seconds() - compiled
+        elapsed = time.perf_counter() - started - compiling
+        if given["verbose"]:
+            print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
+        write_and_print(found, given, elapsed, compiling)
     _EARLY_END.say(f"the tracks of {found.num_tracked} of {found.total} scans are written")
     if found.missing:
         again = "; the same command does what is left" if given["jobs"] or given["scheduler"] or given["slice"] else ""
@@ -130,7 +131,7 @@ def _has_plots(file: str) -> bool:
     return not file.lower().endswith(".toml") and not _is_npz(file)
 
 
-def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
+def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -> Tracked:
     """Track the radars of a description."""
     from assoc._cli.track.radars_file import read_radars
     from assoc.tracking import smoothed, track_scene
@@ -163,7 +164,7 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
-def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
+def _of_scene(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -> Tracked:
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
@@ -210,7 +211,7 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
     return found.correct(scene)
 
 
-def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
+def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitStack) -> Tracked:
     import numpy as np
 
     from assoc.recordings import radar_of, with_heights
@@ -240,36 +241,40 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
     if sliced and (whole or given["check"]):
         raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map, --asterix, --check")
 
-    def track(scans: Iterator[Window]) -> tuple[Any, Judged, PlotTracks | None]:
+    missing: list[str] = []
+    odd, plots = None, None
+    table: Any = None if sliced or whole else _ended_tracks(given, stored, outputs)
+    takers, ends, sizes = TakenPlots(survey.named, stored.addressed), [], []
+
+    def track(scans: Iterator[Window]) -> PlotTracks | None:
         if whole:
             recording = joined([*stored], notes, os.path.basename(file))
-            done = track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
-            done.table.origin = given["origin"]
-            sizes = [len(window) for window in done.windows]
-            return done.table, Judged(done.ends, sizes, stored.sourced, done.rates, done.kept), done
-        takers, ends, sizes = TakenPlots(survey.named, stored.addressed), [], []
-        with _ended_tracks(given, stored) as table:
-            for followed in follow(tracker, scans, forget=True):
-                takers.take(followed)
-                table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
-                table.add(*followed.listed(not given["all"]))
-                ends.append(float(followed.step.time))
-                sizes.append(len(followed.window))
-                if len(ends) % FORGET == 0:
-                    living = may_return(tracker)
-                    takers.keep(living)
-                    table.end(living)
-        return table, Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept()), None
+            return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
+        for followed in follow(tracker, scans, forget=True):
+            takers.take(followed)
+            table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
+            table.add(*followed.listed(not given["all"]))
+            ends.append(float(followed.step.time))
+            sizes.append(len(followed.window))
+            if len(ends) % FORGET == 0:
+                living = may_return(tracker)
+                takers.keep(living)
+                table.end(living)
+        return None
 
     if sliced:
-        table, judged, missing, odd = _in_slices(given, tracker, windows, stored)
-        plots, count = None, len(judged.ends)
+        table, judged, missing, odd = _in_slices(given, tracker, windows, stored, outputs)
+        count = len(judged.ends)
     else:
         turns = 1 + (survey.last - survey.first) / windows.rotation
-        (table, judged, plots), count = _watched(
+        plots, count = _watched(
             given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
         )
-        missing, odd = [], None
+        judged = Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept())
+    if plots is not None:
+        table, sizes = plots.table, [len(window) for window in plots.windows]
+        table.origin = given["origin"]
+        judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
         odd = ()
@@ -278,24 +283,27 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> Tracked:
         if whole:
             table.take_names(TrackTable())
     total = sum(1 for _ in windows) if _EARLY_END.asked else count
-    return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], not whole, odd)
+
+    def finish() -> None:
+        # an error discards what is not finished, and leaves its room to other outputs
+        with outputs.pop_all():
+            table.finish()
+
+    ends_here = None if whole else finish
+    return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], ends_here, odd)
 
 
-@contextmanager
-def _ended_tracks(given: Given, stored: StoredPlots) -> Iterator[EndedTracks]:
-    """Takes rows of tracks, and writes them as the tracks end; the file takes its name at the end."""
+def _ended_tracks(given: Given, stored: StoredPlots, outputs: ExitStack) -> EndedTracks:
+    """Takes rows of tracks, and writes them as the tracks end; the file takes its name when `outputs` are closed."""
     from assoc._files.tables import table_writer
     from assoc.tracking.offline.ended_tracks import EndedTracks
 
     identified = given["identity"] != "ignore" and (stored.survey.coded or stored.addressed)
-    with table_writer(given["output"]) as writer:
-        table = EndedTracks(writer, given["origin"], identified)
-        yield table
-        table.finish()
+    return EndedTracks(outputs.enter_context(table_writer(given["output"])), given["origin"], identified)
 
 
 def _in_slices(
-    given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots
+    given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots, outputs: ExitStack
 ) -> tuple[Any, Judged, list[str], Sequence[OddIdentity]]:
     """Track slices of the recording, write their tracks, and name what is missing, and odd identities."""
     import numpy as np
@@ -308,30 +316,30 @@ def _in_slices(
     places = {"jobs": given["jobs"] or 1, "scheduler": given["scheduler"]}
     takers, stitching = TakenPlots(stored.survey.named, stored.addressed), Stitching()
     ends, sizes = [np.zeros(0)], []
-    with kept_slices(given, given["files"]) as slices:
-        seconds, early = given["slice"] or _SLICE, overlap(tracker, windows.rotation)
-        try:
-            with (
-                _EARLY_END.work(0.0),
-                _ended_tracks(given, stored) as table,
-                closing_of(slices.run(work, windows, seconds, early, places)) as parts,
-            ):
-                for part in map(stitching.add, parts):
-                    table.add_frame(part.frame)
-                    table.count_identities(part.tracks, part.known[:, 1:])
-                    takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
-                    living = {*part.tracks.tolist(), *part.frame.track_id.tolist()}
-                    takers.keep(living)
-                    table.end(living)
-                    ends.append(part.ends)
-                    sizes += part.sizes.tolist()
-        except KeyboardInterrupt:
-            _EARLY_END.say(f"{len(slices.done())} slices are kept; the same command goes on from there")
-            raise
-        missing = slices.missing()
+    # these go when the tracks are written
+    slices = outputs.enter_context(kept_slices(given, given["files"]))
+    table = _ended_tracks(given, stored, outputs)
+    seconds, early = given["slice"] or _SLICE, overlap(tracker, windows.rotation)
+
+    def kept() -> str:
+        return f"{len(slices.done())} slices are kept; the same command goes on from there" if slices.stay else ""
+
+    with (
+        _EARLY_END.work(0.0, kept),
+        closing_of(slices.run(work, windows, seconds, early, places)) as parts,
+    ):
+        for part in map(stitching.add, parts):
+            table.add_frame(part.frame)
+            table.count_identities(part.tracks, part.known[:, 1:])
+            takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
+            living = {*part.tracks.tolist(), *part.frame.track_id.tolist()}
+            takers.keep(living)
+            table.end(living)
+            ends.append(part.ends)
+            sizes += part.sizes.tolist()
     times = np.concatenate(ends)
     judged = Judged(times, sizes, stored.sourced, takers.rates(), takers.kept())
-    return table, judged, missing, stitching.odd_identities
+    return table, judged, slices.missing(), stitching.odd_identities
 
 
 def _watched(

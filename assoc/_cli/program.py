@@ -12,7 +12,7 @@ from assoc._cli.messages import warnings_as_lines
 from assoc._cli.options import BAD_INPUT
 from assoc._cli.signals import Interruption, end_early
 from assoc._text.plain import one_line
-from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
+from assoc.errors import AssocError, InfeasibleError, LimitExceededError
 
 DONE, NOTHING_FEASIBLE, INTERRUPTED = 0, 3, 130
 """Exit codes; the last one is that of shells for Ctrl-C."""
@@ -93,12 +93,12 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
 
 def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
     """Write the outputs that are asked for (not None); if one fails the others are written, then it raises."""
-    errors = []
+    errors: list[AssocError] = []
     for asked, write in outputs:
         try:
             if asked is not None:
                 write()
-        except InvalidInputError as error:
+        except AssocError as error:
             errors.append(error)
     if errors:
         raise errors[0]

@@ -153,8 +153,12 @@ class EarlyEnd:
                 _thread.interrupt_main()
 
     @contextmanager
-    def work(self, patience: float) -> Iterator[None]:
-        """Let a signal end this block by `ask_to_end`, and by an interrupt if that takes more than ``patience`` s."""
+    def work(self, patience: float, kept: Callable[[], str] = lambda: "") -> Iterator[None]:
+        """Let a signal end this block by `ask_to_end`, and by an interrupt if that takes more than ``patience`` s.
+
+        After an interrupt the program ends and says what is ``kept``. What must not be interrupted comes after the
+        block.
+        """
         self._patience = patience
         with self._lock:
             self._working = True
@@ -166,7 +170,7 @@ class EarlyEnd:
                 with self._lock:
                     self._working = False
         except KeyboardInterrupt:
-            self.say("")
+            self.say(kept())
             raise
 
     @property

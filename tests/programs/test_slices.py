@@ -165,6 +165,60 @@ def at_first(monkeypatch, do):
     monkeypatch.setattr(Slices, "_save", save)
 
 
+def test_slices_are_kept_until_the_tracks_are_written(here, capsys, monkeypatch):
+    plain, saved = os.replace, []
+
+    def replace(source, target):
+        saved.append(os.path.basename(target))
+        if saved[-1] == "t.csv":
+            raise OSError(28, "No space left on device")
+        plain(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", replace)
+        code, tracks, said = run([*SLICED, "--rates", "r.csv"], "t.csv", capsys)
+    assert code == 2 and tracks is None and "t.csv: cannot be written (No space left on device)" in said
+    assert saved[:2] == ["00000.npz", "00001.npz"] and saved[-2:] == ["t.csv", "r.csv"]
+    changed = {path: path.stat().st_mtime_ns for path in here.glob("t.csv.slices/*/*.npz")}
+    assert len(changed) == len(saved) - 2
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", lambda source, target: saved.append(target) or plain(source, target))
+        saved.clear()
+        assert run(SLICED, "t.csv", capsys)[0] == 0
+    assert len(saved) == 1 and not os.path.exists("t.csv.slices")
+
+
+INTERRUPTED = """
+import os, signal, sys, time
+from assoc import track
+
+plain = os.replace
+
+def replace(source, target):
+    plain(source, target)
+    if target.endswith("00001.npz"):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000):
+            time.sleep(0.05)
+
+os.replace = replace
+sys.exit(track.start())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+@pytest.mark.parametrize("output", ["t.csv", "-"])
+def test_after_an_interrupt_it_is_said_what_is_kept(here, capsys, monkeypatch, output):
+    (here / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(here / "temporary"))
+    command = [sys.executable, "-c", INTERRUPTED, *SLICED, *WORDS, "-o", output]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    kept = "; 2 slices are kept; the same command goes on from there" if output == "t.csv" else ""
+    assert (done.returncode, done.stderr) == (130, f"assoc.track: interrupted{kept}\n")
+    assert os.listdir("temporary") == []
+    assert len([*here.glob("t.csv.slices/*/*.npz")]) == (2 if kept else 0)
+
+
 def in_hours(recording):
     """Files of a day: in the wrong order, one without plots, one that is no table, and one that reaches back."""
     thirds = np.array_split(np.arange(len(recording)), 3)

@@ -1,11 +1,15 @@
 """Tracks that are written as they end are those of a table that holds them all."""
 
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from assoc import track
-from assoc.errors import LimitExceededError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings import fixed_groups, radar_of, read_plots, write_plots
 from assoc.simulation import simulate_recording
 from assoc.tracking import TRACKERS, TrackTable
@@ -84,6 +88,61 @@ def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
     assert sorted(path.name for path in here.iterdir()) == ["plots.csv", "t.csv"]
 
 
+def test_what_cannot_be_written_leaves_the_rest(here, capsys):
+    assert track.main(["plots.csv", "-o", "t.csv", "--rates", "expected.csv", *WORDS[1:]]) == 0
+    printed = capsys.readouterr().out
+    assert track.main(["plots.csv", "-o", "/dev/full", "--rates", "r.csv", *WORDS[1:]]) == 2
+    said = capsys.readouterr()
+    assert said.err == "assoc.track: error: /dev/full: cannot be written (No space left on device)\n"
+    assert (here / "r.csv").read_text() == (here / "expected.csv").read_text()
+    # all but the line with the seconds
+    (counts,) = [line for line in printed.splitlines() if line.startswith("t.csv: ")]
+    assert counts.replace("t.csv", "/dev/full") in said.out and printed.splitlines()[-1] in said.out
+
+
+SLOW = """
+import os, signal, sys, time
+from assoc import track
+from assoc._system.compile_time import loading
+from assoc.tracking.offline import plots
+
+steps, sync = plots.step_windows, os.fsync
+number = 0
+
+def nap(seconds):
+    while seconds > 0:
+        time.sleep(0.05)
+        seconds -= 0.05
+
+def step_windows(*arguments, **options):
+    global number
+    number += 1
+    if number == 60:
+        os.kill(os.getpid(), signal.SIGINT)
+        # there is no patience with what loads kernels
+        with loading():
+            nap(60)
+    yield from steps(*arguments, **options)
+
+def fsync(handle):
+    nap(2)
+    sync(handle)
+
+plots.step_windows, os.fsync = step_windows, fsync
+sys.exit(track.start())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+def test_an_interrupt_of_tracking_does_not_reach_the_writing(here):
+    command = [sys.executable, "-c", SLOW, "plots.csv", "-o", "t.csv", *WORDS]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    told = "assoc.track: interrupted; the tracks of 59 of 169 scans are written\n"
+    assert (done.returncode, done.stderr) == (130, told)
+    assert pd.read_csv("t.csv").time.max() < 600.0
+    assert sorted(path.name for path in here.iterdir()) == ["plots.csv", "t.csv"]
+
+
 def test_no_tracks_make_a_table_of_no_rows(here, capsys):
     recording = read_plots("plots.csv")
     write_plots("two.csv", recording.take(np.arange(2)))
@@ -119,6 +178,22 @@ def test_a_track_is_written_when_it_has_ended_and_not_before():
     table.finish()
     assert parts.ids == [1, 2, 2, 2, 2, 3, 3, 3]
     assert len(table) == 8 and table.confirmed_ids() == {1, 2, 3}
+
+
+class Full(Parts):
+    def add(self, part):
+        raise InvalidInputError("t.csv: cannot be written")
+
+
+def test_rows_are_counted_though_they_cannot_be_written():
+    table = EndedTracks(Full(), None, False)
+    for time in range(4):
+        columns = dict.fromkeys(("x", "nis"), 0.0) | {"confirmed": True, "consistent": True, "status": "confirmed"}
+        table.add_frame(pd.DataFrame({"track_id": [time], "time": float(time), **columns}))
+        table.end({time})
+    with pytest.raises(InvalidInputError, match=r"t\.csv: cannot be written"):
+        table.finish()
+    assert len(table) == 4 and table.confirmed_ids() == {0, 1, 2, 3}
 
 
 def test_a_track_that_may_return_has_not_ended():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.lines import print_lines
@@ -39,8 +39,8 @@ class Tracked(NamedTuple):
     """For reports."""
     missing: Sequence[str] = ()
     """Files and slices that they lack."""
-    written: bool = False
-    """Whether the tracks were written as they ended."""
+    finish: Callable[[], object] | None = None
+    """Writes the rest of tracks that were written as they ended."""
     odd: Sequence[object] | None = None
     """Identities that cannot all be right; None: those that the tracker found."""
 
@@ -77,7 +77,7 @@ def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: flo
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),
         (given["asterix"], lambda: _write_asterix(given["asterix"], found)),
-        (None if found.written else given["output"], lambda: _write_tracks(given["output"], found.table)),
+        (given["output"], found.finish or (lambda: _write_tracks(given["output"], found.table))),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),

@@ -16,6 +16,7 @@ import numpy as np
 from assoc._cli.options import Given
 from assoc._files.npz import Field, load_npz, save_npz
 from assoc._files.output import STDOUT, is_stream
+from assoc._system import temporary
 from assoc._system.cluster import LostError
 from assoc._system.engine import spread
 from assoc._text.times import moment
@@ -40,6 +41,8 @@ class Slices:
     """Slices of a recording, done (in `folder`) or not."""
 
     folder: str
+    stay: bool = True
+    """Whether those that are done stay when the program ends early."""
     spans: dict[int, tuple[float, float]] = field(default_factory=dict)
     """First and last time of each, seconds."""
     failed: dict[int, str] = field(default_factory=dict)
@@ -150,8 +153,12 @@ def kept_slices(given: Given, files: Iterable[str]) -> Iterator[Slices]:
     """Slices in a folder beside the output, which goes when all are done; they are those of the same work alone."""
     output = given["output"]
     if output == STDOUT or is_stream(output):
-        with tempfile.TemporaryDirectory(prefix="assoc-slices-") as folder:
-            yield Slices(folder)
+        folder = tempfile.mkdtemp(prefix="assoc-slices-")
+        temporary.add(folder)
+        try:
+            yield Slices(folder, stay=False)
+        finally:
+            temporary.remove(folder)
         return
     nothing = ("jobs", "scheduler", "quiet", "verbose", "check", "rates", "output")
     work = {name: value for name, value in given.items() if name not in nothing}

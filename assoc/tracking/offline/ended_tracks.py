@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc._files.tables import TableWriter, escaped
 from assoc._types import Array
-from assoc.errors import LimitExceededError
+from assoc.errors import AssocError, LimitExceededError
 from assoc.scene.geodesy import Origin
 from assoc.tracking.track_table import TrackTable
 
@@ -45,13 +45,15 @@ class EndedTracks:
         # where the rows of each track are in the file: first row, and how many
         self._parts: dict[int, list[tuple[int, int]]] = {}
         self._row: np.dtype[Any] = np.dtype([])
-        self._stored = self._written = 0
+        self._count = 0
         self._before: set[int] = set()
         self._confirmed: set[int] = set()
         self._inconsistent: dict[int, float] = {}
+        # of writing; after it rows are only counted
+        self._error: AssocError | None = None
 
     def __len__(self) -> int:
-        return self._stored + len(self._table)
+        return self._count + len(self._table)
 
     def count_identities(self, ids: Array, known: Array) -> None:
         """As of `TrackTable`."""
@@ -70,10 +72,15 @@ class EndedTracks:
         wrong = frame[~frame.consistent]
         for track, nis in zip(wrong.track_id.tolist(), wrong.nis.tolist(), strict=True):
             self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
+        if self._error is None:
+            self._store(frame)
+        self._count += len(frame)
+
+    def _store(self, frame: pd.DataFrame) -> None:
         frame = frame.sort_values("track_id", kind="stable")
         columns = {str(name): frame[name].to_numpy() for name in frame}
         columns["status"] = columns["status"].astype("S10")
-        if not self._stored:
+        if not self._count:
             self._row = np.dtype([(name, column.dtype) for name, column in columns.items()])
         rows = np.empty(len(frame), self._row)
         for name, column in columns.items():
@@ -83,14 +90,13 @@ class EndedTracks:
             self._file.write(rows.tobytes())
             self._file.flush()
         except OSError as error:
-            raise LimitExceededError(
+            self._error = LimitExceededError(
                 f"tracks cannot be kept in {tempfile.gettempdir()} ({error.strerror or error}); "
                 "set TMPDIR to a folder with more room"
-            ) from None
+            )
         ids, first, counts = np.unique(columns["track_id"], return_index=True, return_counts=True)
         for track, begin, count in zip(ids.tolist(), first.tolist(), counts.tolist(), strict=True):
-            self._parts.setdefault(track, []).append((self._stored + begin, count))
-        self._stored += len(rows)
+            self._parts.setdefault(track, []).append((self._count + begin, count))
 
     def end(self, living: set[int]) -> None:
         """Write the tracks that are not among the living, nor were when this was last called."""
@@ -99,16 +105,26 @@ class EndedTracks:
             self.add_frame(table.to_frame())
         kept, self._before = living | self._before, living
         self._names.name_by_identities(kept)
-        ended = sorted(self._parts.keys() - kept)
-        if ended:
-            self._write(ended)
+        try:
+            if self._error is None:
+                self._write(sorted(self._parts.keys() - kept))
+        except AssocError as error:
+            self._error = error
         self._names.targets, self._names.identities = {}, {}
 
     def finish(self) -> None:
-        """Write all that is left."""
+        """Write all that is left.
+
+        Raises
+        ------
+        AssocError
+            Tracks could not be written, now or before.
+        """
         self.end(set())
         self.end(set())
-        if not self._stored:
+        if self._error is not None:
+            raise self._error
+        if not self._count:
             self._writer.add(self._named(TrackTable(self._origin).to_frame()))
 
     def _write(self, ended: list[int]) -> None:
