@@ -52,11 +52,12 @@ class _Lists:
 class Deepening:
     """Rounds of growing excess D until k solutions are proved to be the lightest; ``ahead`` comes before branching."""
 
-    def __init__(self, columns: AllColumns, k: int, run: Run, ahead: HeadStart) -> None:
+    def __init__(self, columns: AllColumns, k: int, run: Run, ahead: HeadStart, budget: int = FIRST_BUDGET) -> None:
         self._columns = columns
         self._k = k
         self._run = run
         self._ahead = ahead
+        self._budget = budget
         self._nodes = 0
         self._tolerance = _TIE * columns.scale
         self._known: Columns | None = None
@@ -137,7 +138,7 @@ class Deepening:
     def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists | None:
         """Rank every component; None where the head start shows that more excess is needed."""
         reduced = self._columns.reduced[packing.origin]
-        wanted = Wanted(self._k, room, self._tolerance, FIRST_BUDGET, self._run.deadline())
+        wanted = Wanted(self._k, room, self._tolerance, self._budget, self._run.deadline())
         start, weights, pointer, columns, proven = rank_components(packing.arrays, reduced, duals, wanted)
         lists = _Lists()
         for c in range(packing.num_components):

@@ -27,6 +27,7 @@ from assoc.packing.prepare import Prepared, conditioned, prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem, check_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
+from assoc.ranking.component_ranking import FIRST_BUDGET
 from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
 from assoc.ranking.two_sensors import rank_two_sensors
@@ -117,8 +118,13 @@ class Ranking:
     """The columns and their prices."""
 
 
-def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
-    """Return the k best and a bound on the rest; a given run brings its own time limit."""
+def rank(
+    problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None, budget: int = FIRST_BUDGET
+) -> Ranking:
+    """Return the k best and a bound on the rest; a given run brings its own time limit.
+
+    A component is branched on after ``budget`` decisions of enumeration beyond one for each row.
+    """
     run = run or Run(0, time_limit=checked_time_limit(time_limit))
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
@@ -131,7 +137,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
         # the fallback comes first: the ascent might leave no time for it
         prepare_fallback(packing, run)
         columns = price_all_columns(problem, run)
-        found = Deepening(columns, most, run, ahead).run()
+        found = Deepening(columns, most, run, ahead, budget).run()
     if len(found.chosen) == most < k and found.rest < np.inf:
         run.stopped_by = run.stopped_by or "memory_limit"
     rest = found.rest + columns.offset

@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{chosen.recording}: there is no such file", file=sys.stderr)
                 return 2
             os.environ[recorded.PATH] = chosen.recording
-        return _make(compare=chosen.compare)
+        return _make(instances(), compare=chosen.compare)
     picked = list(_picked(parser, chosen.names, getattr(chosen, "family", None)))
     if chosen.part == "solve":
         return _solve(picked, chosen.solver, chosen.seconds)
@@ -102,9 +102,9 @@ def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | Non
             yield one
 
 
-def _make(*, compare: bool) -> int:
+def _make(known: Sequence[Instance], *, compare: bool) -> int:
     different = 0
-    every = [one for one in instances() if not one.kept and (recorded.PATH in os.environ or not one.recorded)]
+    every = [one for one in known if not one.kept and (recorded.PATH in os.environ or not one.recorded)]
     for one in every:
         path, made = store.instance_file(one.name), one.make()
         if not compare:
@@ -113,7 +113,7 @@ def _make(*, compare: bool) -> int:
         elif not _alike(made, store.load(one.name)):
             different += 1
             print(f"{one.name}: differs from what is stored", file=sys.stderr)
-    left = len(instances()) - len(every)
+    left = len(known) - len(every)
     without = f", {left} stay as they are" if left else ""
     print(f"{len(every)} instances{without}" + (f", {different} differ" if compare else ""))
     return 1 if different else 0

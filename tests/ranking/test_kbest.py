@@ -14,7 +14,6 @@ from assoc.packing.branching.counts import Splitting
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking import iterative_deepening
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.component_ranking import ComponentRanking
 from assoc.ranking.kbest import kbest, rank
@@ -35,14 +34,14 @@ from tests.sizes import few_or_all
 from tests.solvers.test_against_brute_force import blackman_popoli
 
 
-def check(problem, k):
+def check(problem, k, **options):
     """Ranked as by enumeration: distinct solutions, each valid as a Solution."""
     expected = all_solutions(problem, limit=4000)
     if not expected:
         with pytest.raises(InfeasibleError):
             kbest(problem, k)
         return 0
-    ranking = rank(problem, k, None)
+    ranking = rank(problem, k, None, **options)
     found = ranking.solutions
     if k < len(expected):
         assert expected[k - 1].cost - 1e-9 <= ranking.rest <= expected[k].cost + 1e-12
@@ -221,17 +220,16 @@ def test_scenes_full_of_ghosts_in_parts_and_without(seed):
 
 
 @pytest.mark.slow
-def test_components_that_need_branching_within_a_problem(monkeypatch):
-    monkeypatch.setattr(iterative_deepening, "FIRST_BUDGET", -3)
+def test_components_that_need_branching_within_a_problem():
     rng = np.random.default_rng(4)
     for number in range(40):
         if number % 2:
             try:
-                check(disconnected_problem(rng, 2), (3, 30)[number % 4 // 2])
+                check(disconnected_problem(rng, 2), (3, 30)[number % 4 // 2], budget=-3)
             except MemoryError:
                 pass
         else:
-            check(axial_problem(rng, (4, 4, 4), 0.7, "ties"), (3, 30)[number % 4 // 2])
+            check(axial_problem(rng, (4, 4, 4), 0.7, "ties"), (3, 30)[number % 4 // 2], budget=-3)
 
 
 def test_wide_integrality_gap():

@@ -5,7 +5,6 @@ import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.counts import Splitting
-from assoc.packing.branching.root import plain_root
 from assoc.packing.packing import assemble
 from assoc.packing.run import never
 from assoc.ranking import component_ranking
@@ -19,20 +18,11 @@ pytestmark = pytest.mark.slow
 ALWAYS = Splitting(after=1, pays=np.inf)
 
 
-@pytest.fixture
-def without_cuts(monkeypatch):
-    """Cuts close most of these small packings before there is anything to split."""
-    monkeypatch.setattr(component_ranking, "root_with_cuts", lambda packing, duals, *rest: plain_root(packing, duals))
-
-
-@pytest.mark.parametrize(("seed", "rigid"), [(3, 0.0), (26, 0.0), (26, 0.3)])
+# packings that cuts do not close before there is anything to split: few of the random ones
+@pytest.mark.parametrize(("seed", "rigid"), [(149, 0.0), (26, 0.0), (26, 0.3)])
 @pytest.mark.parametrize(("k", "budget"), [(4, 0), (12, 6)])
-def test_none_is_left_out_and_none_listed_twice(without_cuts, seed, rigid, k, budget):
+def test_none_is_left_out_and_none_listed_twice(seed, rigid, k, budget):
     check_list(random_packing(seed, rigid), k, budget)
-
-
-def test_the_same_with_cuts():
-    check_list(random_packing(26), 12, 0)
 
 
 def check_list(packing, k, budget):
@@ -78,8 +68,8 @@ def test_without_memory_for_parts_the_search_goes_on_as_it_was():
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
 
 
-def test_what_was_given_up_in_one_part_is_remembered_in_the_next(without_cuts):
-    packing = random_packing(3)
+def test_what_was_given_up_in_one_part_is_remembered_in_the_next():
+    packing = random_packing(149)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
     ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
     while not ranking.parts_begun:
@@ -109,8 +99,8 @@ def test_a_split_that_time_ends_leaves_a_bound_that_holds():
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
 
 
-def test_parts_that_show_nothing_new_are_not_begun(without_cuts):
-    packing = random_packing(3)
+def test_parts_that_show_nothing_new_are_not_begun():
+    packing = random_packing(149)
     every = sorted(packing.weights[one].sum() for one in solutions(packing))
     ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
     while not ranking._split():

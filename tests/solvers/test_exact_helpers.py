@@ -1,38 +1,37 @@
 """When `exact` lets metaheuristics help its branching."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from assoc import assign
 from assoc.costs import build_problem
-from assoc.packing.branching.counts import Splitting
-from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components import closing
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.components.component import split_components
 from assoc.packing.components.turns import Turns
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.exact import search as exact
 from experiments.common.instances.scenes import ghost
 
 
-@pytest.mark.parametrize("alone", [3, 10**9])
-def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
+@pytest.mark.parametrize(("age", "joins"), [(0, False), (exact._ALONE - 1, True)])
+def test_they_join_a_long_search_of_a_small_component(age, joins):
     """After so many turns of branching, and not before; the optimum is the same."""
-    joined = []
-    usual = exact._Task._search_better
-
-    def noted(task):
-        joined.append(task.age)
-        usual(task)
-
-    monkeypatch.setattr(exact, "_ALONE", alone)
-    # not split on counts: then it is over at once
-    monkeypatch.setattr(closing, "BranchAndBound", partial(BranchAndBound, splitting=Splitting(10**9)))
-    monkeypatch.setattr(exact._Task, "_search_better", noted)
-    solution = assign(build_problem(ghost(20, 2018), 0), "exact")
-    assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
-    assert bool(joined) == (alone == 3) and all(age >= alone for age in joined)
+    prepared = prepare(build_problem(ghost(20, 2018), 0))
+    packing, run = prepared.packing, Run(0)
+    components = split_components(packing, dual_bound(packing), np.arange(packing.num_columns))
+    searches = exact._Searches(run=run, node_limit=10**6, patience=10)
+    weight, most = prepared.offset, 0
+    for component in components:
+        component.run = run
+        component.offer_greedy()
+        task = exact._Task(component, searches, age=age)
+        while not component.closed and not task.turn():
+            pass
+        assert component.weight - component.lower_bound <= 1e-6
+        weight += component.weight
+        most = max(most, task.improvements)
+    assert weight == pytest.approx(-315.9909, abs=1e-4) and (most > 0) == joins
 
 
 @pytest.mark.slow
