@@ -30,7 +30,7 @@ def find(file: str, quantity: str) -> Claim:
         return results[quantity]
     found = results.starting(quantity)
     if len(found) > 1:
-        raise KeyError(f"{quantity!r} begins {len(found)} claims of {results.name}")
+        raise KeyError(f"{quantity!r} begins {len(found)} claims of {results.path}")
     return found[0]
 
 
