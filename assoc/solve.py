@@ -135,7 +135,8 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     scans: list[ScanAssociation] = []
     failed: LostError | LimitExceededError | None = None
     # other processes do not receive the request to end: their scans are abandoned
-    with _EARLY_END.work(0.0 if jobs > 1 or given["scheduler"] else _LAST_SCAN), _written(given, sources) as write:
+    patience = 0.0 if jobs > 1 or given["scheduler"] else _LAST_SCAN
+    with _written(given, sources) as write, _EARLY_END.work(patience):
         try:
             for (number, _), scan in zip(items, _until_asked(watched), strict=False):
                 log.end(scan)
