@@ -76,6 +76,42 @@ def test_what_is_finished_is_written(work, number, word):
     assert "interrupted" in (work / "o.csv").read_text()
 
 
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+def test_an_interrupt_does_not_reach_the_writing(work):
+    """A disk that takes two seconds; there is no patience with what loads kernels."""
+    slow = """
+import os
+from assoc._system.compile_time import loading
+
+sync = os.fsync
+
+def nap(seconds):
+    while seconds > 0:
+        time.sleep(0.05)
+        seconds -= 0.05
+
+def fsync(handle):
+    nap(2)
+    sync(handle)
+
+os.fsync = fsync
+
+def solve(packing, parameters, run):
+    solve.calls += 1
+    print("scan", solve.calls, flush=True)
+    if solve.calls > 2:
+        with loading():
+            nap(60)
+"""
+    start, _, end = ASLEEP.partition("def solve")
+    rest = end[end.index("    return") :]
+    (work / "asleep.py").write_text(start + slow + rest)
+    words = ["solve", "scene.npz", "--import", "asleep", "--solver", "asleep", "--lines", "o.jsonl"]
+    code, _, errors = interrupted(words, work, "scan 3")
+    assert (code, errors) == (130, "assoc.solve: interrupted; 2 of 5 scans are finished and written\n")
+    assert len((work / "o.jsonl").read_text().splitlines()) == 2
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
 def test_it_ends_though_a_thread_does_not(work):
