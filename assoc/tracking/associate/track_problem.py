@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assoc._system.door import door
+from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks.scores import existence_gain, score_terms
@@ -75,33 +76,14 @@ def track_problem(
     D. Musicki, R. Evans, Joint integrated probabilistic data association: JIPDA, IEEE Trans. Aerospace and Electronic
     Systems 40, 2004.
     """
-    mean = getattr(states, "mean", None)
-    if (
-        not isinstance(mean, np.ndarray)
-        or mean.shape[1:] != (filter.motion.dim,)
-        or (isinstance(filter, InteractingMultipleModel) is not isinstance(states, Mixture))
-    ):
-        raise InvalidInputError(f"states: expected states of {filter.motion.dim} components as the filter makes them")
-    if not len(sensors):
-        raise InvalidInputError("sensors: expected at least one")
-    for s, sensor in enumerate(sensors):
-        if sensor.platform is not None:
-            raise InvalidInputError(f"sensors: number {s + 1} is on a platform, expected one that stands at a position")
+    _check_states(filter, states)
     chance = numbers(existence, "existence")
     if chance.shape not in ((), (1,), (len(states),)):
         raise InvalidInputError(f"existence: expected one number, or one for each of {len(states)} tracks, "
                                 f"got shape {chance.shape}")  # fmt: skip
     if not ((chance > 0.0) & (chance <= 1.0)).all():
         raise InvalidInputError("existence: expected probabilities above 0 and at most 1")
-    if len(sensors) != len(measurements):
-        raise InvalidInputError(f"measurements: expected those of {len(sensors)} sensors, got {len(measurements)}")
-    scan = []
-    for s, (sensor, own) in enumerate(zip(sensors, measurements, strict=True)):
-        z = numbers(own, f"measurements of sensor {s + 1}")
-        scan.append(z.reshape(0, sensor.dim) if z.size == 0 else z)
-        if scan[-1].ndim != 2 or scan[-1].shape[1] != sensor.dim or not np.isfinite(scan[-1]).all():
-            raise InvalidInputError(f"measurements of sensor {s + 1}: expected finite numbers of shape "
-                                    f"(n, {sensor.dim}), got shape {z.shape}")  # fmt: skip
+    scan = _checked_scan(sensors, measurements)
     terms = score_terms(sensors)
     missed = log_missed(terms.miss, Views(sensors, filter.motion.position).shares(states))
     tuples = grow_track_tuples(
@@ -113,3 +95,32 @@ def track_problem(
     gain = existence_gain(odds[tuples.track], -tuples.costs, np.asarray(tuples.rows.any(axis=1)))
     sizes = [len(states), *(len(z) for z in scan)]
     return AssignmentProblem(np.column_stack([tuples.track + 1, tuples.rows]), -gain, sizes)
+
+
+def _check_states(filter: Filter[Any], states: Any) -> None:
+    mean = getattr(states, "mean", None)
+    if (
+        not isinstance(mean, np.ndarray)
+        or mean.shape[1:] != (filter.motion.dim,)
+        or (isinstance(filter, InteractingMultipleModel) is not isinstance(states, Mixture))
+    ):
+        raise InvalidInputError(f"states: expected states of {filter.motion.dim} components as the filter makes them")
+
+
+def _checked_scan(sensors: Sequence[Sensor], measurements: Sequence[ArrayLike]) -> list[Array]:
+    """The measurements of sensors that stand, (n_s, d_s)."""
+    if not len(sensors):
+        raise InvalidInputError("sensors: expected at least one")
+    for s, sensor in enumerate(sensors):
+        if sensor.platform is not None:
+            raise InvalidInputError(f"sensors: number {s + 1} is on a platform, expected one that stands at a position")
+    if len(sensors) != len(measurements):
+        raise InvalidInputError(f"measurements: expected those of {len(sensors)} sensors, got {len(measurements)}")
+    scan: list[Array] = []
+    for s, (sensor, values) in enumerate(zip(sensors, measurements, strict=True)):
+        z = numbers(values, f"measurements of sensor {s + 1}")
+        scan.append(z.reshape(0, sensor.dim) if z.size == 0 else z)
+        if scan[-1].ndim != 2 or scan[-1].shape[1] != sensor.dim or not np.isfinite(scan[-1]).all():
+            raise InvalidInputError(f"measurements of sensor {s + 1}: expected finite numbers of shape "
+                                    f"(n, {sensor.dim}), got shape {z.shape}")  # fmt: skip
+    return scan
