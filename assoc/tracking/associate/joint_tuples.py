@@ -35,23 +35,10 @@ _SURE = 30.0
 """Scores are clipped here, as those of the tracker that takes sensor by sensor."""
 _COUNTS = 1e-5
 """Share below which a tuple does not count in a track's state."""
-
-
 _FREE = 0.5
 """A measurement with a lower probability to be a track's may start one."""
 _New = tuple[TrackBatch, Array]
 """New tracks and their measurements, (K, S)."""
-
-
-class PairSums(NamedTuple):
-    """Of one sensor's measurements: the fields of `PairProbabilities`."""
-
-    track_id: Array
-    measurement: Array
-    probability: Array
-    lower: Array
-    upper: Array
-    share: Array
 
 
 class _Joint(NamedTuple):
@@ -65,8 +52,8 @@ class _Joint(NamedTuple):
     """Log odds of existence, (T,)."""
     hit: Array
     """Whether the track was detected with probability above 0.5, bool (T,)."""
-    pairs: tuple[PairSums, ...]
-    """Of each sensor."""
+    pairs: tuple[tuple[Array, ...], ...]
+    """The fields of `PairProbabilities` of each sensor, in their order."""
     owner: list[Array]
     """Row of the track that has more than half of each measurement, -1: none."""
     taken: list[Array]
@@ -74,7 +61,7 @@ class _Joint(NamedTuple):
 
 
 def at_once(progress: Progress, permutations: str, max_events: int) -> Association:
-    """Associate a scan of one instant; `own` are the `PairSums` of each sensor."""
+    """Associate a scan of one instant; `own` are the fields of each sensor's `PairProbabilities`."""
     settings, scan, tracks = progress.settings, progress.scan, progress.state.tracks
     missed = misses(progress, tracks.states)
     track, rows, costs = grow_track_tuples(
@@ -136,7 +123,7 @@ def _joint(progress: Progress, track: Array, rows: Array, gain: Array, permutati
         key, number = np.unique(track[here] * (size + 1) + rows[here, s], return_inverse=True)
         one, measurement = key // (size + 1), key % (size + 1) - 1
         sums = [np.bincount(number, values[here], len(key)) for values in (estimate, lower, upper, share)]
-        pairs.append(PairSums(tracks.track_id[one], measurement, *(np.minimum(each, 1.0) for each in sums)))
+        pairs.append((tracks.track_id[one], measurement, *(np.minimum(each, 1.0) for each in sums)))
         likely = sums[3] > 0.5
         owner.append(np.full(size, -1))
         owner[-1][measurement[likely]] = one[likely]
