@@ -235,7 +235,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Build the sdist and the wheels, and try them.")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="where to put them")
     dist = parser.parse_args().folder.absolute()
-    with tempfile.TemporaryDirectory(prefix="assoc-dist-") as name:
+    # a program that has ended lets its helper finish a kernel, which may be written while the folder is removed
+    with tempfile.TemporaryDirectory(prefix="assoc-dist-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         try:
             done = build(dist)
