@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.imm import Mixture
@@ -25,29 +26,34 @@ def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
             f"filter: states of the kind {type(states).__name__} cannot be merged; use a Kalman filter, extended or "
             "unscented, or interacting multiple models"
         )
-    # sorted by target, for sums over stretches
-    order = np.argsort(target, kind="stable")
-    states, target, weights = states[order], target[order], weights[order]
-    begin = np.searchsorted(target, np.arange(count))
     if isinstance(states, Gaussian):
-        return gaussian(*_matched(states.mean, states.covariance, target, weights, begin))
-    modes = states.weights.shape[1]
+        means, covariances = _matched(states.mean[:, None], states.covariance[:, None], weights[:, None], target, count)
+        return gaussian(means[:, 0], covariances[:, 0])
     each = weights[:, None] * states.weights
-    total = _sums(each, begin)
+    total = np.stack([np.bincount(target, column, count) for column in each.T], axis=1)
     # models of weight zero are merged as well
     share = np.where(total[target] > 0.0, each / np.maximum(total[target], 1e-300), weights[:, None])
-    parts = [_matched(states.means[:, j], states.covariances[:, j], target, share[:, j], begin) for j in range(modes)]
-    means, covariances = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
+    means, covariances = _matched(states.means, states.covariances, share, target, count)
     return Mixture(means, covariances, total / total.sum(axis=1, keepdims=True))
 
 
-def _matched(mean: Array, covariance: Array, target: Array, weights: Array, begin: Array) -> tuple[Array, Array]:
-    whole = _sums(weights[:, None] * mean, begin)
-    away = mean - whole[target]
-    spread = covariance + away[:, :, None] * away[:, None, :]
-    return whole, _sums(weights[:, None, None] * spread, begin)
-
-
-def _sums(values: Array, begin: Array) -> Array:
-    """Sums of the stretches that begin there."""
-    return np.asarray(np.add.reduceat(values, begin, axis=0)) if len(begin) else values[:0]
+@njit
+def _matched(means: Array, covariances: Array, shares: Array, target: Array, count: int) -> tuple[Array, Array]:
+    """Means (B, m, n) and covariances (B, m, n, n) of states (K, m, ...) with these shares (K, m) of their targets."""
+    K, m, n = means.shape
+    whole, spread = np.zeros((count, m, n)), np.zeros((count, m, n, n))
+    for k in range(K):
+        for j in range(m):
+            for a in range(n):
+                whole[target[k], j, a] += shares[k, j] * means[k, j, a]
+    away = np.empty(n)
+    for k in range(K):
+        b = target[k]
+        for j in range(m):
+            share = shares[k, j]
+            for a in range(n):
+                away[a] = means[k, j, a] - whole[b, j, a]
+            for a in range(n):
+                for e in range(n):
+                    spread[b, j, a, e] += share * (covariances[k, j, a, e] + away[a] * away[e])
+    return whole, spread

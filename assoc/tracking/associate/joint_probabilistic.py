@@ -38,7 +38,7 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan
 from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import concatenate
+from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.pairs.permutations import without_permutations
@@ -261,7 +261,7 @@ def _take_in(
     row = np.concatenate([np.searchsorted(old, pairs.track[used]), np.arange(len(old))])
     weights = np.concatenate([weight[used], stays[old]])
     states = merged(concatenate([pairs.correct(used), tracks.states[old]]), row, weights, len(old))
-    states = concatenate([states, tracks.states[same]])[np.argsort(np.concatenate([old, same]))]
+    states = placed(len(tracks), [(old, states), (same, tracks.states[same])])
     hit = update.detected > 0.5
     return tracks.scored(states, update.odds - tracks.existence, np.where(hit, time, np.nan)), hit
 
