@@ -31,7 +31,7 @@ from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.graph import PairGraph
 from assoc.ranking.sweep import cluster
 
-_ROUNDS, _SETTLED = 400, 1e-10
+_ROUNDS, _SETTLED = 400, 1e-6
 """Belief propagation ends after so many messages of each vertex of a cluster, or when they change by less than this."""
 _FAINT = 1e-290
 """Sums relative to their largest term below this have lost digits."""
