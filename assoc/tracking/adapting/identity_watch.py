@@ -231,8 +231,8 @@ class _Hearing:
 
     def hear(self, track: int, column: int, sensor: str, time: float, number: int) -> None:
         """Take in what a sensor says of a confirmed track; 0: of something else."""
-        heard = self._numbers.get((column, number), Heard(time, self._scan, ()))
-        carriers = heard.carriers
+        heard = self._numbers.get((column, number))
+        carriers = () if heard is None else heard.carriers
         alone = len(carriers) == 1 and carriers[0][0] == track
         others = () if alone else tuple(one for one in carriers if one[0] != track)
         if track:
@@ -313,8 +313,9 @@ class _Hearing:
     def _compare_sensors(self, key: tuple[int, int, str], voice: Voice) -> None:
         """Do two sensors say different numbers of a track?"""
         track, column, sensor = key
-        for other, theirs in self._of(track, column).items():
-            if theirs.said == voice.said or not _at_once(voice, theirs):
+        for other in self._names:
+            theirs = self._voices.get((track, column, other))
+            if theirs is None or theirs.said == voice.said or not _at_once(voice, theirs):
                 continue
             since, pairs = min(voice.begin, theirs.begin), sorted([(voice.said, sensor), (theirs.said, other)])
             # what another track has is a matter of the two tracks
