@@ -111,9 +111,9 @@ class Run:
         """Seconds left for a search; infinite without a time limit."""
         return np.inf if self.time_limit is None else self.time_limit - self.reserve - self.runtime()
 
-    def deadline(self) -> float:
-        """The time limit for kernels, in seconds of `time.monotonic` (clock.py); infinite without one."""
-        return np.inf if self.time_limit is None else time.monotonic() + self.remaining()
+    def deadline(self, share: float = 1.0) -> float:
+        """The end of a share of the time left, for kernels, in seconds of `time.monotonic`; infinite: no limit."""
+        return np.inf if self.time_limit is None else time.monotonic() + share * self.remaining()
 
     def should_stop(self) -> bool:
         """Whether time is over, or the callback or the user asked to stop; sets ``stopped_by``."""

@@ -194,6 +194,25 @@ def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
     assert not component(ghosts(), "full").dives
 
 
+@pytest.mark.parametrize("over", [1, 2])
+def test_a_program_that_takes_too_long_is_given_up(over):
+    """It is tried again where something else took the time; without it, covers are random and dives end."""
+    one = component(ghosts(), "full")
+    ends, shares = [-1.0] * over + [np.inf] * 5, []
+    left = SimpleNamespace(
+        remaining=lambda: 1.0,
+        deadline=lambda share=1.0: np.inf if share == 1.0 else shares.append(share) or ends.pop(0),
+    )
+    one.run = left
+    rng = np.random.default_rng(0)
+    owner = one.dive(0, rng)
+    cover_of(one.packing, columns_of(owner))
+    assert shares == [0.25] * 2
+    assert one.dives is (over == 1)
+    one.dive(1, rng)
+    assert len(shares) == 2
+
+
 def test_the_colony_dives(monkeypatch):
     """The number of divers in a cycle, of several strictnesses; also zero."""
     called = []

@@ -26,6 +26,8 @@ Owner = NDArray[np.int32]
 
 # cluster searches between two checks of the gap and of the clock
 _AT_ONCE = 10
+# share of the time left in which the first linear program of dives must be solved, or there are no dives
+_FOR_PROGRAM = 0.25
 
 
 @dataclass(slots=True)
@@ -153,17 +155,35 @@ class Component(Priced):
     def dive(self, number: int, rng: np.random.Generator, trail: Floats | None = None, beta: float = 1.0) -> Owner:
         """Return a cover built in the linear program (`Diver.dive`) and completed by insertion.
 
-        The strictness varies with ``number``. ``trail`` is tau_j^alpha of each column.
+        The strictness varies with ``number``. ``trail`` is tau_j^alpha of each column. Where the program itself takes
+        too much of the time left, the cover is a `random_cover`, and no further dives are made.
         """
+        strictness = beta * 2.0 ** (2 + number % 4)
+        if self._diver is None and self._may_dive:
+            self._diver = self._new_diver()
+            self._may_dive = self._diver is not None
         if self._diver is None:
-            known = np.zeros(0, dtype=np.int64) if self.best is None else self.best_columns()
-            self._diver = Diver(self, known, self.deadline)
+            return self.random_cover(strictness, rng)
         if trail is None:
             trail = np.ones(self.packing.num_columns)
-        strictness = beta * 2.0 ** (2 + number % 4)
         owner = self._diver.dive(trail, strictness, rng, self.weight - self.tolerance, self.deadline)
         insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
         return owner
+
+    def _new_diver(self) -> Diver | None:
+        """A diver with its first program solved, or None if that takes too much of the time left."""
+        known = np.zeros(0, dtype=np.int64) if self.best is None else self.best_columns()
+        if self.run is None:
+            return Diver(self, known, np.inf)
+        for _ in range(2):
+            left = self.run.remaining()
+            diver = Diver(self, known, self.run.deadline(_FOR_PROGRAM))
+            if diver.in_time:
+                return diver
+            # once more if kernels were loaded meanwhile, which is not the program's time
+            if left - self.run.remaining() > 0.5 * _FOR_PROGRAM * left:
+                break
+        return None
 
     def improve(self, owner: Owner, rng: np.random.Generator, clusters: int) -> float:
         """Improve a new cover in place; return its weight."""

@@ -88,6 +88,8 @@ class Diver:
         self._program = LinearProgram.extended(self._core, root.program, root.slack, basis)
         self._relaxed = self._program.solve(deadline=deadline)
         self._program.mark()
+        self.in_time: bool = self._relaxed.status == OPTIMAL or not is_over(deadline)
+        """Whether the program was solved before the deadline."""
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
