@@ -77,7 +77,7 @@ def crowds(quick: bool) -> list[Claim]:
 
 def processes(quick: bool) -> list[Claim]:
     """The same scans by one process and by two."""
-    rows = {jobs: alone(one_scan.solved, jobs, 50 if quick else 1_000) for jobs in (1, 2)}
+    rows = {jobs: alone(one_scan.solved, jobs, 50 if quick else 10_000) for jobs in (1, 2)}
     claims = [claim for jobs, row in rows.items() for claim in _claims(f"processes, {jobs}", row)]
     return [*claims, Claim("processes: one / two, wall", "", ours=rows[1]["wall"] / rows[2]["wall"])]
 
