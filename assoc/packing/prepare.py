@@ -112,14 +112,23 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
 
 def _dearest_need(problem: AssignmentProblem) -> float:
     """The largest, over the measurements that must be used, of the least cost of a tuple with it; at least 0."""
-    largest = 0.0
-    for s, size in enumerate(problem.sizes.tolist()):
-        if problem.dummy or size == problem.sizes.min():
-            least = np.full(size, np.inf)
-            there = problem.tuples[:, s] > 0
-            np.minimum.at(least, problem.tuples[there, s] - 1, problem.costs[there])
-            largest = max(largest, float(least.max(initial=0.0)))
-    return largest
+    sizes = problem.sizes.astype(np.int64)
+    must = np.repeat(problem.dummy | (sizes == sizes.min()), sizes)
+    least = np.full(must.size, np.inf)
+    _lower_to_least(problem.tuples, problem.costs, sizes.cumsum() - sizes, least)
+    return float(least[must].max(initial=0.0))
+
+
+@njit
+def _lower_to_least(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], least: NDArray[np.float64]
+) -> None:
+    """Lower each row's value to the least cost of a tuple that has it."""
+    for k in range(costs.size):
+        for s in range(offsets.size):
+            if tuples[k, s] > 0:
+                r = offsets[s] + tuples[k, s] - 1
+                least[r] = min(least[r], costs[k])
 
 
 def prepare(problem: AssignmentProblem) -> Prepared:

@@ -16,6 +16,7 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
+from assoc.packing.kernels.columns import first_row
 from assoc.packing.prepare import Prepared, PreparedArrays
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
@@ -149,9 +150,8 @@ def as_tuples(
 def _cheapest_copy(costs: Floats, prepared: PreparedArrays, j: int) -> int:
     """The cheapest column with the same rows as column j."""
     cols, origin, row_ptr, row_cols = prepared.cols, prepared.origin, prepared.row_ptr, prepared.row_cols
-    r = -1
-    for s in range(cols.shape[1]):
-        r = max(r, cols[j, s])
+    # its first row: in the usual order of tuples the columns of this one are side by side
+    r = first_row(cols, j)
     best = j
     for at in range(row_ptr[r], row_ptr[r + 1]):
         k = row_cols[at]
