@@ -59,7 +59,7 @@ class _Graph(NamedTuple):
     log_weight: Floats
     row_ptr: Ints
     row_cols: Ints
-    place: Ints
+    number: Ints
 
 
 class _Tables(NamedTuple):
@@ -72,7 +72,7 @@ class _Tables(NamedTuple):
     column: Ints
     bits: Ints
     weight: Floats
-    own: Floats
+    inner: Floats
     """Weight of those within the block, else 0."""
 
 
@@ -184,18 +184,18 @@ def _bound_alone(graph: _Graph, widest: int, deadline: float, upper: Floats) -> 
         if size <= widest:
             most, rows = max(most, count), max(rows, size)
     tables = _new_tables(rows, most)
-    own, prices = np.empty(graph.cols.shape[1], np.int64), np.full(graph.place.size, np.inf)
+    block, prices = np.empty(graph.cols.shape[1], np.int64), np.full(graph.number.size, np.inf)
     for j in range(graph.log_weight.size):
         if is_over(deadline):
             return
         count = 0
         for r in graph.cols[j]:
             if r >= 0:
-                own[count] = r
+                block[count] = r
                 count += 1
         if count > widest:
             continue
-        _summed(graph, own[:count], prices, tables)
+        _summed(graph, block[:count], prices, tables)
         upper[j] = min(upper[j], math.exp(graph.log_weight[j]) / tables.inside[(1 << count) - 1])
 
 
@@ -219,22 +219,22 @@ def _bound_blocks(
         for b in range(ptr.size - 1):
             if is_over(deadline):
                 return False
-            own = rows[ptr[b] : ptr[b + 1]]
-            _summed(graph, own, prices, tables)
-            _limited(own.size, tables)
-            now = prices[own]
+            block = rows[ptr[b] : ptr[b + 1]]
+            _summed(graph, block, prices, tables)
+            _limited(block.size, tables)
+            now = prices[block]
             if _lowered(now, tables.limit, totals):
                 valid = False
             if turn < _PASSES and _raised(now, tables.limit, totals):
                 valid = False
-            prices[own] = now
+            prices[block] = now
         if valid:
             break
     if valid:
         for b in range(ptr.size - 1):
-            own = rows[ptr[b] : ptr[b + 1]]
-            _summed(graph, own, prices, tables)
-            _narrowed(graph, own, tables, lower, upper)
+            block = rows[ptr[b] : ptr[b + 1]]
+            _summed(graph, block, prices, tables)
+            _narrowed(graph, block, tables, lower, upper)
     return valid
 
 
@@ -243,25 +243,25 @@ def _new_tables(rows: int, entries: int) -> _Tables:
     """Allocate tables for blocks of this size."""
     size = 1 << rows
     ptr, column, bits = np.empty(rows + 1, np.int64), np.empty(entries, np.int64), np.empty(entries, np.int64)
-    weight, own = np.empty(entries), np.empty(entries)
-    return _Tables(np.empty(size), np.empty(size), np.empty(size), ptr, column, bits, weight, own)
+    weight, inner = np.empty(entries), np.empty(entries)
+    return _Tables(np.empty(size), np.empty(size), np.empty(size), ptr, column, bits, weight, inner)
 
 
 @inner_njit
-def _summed(graph: _Graph, own: Ints, prices: Floats, tables: _Tables) -> None:
+def _summed(graph: _Graph, block: Ints, prices: Floats, tables: _Tables) -> None:
     """Fill in F and I of all subsets of a block."""
-    place, count = graph.place, 0
-    for i in range(own.size):
-        place[own[i]] = i
-    for i in range(own.size):
+    number, count = graph.number, 0
+    for i in range(block.size):
+        number[block[i]] = i
+    for i in range(block.size):
         tables.ptr[i] = count
-        for x in range(graph.row_ptr[own[i]], graph.row_ptr[own[i] + 1]):
+        for x in range(graph.row_ptr[block[i]], graph.row_ptr[block[i] + 1]):
             j = graph.row_cols[x]
             bits, outside, crosses, first = np.int64(0), 0.0, False, True
             for r in graph.cols[j]:
-                if r >= 0 and place[r] >= 0:
-                    bits |= np.int64(1) << place[r]
-                    first = first and place[r] >= i
+                if r >= 0 and number[r] >= 0:
+                    bits |= np.int64(1) << number[r]
+                    first = first and number[r] >= i
                 elif r >= 0:
                     outside += prices[r]
                     crosses = True
@@ -269,24 +269,24 @@ def _summed(graph: _Graph, own: Ints, prices: Floats, tables: _Tables) -> None:
             # one that underflows adds nothing that counts, and would make no number of a sum that has overflowed
             if first and weight > 0.0:
                 tables.column[count], tables.bits[count] = j, bits
-                tables.weight[count], tables.own[count] = weight, 0.0 if crosses else weight
+                tables.weight[count], tables.inner[count] = weight, 0.0 if crosses else weight
                 count += 1
-    tables.ptr[own.size] = count
-    for r in own:
-        place[r] = -1
+    tables.ptr[block.size] = count
+    for r in block:
+        number[r] = -1
     relaxed, inside = tables.relaxed, tables.inside
     relaxed[0] = inside[0] = 1.0
-    for i in range(own.size - 1, -1, -1):
+    for i in range(block.size - 1, -1, -1):
         # subsets whose first row is i: those of the rows after it, which are done, with it
         bit = np.int64(1) << i
-        for after in range(np.int64(1) << (own.size - 1 - i)):
+        for after in range(np.int64(1) << (block.size - 1 - i)):
             subset = (after << (i + 1)) | bit
             total, within = relaxed[subset ^ bit], inside[subset ^ bit]
             for x in range(tables.ptr[i], tables.ptr[i + 1]):
                 if tables.bits[x] & ~subset == 0:
                     rest = subset & ~tables.bits[x]
                     total += tables.weight[x] * relaxed[rest]
-                    within += tables.own[x] * inside[rest]
+                    within += tables.inner[x] * inside[rest]
             relaxed[subset], inside[subset] = total, within
 
 
@@ -351,20 +351,20 @@ def _raised(prices: Floats, limit: Floats, totals: Floats) -> bool:
 
 
 @inner_njit
-def _narrowed(graph: _Graph, own: Ints, tables: _Tables, lower: Floats, upper: Floats) -> None:
+def _narrowed(graph: _Graph, block: Ints, tables: _Tables, lower: Floats, upper: Floats) -> None:
     """Narrow the bounds of the columns and rows of a block by (3)."""
-    full = (1 << own.size) - 1
+    full = (1 << block.size) - 1
     inside, relaxed = tables.inside[full], tables.relaxed[full]
     if not relaxed < np.inf:
         return
-    for x in range(own.size + tables.ptr[own.size]):
-        if x < own.size:
-            where, rest = graph.log_weight.size + own[x], full ^ (1 << x)
+    for x in range(block.size + tables.ptr[block.size]):
+        if x < block.size:
+            where, rest = graph.log_weight.size + block[x], full ^ (1 << x)
             least, most = tables.inside[rest], tables.relaxed[rest]
         else:
-            e = x - own.size
+            e = x - block.size
             where, rest = tables.column[e], full & ~tables.bits[e]
-            least, most = tables.own[e] * tables.inside[rest], tables.weight[e] * tables.relaxed[rest]
+            least, most = tables.inner[e] * tables.inside[rest], tables.weight[e] * tables.relaxed[rest]
         # differences of sums, less what they may have lost
         others = max(inside - least - _LOST * inside, 0.0)
         most_others = max(relaxed - most, 0.0) + _LOST * relaxed

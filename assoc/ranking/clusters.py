@@ -45,7 +45,7 @@ def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.i
     else:
         for column in tuples.T[::-1]:
             order = order[ascending_whole(column[order].astype(np.int64))]
-    new, index = _places(tuples, order)
+    new, index = _indices(tuples, order)
     return tuples[order[new]], index
 
 
@@ -72,11 +72,11 @@ def _as_numbers(tuples: Ints, sides: Ints) -> Any:
 
 
 @njit
-def _places(tuples: Ints, order: Ints) -> Any:
+def _indices(tuples: Ints, order: Ints) -> Any:
     """Mask of the sorted tuples that differ from the one before, and each tuple's index among the distinct ones."""
     num, num_sensors = tuples.shape
     new = np.ones(num, np.bool_)
-    place = np.empty(num, np.int64)
+    index = np.empty(num, np.int64)
     count = -1
     for i in range(num):
         j = order[i]
@@ -88,8 +88,8 @@ def _places(tuples: Ints, order: Ints) -> Any:
             new[i] = not same
         if new[i]:
             count += 1
-        place[j] = count
-    return new, place
+        index[j] = count
+    return new, index
 
 
 @njit
@@ -108,7 +108,7 @@ def _clusters(tuples: Ints, offsets: Ints, total: int) -> Any:
                     parent[max(root, first)] = min(root, first)
                     first = min(root, first)
     label = np.full(total, -1, np.int64)
-    own = np.empty(num, np.int64)
+    cluster = np.empty(num, np.int64)
     count = 0
     for j in range(num):
         for s in range(num_sensors):
@@ -117,16 +117,16 @@ def _clusters(tuples: Ints, offsets: Ints, total: int) -> Any:
                 if label[root] < 0:
                     label[root] = count
                     count += 1
-                own[j] = label[root]
+                cluster[j] = label[root]
                 break
     start = np.zeros(count + 1, np.int64)
     for j in range(num):
-        start[own[j] + 1] += 1
+        start[cluster[j] + 1] += 1
     for c in range(count):
         start[c + 1] += start[c]
-    place = start[:-1].copy()
+    index = start[:-1].copy()
     order = np.empty(num, np.int64)
     for j in range(num):
-        order[place[own[j]]] = j
-        place[own[j]] += 1
+        order[index[cluster[j]]] = j
+        index[cluster[j]] += 1
     return order, start

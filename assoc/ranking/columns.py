@@ -86,9 +86,9 @@ def price_all_columns(problem: AssignmentProblem, run: Run) -> AllColumns:
     rows, weights, origin = distinct_columns(problem)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
-    own = dual_bound(packing, run=run)
-    hard_pass(packing, own)
-    duals[packing.row_origin] = own
+    found = dual_bound(packing, run=run)
+    hard_pass(packing, found)
+    duals[packing.row_origin] = found
     return priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
 
 
@@ -172,9 +172,9 @@ def _distinct_columns(tuples: Ints, costs: Floats, offsets: Ints, single_cost: F
             mark ^= mark >> np.uint64(29)
         if dummy and measurements < 2:
             continue
-        place = np.int64(mark & np.uint64(size - 1))
-        while table[place] >= 0:
-            other = origin[table[place]]
+        at = np.int64(mark & np.uint64(size - 1))
+        while table[at] >= 0:
+            other = origin[table[at]]
             same = True
             for s in range(num_sensors):
                 if tuples[other, s] != tuples[j, s]:
@@ -182,13 +182,13 @@ def _distinct_columns(tuples: Ints, costs: Floats, offsets: Ints, single_cost: F
                     break
             if same:
                 break
-            place = (place + 1) & (size - 1)
-        if table[place] < 0:
-            table[place] = count
+            at = (at + 1) & (size - 1)
+        if table[at] < 0:
+            table[at] = count
             origin[count] = j
             count += 1
-        elif costs[j] < costs[origin[table[place]]]:
-            origin[table[place]] = j
+        elif costs[j] < costs[origin[table[at]]]:
+            origin[table[at]] = j
     rows = np.empty((count, num_sensors), np.int32)
     weights = np.empty(count)
     for n in range(count):

@@ -192,27 +192,27 @@ def _priced(work: Work, num: int) -> PricedColumns:
     """The columns of the current node with its multipliers, indexed by row."""
     cols, active = work.cols, work.node.active
     num_sensors = cols.shape[1]
-    own_cols = np.empty((num, num_sensors), np.int32)
+    active_cols = np.empty((num, num_sensors), np.int32)
     reduced = np.empty(num)
     row_ptr = np.zeros(work.trial.size + 1, np.int64)
     for a in range(num):
         reduced[a] = reduced_cost(work.program, work.duals, active[a])
         for s in range(num_sensors):
-            own_cols[a, s] = cols[active[a], s]
-            if own_cols[a, s] >= 0:
-                row_ptr[own_cols[a, s] + 1] += 1
+            active_cols[a, s] = cols[active[a], s]
+            if active_cols[a, s] >= 0:
+                row_ptr[active_cols[a, s] + 1] += 1
     for r in range(work.trial.size):
         row_ptr[r + 1] += row_ptr[r]
     row_cols = np.empty(row_ptr[-1], np.int32)
-    place = row_ptr[:-1].copy()
+    at = row_ptr[:-1].copy()
     for a in range(num):
         for s in range(num_sensors):
-            r = own_cols[a, s]
+            r = active_cols[a, s]
             if r >= 0:
-                row_cols[place[r]] = a
-                place[r] += 1
+                row_cols[at[r]] = a
+                at[r] += 1
     return PricedColumns(
-        own_cols, active[:num].copy(), work.weights, reduced, work.node.slack, work.duals, row_ptr, row_cols,
+        active_cols, active[:num].copy(), work.weights, reduced, work.node.slack, work.duals, row_ptr, row_cols,
         np.empty(num, np.int32),
     )  # fmt: skip
 
@@ -232,15 +232,15 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
             which, verdict = part_certain(program, cols, allowed, basis, trials, count, effort)
         if which >= 0:
             return (trials.pairs[which, 0], trials.pairs[which, 1]), verdict, True
-    one, two = any_open_pair(cols, allowed, work.trial)
-    if one < 0:
+    first, second = any_open_pair(cols, allowed, work.trial)
+    if first < 0:
         # columns share no rows: branch on whether one is used
         for j in allowed.active:
             for s in range(cols.shape[1]):
                 for t in range(s + 1, cols.shape[1]):
                     if cols[j, s] >= 0 and cols[j, t] >= 0 and (allowed.slack[cols[j, s]] or allowed.slack[cols[j, t]]):
-                        one, two = int(cols[j, s]), int(cols[j, t])
-    return (one, two), NEITHER, True
+                        first, second = int(cols[j, s]), int(cols[j, t])
+    return (first, second), NEITHER, True
 
 
 @njit
@@ -272,9 +272,9 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
         lower = max(lower, bound)
         if lower < cut:
             num = drop(work, num, bound, cut)
-            own = Wanted(wanted.k, wanted.limit, wanted.tolerance, budget, deadline)
+            wanted_here = Wanted(wanted.k, wanted.limit, wanted.tolerance, budget, deadline)
             budget = wanted.budget
-            steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, bound, own, True, store)
+            steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, bound, wanted_here, True, store)
             cut = min(cut_of(store, wanted), work.limit)
             if steps == NOT_COMPLETE and is_over(deadline):
                 # the node is unchanged on the stack; solutions it has listed already are recognised
@@ -332,28 +332,28 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
         base = 0.0
         for r in range(top, end):
             base += duals[r]
-        own_wanted = Wanted(wanted.k, base + room, wanted.tolerance, wanted.budget + end - top, wanted.deadline)
-        steps, store = enumerate_solutions(priced, top, end, base, own_wanted, False, new_store_inside(end - top))
+        wanted_here = Wanted(wanted.k, base + room, wanted.tolerance, wanted.budget + end - top, wanted.deadline)
+        steps, store = enumerate_solutions(priced, top, end, base, wanted_here, False, new_store_inside(end - top))
         if steps != NOT_COMPLETE:
-            proven[c] = cut_of(store, own_wanted)
-            own, chosen = _sorted_store(store)
-            if own.size:
+            proven[c] = cut_of(store, wanted_here)
+            lightest, chosen = _sorted_store(store)
+            if lightest.size:
                 # the excess that this component needs is not available to the others
-                room -= own[0] - base
-            for i in range(own.size):
+                room -= lightest[0] - base
+            for i in range(lightest.size):
                 if count == weights.size:
                     weights = np.concatenate((weights, np.empty(count)))
                     pointer = np.concatenate((pointer, np.empty(count, np.int64)))
-                weights[count] = own[i]
-                place = pointer[count]
-                if place + chosen.shape[1] > columns.size:
+                weights[count] = lightest[i]
+                at = pointer[count]
+                if at + chosen.shape[1] > columns.size:
                     columns = np.concatenate((columns, np.empty(columns.size + chosen.shape[1], np.int32)))
                 for t in range(chosen.shape[1]):
                     if chosen[i, t] < 0:
                         break
-                    columns[place] = chosen[i, t]
-                    place += 1
+                    columns[at] = chosen[i, t]
+                    at += 1
                 count += 1
-                pointer[count] = place
+                pointer[count] = at
         start[c + 1] = count
     return start, weights[:count].copy(), pointer[: count + 1].copy(), columns, proven

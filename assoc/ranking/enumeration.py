@@ -114,14 +114,14 @@ def _keep(store: Store, k: int, weight: float, columns: Ints, count: int, check:
     mark = np.uint64(0)
     for t in range(count):
         mark ^= _mark(columns[t])
-    own = np.sort(columns[:count])
+    ordered = np.sort(columns[:count])
     if check:
         for i in range(store.num[0]):
             at = store.slot[i]
             if store.marks[at] == mark and store.columns[at, count] < 0:
                 same = True
                 for t in range(count):
-                    if store.columns[at, t] != own[t]:
+                    if store.columns[at, t] != ordered[t]:
                         same = False
                         break
                 if same:
@@ -140,7 +140,7 @@ def _keep(store: Store, k: int, weight: float, columns: Ints, count: int, check:
         push(store.key, store.slot, k - 1, -weight, at)
     store.marks[at] = mark
     for t in range(count):
-        store.columns[at, t] = own[t]
+        store.columns[at, t] = ordered[t]
     store.columns[at, count] = -1
     return store
 
@@ -161,17 +161,7 @@ def enumerate_solutions(
     for r in range(top, end):
         if is_over(deadline):
             return NOT_COMPLETE, store
-        if row_ptr[r + 1] - row_ptr[r] > _LONG:
-            _sort_row(reduced, row_cols[row_ptr[r] : row_ptr[r + 1]])
-            continue
-        # insertion sort: the lists are short
-        for x in range(row_ptr[r] + 1, row_ptr[r + 1]):
-            a = row_cols[x]
-            y = x
-            while y > row_ptr[r] and reduced[row_cols[y - 1]] > reduced[a]:
-                row_cols[y] = row_cols[y - 1]
-                y -= 1
-            row_cols[y] = a
+        _sort_row(reduced, row_cols[row_ptr[r] : row_ptr[r + 1]])
     done = np.zeros(num_rows, np.bool_)
     # how many of a column's rows are decided: it can be taken while this is 0
     for x in range(row_ptr[top], row_ptr[end]):
@@ -193,9 +183,7 @@ def enumerate_solutions(
             row, choices = _next_row(priced, top, end, done, cut - spent[depth])
             if row < 0 or choices == 0:
                 if row < 0 and spent[depth] < cut:
-                    weight = 0.0
-                    for t in range(count):
-                        weight += weights[chosen[t]]
+                    weight = _weight(weights, chosen[:count])
                     if weight < cut:
                         store = _keep(store, k, weight, chosen, count, check)
                         cut = cut_of(store, wanted)
@@ -211,10 +199,10 @@ def enumerate_solutions(
             count -= _decide(priced, top, row_at[depth], taken[depth], done, False)
         row = row_at[depth]
         room = cut - spent[depth]
-        place = cursor[depth]
-        while place < row_ptr[row + 1] and blocked[row_cols[place]] > 0:
-            place += 1
-        cost = max(reduced[row_cols[place]], 0.0) if place < row_ptr[row + 1] else np.inf
+        x = cursor[depth]
+        while x < row_ptr[row + 1] and blocked[row_cols[x]] > 0:
+            x += 1
+        cost = max(reduced[row_cols[x]], 0.0) if x < row_ptr[row + 1] else np.inf
         alone = max(-duals[row], 0.0) if slack_left[depth] else np.inf
         if min(cost, alone) >= room:
             forward = False
@@ -225,10 +213,10 @@ def enumerate_solutions(
             taken[depth] = _ALONE
             cost = alone
         else:
-            taken[depth] = row_cols[place]
+            taken[depth] = row_cols[x]
             chosen[count] = names[taken[depth]]
-            place += 1
-        cursor[depth] = place
+            x += 1
+        cursor[depth] = x
         count += _decide(priced, top, row, taken[depth], done, True)
         spent[depth + 1] = spent[depth] + cost
         depth += 1
@@ -239,15 +227,33 @@ def enumerate_solutions(
 
 
 @inner_njit
-def _sort_row(reduced: Floats, own: Ints) -> None:
-    """Sort columns by reduced cost, in place; stable."""
+def _weight(weights: Floats, columns: Ints) -> float:
+    total = 0.0
+    for j in columns:
+        total += weights[j]
+    return total
+
+
+@inner_njit
+def _sort_row(reduced: Floats, columns: Ints) -> None:
+    """Sort columns by reduced cost; stable."""
+    if columns.size <= _LONG:
+        # insertion sort: most lists are short
+        for x in range(1, columns.size):
+            a = columns[x]
+            y = x
+            while y > 0 and reduced[columns[y - 1]] > reduced[a]:
+                columns[y] = columns[y - 1]
+                y -= 1
+            columns[y] = a
+        return
     ordered = True
-    for x in range(1, own.size):
-        if reduced[own[x - 1]] > reduced[own[x]]:
+    for x in range(1, columns.size):
+        if reduced[columns[x - 1]] > reduced[columns[x]]:
             ordered = False
             break
     if not ordered:
-        copy_to(own, own[order_of(reduced[own])])
+        copy_to(columns, columns[order_of(reduced[columns])])
 
 
 @inner_njit

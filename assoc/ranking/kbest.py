@@ -145,7 +145,7 @@ def rank(
     if not found.chosen:
         rest = max(rest, ahead.bound + columns.offset - _rounding(columns, prepared, ahead.bound))
         return Ranking([_unproved(problem, rest, k, run, columns, found.known)], rest, columns)
-    answers = _in_order(problem, [columns.indices(own) for own in found.chosen])
+    answers = _in_order(problem, [columns.indices(chosen) for chosen in found.chosen])
     runtime, compile_time = run.runtime(), run.compile_time()
     solutions = [
         Solution(
@@ -224,7 +224,7 @@ def _unproved(
         ((cost, indices),) = _in_order(problem, [columns.indices(known)])
         solution = Solution(problem.tuples[indices], indices, cost, min(bound, cost), "kbest", 0, 0.0)
         with contextlib.suppress(InfeasibleError):
-            solution = min(solution, quick(problem, bound, run), key=lambda one: one.cost)
+            solution = min(solution, quick(problem, bound, run), key=lambda answer: answer.cost)
     return replace(
         solution,
         solver="kbest",

@@ -41,7 +41,7 @@ def merge(start: Ints, weights: Floats, k: int) -> Any:
         result = np.empty(room)
         heap = np.empty(total.size)
         item = np.empty(total.size, np.int64)
-        place = np.zeros(total.size, np.int64)
+        index = np.zeros(total.size, np.int64)
         size = 0
         # combination t of the lists before enters once t - 1 has been used with this list's first solution
         push(heap, item, size, total[0] + weights[first], 0)
@@ -53,13 +53,13 @@ def merge(start: Ints, weights: Floats, k: int) -> Any:
             pop(heap, item, size)
             result[n] = value
             before[level, n] = t
-            which[level, n] = place[t]
-            if place[t] == 0 and t + 1 < total.size:
+            which[level, n] = index[t]
+            if index[t] == 0 and t + 1 < total.size:
                 push(heap, item, size, total[t + 1] + weights[first], t + 1)
                 size += 1
-            place[t] += 1
-            if place[t] < length:
-                push(heap, item, size, total[t] + weights[first + place[t]], t)
+            index[t] += 1
+            if index[t] < length:
+                push(heap, item, size, total[t] + weights[first + index[t]], t)
                 size += 1
         total = result
         level += 1

@@ -83,16 +83,16 @@ def log_partition(
     log_alone = log_alone[packing.row_origin]
     for c in range(packing.num_components):
         component = packing.component(c)
-        own = log_weights[packing.col_start[c] : packing.col_start[c + 1]]
-        own_alone = log_alone[packing.row_start[c] : packing.row_start[c + 1]]
+        log_weight = log_weights[packing.col_start[c] : packing.col_start[c + 1]]
+        log_uncovered = log_alone[packing.row_start[c] : packing.row_start[c + 1]]
         terms = Terms(
             np.ascontiguousarray(component.cols),
             np.ascontiguousarray(component.row_ptr),
             np.ascontiguousarray(component.row_cols),
-            own,
-            np.exp(own),
-            own_alone,
-            np.exp(own_alone),
+            log_weight,
+            np.exp(log_weight),
+            log_uncovered,
+            np.exp(log_uncovered),
         )
         total += _log_sum_of_solutions(terms, work, deadline())
     return total
@@ -124,16 +124,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
         node = item[0]
         if closed > 0.0 and log_bound[node] - largest - math.log(closed) < _SMALL:
             break
-        row = -1
-        most = -1
-        for r in range(num_rows):
-            if not done[node, r]:
-                choices = 0
-                for x in range(row_ptr[r], row_ptr[r + 1]):
-                    if _is_open(cols, done[node], row_cols[x]):
-                        choices += 1
-                if choices > most:
-                    row, most = r, choices
+        row = _row_of_most_choices(terms, done[node])
         size -= 1
         pop(key, item, size)
         if row < 0:
@@ -160,12 +151,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
             if used == log_spent.size:
                 done, log_spent, log_bound = doubled_rows(done), doubled(log_spent), doubled(log_bound)
                 key, item = doubled(key), doubled(item)
-            copy_to(done[used], before)
-            done[used, row] = True
-            if j >= 0:
-                for s in range(cols.shape[1]):
-                    if cols[j, s] >= 0:
-                        done[used, cols[j, s]] = True
+            _decide(cols, before, row, j, done[used])
             log_spent[used] = spent + price
             bound = _log_product(terms, done[used], factor, reach)
             spent_work += visits
@@ -182,6 +168,32 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     # the rounding of sums of logarithms grows with their size; exp and log of many parts lose a few digits more
     size_of_sums = abs(result) + 50.0 + num_rows * math.log(log_weights.size + 1.0)
     return result + 1e-11 + 4e-16 * (num_rows + 3) * size_of_sums
+
+
+@inner_njit
+def _row_of_most_choices(terms: Terms, done: NDArray[np.bool_]) -> int:
+    """The undecided row with the most open columns; -1: all are decided."""
+    row, most = -1, -1
+    for r in range(done.size):
+        if not done[r]:
+            choices = 0
+            for x in range(terms.row_ptr[r], terms.row_ptr[r + 1]):
+                if _is_open(terms.cols, done, terms.row_cols[x]):
+                    choices += 1
+            if choices > most:
+                row, most = r, choices
+    return row
+
+
+@inner_njit
+def _decide(cols: Ints, before: NDArray[np.bool_], row: int, column: int, after: NDArray[np.bool_]) -> None:
+    """Fill in which rows are decided after a row is covered by a column, or stays uncovered (-1)."""
+    copy_to(after, before)
+    after[row] = True
+    if column >= 0:
+        for s in range(cols.shape[1]):
+            if cols[column, s] >= 0:
+                after[cols[column, s]] = True
 
 
 @inner_njit

@@ -214,9 +214,9 @@ def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choi
     """
     cols, row_ptr, row_cols = problem.cols, problem.row_ptr, problem.row_cols
     num_sensors, taken, count = cols.shape[1], block.size, 0
-    place, chosen = np.empty(_TAKEN, np.int64), np.full(_TAKEN, -1, np.int64)
+    entry, chosen = np.empty(_TAKEN, np.int64), np.full(_TAKEN, -1, np.int64)
     level = 0
-    place[0] = -1
+    entry[0] = -1
     while level >= 0:
         if level == taken and count == choice.shape[0]:
             for i in range(taken):
@@ -240,12 +240,12 @@ def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choi
         if chosen[level] >= 0:
             _put(cols, owner, chosen[level], -1)
             chosen[level] = -1
-        x = place[level]
-        place[level] += 1
+        x = entry[level]
+        entry[level] += 1
         if x < 0:
             # uncovered, or covered by a column of a row before
             if owner[r] >= 0:
-                place[level] = row_ptr[r + 1] - row_ptr[r]
+                entry[level] = row_ptr[r + 1] - row_ptr[r]
         elif x < row_ptr[r + 1] - row_ptr[r]:
             j = row_cols[row_ptr[r] + x]
             fits = True
@@ -263,5 +263,5 @@ def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choi
             continue
         level += 1
         if level < taken:
-            place[level] = -1
+            entry[level] = -1
     return count

@@ -56,8 +56,8 @@ def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[ND
     largest = 1
     for v in range(vertices):
         while label[v] < 0 and not wide[v]:
-            own = members[: cluster(graph, kept, v, clusters, label, members)]
-            added = planned(graph, kept, own, most, steps[count:], work)
+            inside = members[: cluster(graph, kept, v, clusters, label, members)]
+            added = planned(graph, kept, inside, most, steps[count:], work)
             needed = room(steps[count : count + added]) if added >= 0 else 0
             if added >= 0 and needed <= _MOST_NUMBERS:
                 count += added
@@ -65,21 +65,21 @@ def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[ND
                 ends[clusters] = count
                 clusters += 1
                 continue
-            for u in own:
+            for u in inside:
                 label[u] = -1
             if not drop:
-                wide[own] = True
+                wide[inside] = True
                 continue
-            level = limit[own].max()
+            level = limit[inside].max()
             # no step at which nothing would be left out
             least = np.inf
-            for u in own:
+            for u in inside:
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):
                     if kept[graph.edge[x]]:
                         least = min(least, log_upper[graph.edge[x]])
             while level <= least and level < 0.0:
                 level += _STEP
-            for u in own:
+            for u in inside:
                 limit[u] = level + _STEP
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):
                     if log_upper[graph.edge[x]] < level or level >= 0.0:

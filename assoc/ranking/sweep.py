@@ -46,8 +46,8 @@ class Work(NamedTuple):
 
     left: Ints
     """Edges not processed yet."""
-    place: Ints
-    """1 + the bit of an open vertex in the table's index; 0 before it is opened, DONE after it is closed."""
+    number: Ints
+    """Of an open vertex: 1 + its bit in the table's index; 0 before it is opened, DONE after it is closed."""
     near: Ints
     """Whether the vertex or a neighbour is open."""
     shared: Ints
@@ -85,11 +85,11 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
 
     -1 where more than `most` vertices would be open at a time.
     """
-    left, place, near, _, processed, rank, border = work
+    left, number, near, _, processed, rank, border = work
     border[-1] = 0
     for i in range(members.size):
         v = members[i]
-        left[v] = place[v] = near[v] = 0
+        left[v] = number[v] = near[v] = 0
         rank[v] = i
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             left[v] += kept[graph.edge[x]]
@@ -99,7 +99,7 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
         v = _next_vertex(graph, members, work)
         if v < 0:
             return count
-        if place[v] == 0:
+        if number[v] == 0:
             width += 1
             count = _opened(graph, members, v, width, steps, count, work)
         new_table = True
@@ -108,21 +108,21 @@ def planned(graph: Graph, kept: NDArray[np.bool_], members: Ints, most: int, ste
             if e < 0:
                 break
             for u in graph.ends[e]:
-                if u >= 0 and place[u] == 0:
+                if u >= 0 and number[u] == 0:
                     width += 1
                     count = _opened(graph, members, u, width, steps, count, work)
                     new_table = True
             if width > most:
                 return -1
             if new_table:
-                steps[count, 0], steps[count, 1], steps[count, 2] = KEEP, v, np.int64(1) << (place[v] - 1)
+                steps[count, 0], steps[count, 1], steps[count, 2] = KEEP, v, np.int64(1) << (number[v] - 1)
                 count += 1
                 new_table = False
             steps[count, 0], steps[count, 1], steps[count, 2] = USE, e, 0
             processed[e] = True
             for u in graph.ends[e]:
                 if u >= 0:
-                    steps[count, 2] |= np.int64(1) << (place[u] - 1)
+                    steps[count, 2] |= np.int64(1) << (number[u] - 1)
                     left[u] -= 1
             count += 1
             for u in graph.ends[e]:
@@ -145,7 +145,7 @@ def _next_edge(graph: Graph, v: int, work: Work) -> int:
         cost = 0
         for u in graph.ends[e]:
             if u >= 0 and u != v:
-                if work.place[u] == 0:
+                if work.number[u] == 0:
                     cost += 2 if work.left[u] > 1 else 0
                 elif work.left[u] == 1:
                     cost -= 2
@@ -157,17 +157,17 @@ def _next_edge(graph: Graph, v: int, work: Work) -> int:
 @njit
 def _next_vertex(graph: Graph, members: Ints, work: Work) -> int:
     """The near vertex that leaves the fewest vertices open; -1 if none is left."""
-    left, place, _, shared, processed, rank, border = work
+    left, number, _, shared, processed, rank, border = work
     best, least, count = -1, np.iinfo(np.int64).max, 0
     for i in range(border[-1]):
         v = border[i]
-        if place[v] == DONE:
+        if number[v] == DONE:
             continue
         border[count] = v
         count += 1
         if left[v] == 0:
             continue
-        cost = -2 if place[v] > 0 else 0
+        cost = -2 if number[v] > 0 else 0
         for turn in range(2):
             for x in range(graph.ptr[v], graph.ptr[v + 1]):
                 e = graph.edge[x]
@@ -179,7 +179,7 @@ def _next_vertex(graph: Graph, members: Ints, work: Work) -> int:
                     if turn == 0:
                         shared[u] += 1
                     elif shared[u] > 0:
-                        if place[u] == 0:
+                        if number[u] == 0:
                             cost += 2 if left[u] > shared[u] else 0
                         elif left[u] == shared[u]:
                             cost -= 2
@@ -197,7 +197,7 @@ def _next_vertex(graph: Graph, members: Ints, work: Work) -> int:
 
 @njit
 def _opened(graph: Graph, members: Ints, v: int, width: int, steps: Ints, count: int, work: Work) -> int:
-    work.place[v] = width
+    work.number[v] = width
     for x in range(graph.ptr[v], graph.ptr[v + 1]):
         for u in graph.ends[graph.edge[x]]:
             # edges that are not kept may lead to other clusters
@@ -211,11 +211,11 @@ def _opened(graph: Graph, members: Ints, v: int, width: int, steps: Ints, count:
 
 @njit
 def _closed(v: int, steps: Ints, count: int, work: Work) -> int:
-    bit = work.place[v]
+    bit = work.number[v]
     for i in range(work.border[-1]):
-        if work.place[work.border[i]] > bit:
-            work.place[work.border[i]] -= 1
-    work.place[v] = DONE
+        if work.number[work.border[i]] > bit:
+            work.number[work.border[i]] -= 1
+    work.number[v] = DONE
     steps[count, 0], steps[count, 1], steps[count, 2] = CLOSE, v, np.int64(1) << (bit - 1)
     return count + 1
 
@@ -251,7 +251,14 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
         elif steps[n, 0] == CLOSE:
             size //= 2
     # copies hold the entries in which the vertex of the step is not used
-    table, before, divided = buffer[:largest], buffer[largest:], np.ones(len(steps))
+    table, copies, divided = buffer[:largest], buffer[largest:], np.ones(len(steps))
+    used = _forwards(steps, weights, free, table, copies, divided)
+    _backwards(steps, (weights, free), table, copies, used, divided, (probability, alone))
+
+
+@inner_njit
+def _forwards(steps: Ints, weights: Floats, free: Floats, table: Floats, copies: Floats, divided: Floats) -> int:
+    """Sum the partial events step by step; the first entry is the sum of all. Returns how much the copies take."""
     table[0], size, used = 1.0, 1, 0
     for n in range(len(steps)):
         kind, what, bits = steps[n, 0], steps[n, 1], steps[n, 2]
@@ -268,7 +275,7 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
                 start = ((start | passed) + 1) & ~passed
         elif kind == KEEP or free[what] > 0.0:
             for i in range(size // 2):
-                before[used + i] = table[_without(i, bits)]
+                copies[used + i] = table[_without(i, bits)]
             used += size // 2
         if kind == CLOSE:
             size //= 2
@@ -279,6 +286,17 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
                 table[i] = free[what] * table[j] + table[j | bits]
                 top = max(top, table[i])
             divided[n] = _scale(table, size, top)
+    return used
+
+
+@inner_njit
+def _backwards(
+    steps: Ints, reduced: tuple[Floats, Floats], table: Floats, copies: Floats, used: int, divided: Floats,
+    found: tuple[Floats, Floats],
+) -> None:  # fmt: skip
+    """Sum the completions of the sets, and fill in probabilities by these and the copies of the partial events."""
+    weights, free = reduced
+    probability, alone = found
     # the sum of all events, scaled as the tables are: forwards as before the step, backwards as after it
     total = table[0]
     table[0], size = 1.0, 1
@@ -298,7 +316,7 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
                 shift = used - size // 2 + ((start & (bit - 1)) | ((start >> 1) & ~(bit - 1))) - start
                 for i in range(start, start + stretch):
                     value = table[i + bits]
-                    by_it += before[i + shift] * value
+                    by_it += copies[i + shift] * value
                     table[i] += weight * value
                 start = ((start | passed) + 1) & ~passed
             probability[what] = min(weight * by_it / total, 1.0) if total > _SMALL else np.nan
@@ -315,7 +333,7 @@ def swept(steps: Ints, weights: Floats, free: Floats, probability: Floats, alone
                 table[j | bits] = value
                 table[j] = free[what] * value
                 if free[what] > 0.0:
-                    unused += before[used + i] * value
+                    unused += copies[used + i] * value
                 top = max(top, value)
             alone[what] = min(free[what] * unused / total, 1.0) if total > _SMALL else np.nan
             size *= 2

@@ -19,17 +19,17 @@ def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllC
     slack = slack_of(problem)
     n, m = (int(size) for size in problem.sizes)
     # the rows are the sensor with fewer measurements: each node then has fewer children
-    own, other = rows[:, 0], rows[:, 1] - np.int32(n)
-    own_alone, other_alone = slack[:n], slack[n:]
+    first, second = rows[:, 0], rows[:, 1] - np.int32(n)
+    first_alone, second_alone = slack[:n], slack[n:]
     turned = n > m
     if turned:
-        own, other, own_alone, other_alone = other, own, other_alone, own_alone
+        first, second, first_alone, second_alone = second, first, second_alone, first_alone
     murty = Murty(
-        np.ascontiguousarray(own),
-        np.ascontiguousarray(other),
+        np.ascontiguousarray(first),
+        np.ascontiguousarray(second),
         weights,
-        np.ascontiguousarray(own_alone),
-        np.ascontiguousarray(other_alone),
+        np.ascontiguousarray(first_alone),
+        np.ascontiguousarray(second_alone),
         k,
     )
     prepared = prepare(problem)

@@ -19,17 +19,17 @@ from assoc.ranking.murty.arrays import ALONE, Forbidden, Graph, Nodes, PathWork,
 
 
 @inner_njit
-def set_forbidden(graph: Graph, nodes: Nodes, forbidden: Forbidden, parent: int, place: int, on: bool) -> None:
-    """Mark or unmark what the child at index ``place`` must not use: its fixed rows and its forbidden edges."""
-    for t in range(place):
+def set_forbidden(graph: Graph, nodes: Nodes, forbidden: Forbidden, parent: int, child: int, on: bool) -> None:
+    """Mark or unmark what a child, the index of its row, must not use: its fixed rows and its forbidden edges."""
+    for t in range(child):
         r = nodes.order[parent, t]
         forbidden.row[r] = on
         if nodes.edge_of[parent, r] >= 0:
             forbidden.column[graph.columns[nodes.edge_of[parent, r]]] = on
-    own = nodes.edge_of[parent, nodes.order[parent, place]]
-    if own >= 0:
-        forbidden.edge[own] = on
-    if place == nodes.fixed[parent]:
+    matched = nodes.edge_of[parent, nodes.order[parent, child]]
+    if matched >= 0:
+        forbidden.edge[matched] = on
+    if child == nodes.fixed[parent]:
         links = nodes.forbidden
         node = parent
         while node >= 0 and links[node, 1] != -1:
@@ -81,12 +81,12 @@ def search_path(
     forbidden_row, forbidden_column, forbidden_edge = forbidden
     distance, _, _, closed, _, tree_row, tree_distance, queue_key, queue_item = work
     dummy = column_alone.size
-    own = edge_of[parent, row]
-    target = columns[own] if own >= 0 else dummy
+    matched = edge_of[parent, row]
+    target = columns[matched] if matched >= 0 else dummy
     z = v[parent, dummy]
     size, num_reached, num_tree = 0, 0, 0
     # the row leaves the dummy: the reduced cost of that edge may be negative
-    i, d = row, (0.0 if own >= 0 else max(0.0, u[parent, row] + z))
+    i, d = row, (0.0 if matched >= 0 else max(0.0, u[parent, row] + z))
     while True:
         if i >= 0:
             tree_row[num_tree] = i
@@ -151,31 +151,31 @@ def clear(work: PathWork, num_reached: int) -> None:
 
 @inner_njit
 def make_node(
-    graph: Graph, nodes: Nodes, forbidden: Forbidden, work: PathWork, node: int, parent: int, place: int, alone: bool
+    graph: Graph, nodes: Nodes, forbidden: Forbidden, work: PathWork, node: int, parent: int, child: int, alone: bool
 ) -> None:
     """Turn a child into a node: its solution and the multipliers that prove it the best of its kind."""
     columns = graph.columns
     edge_of, row_of, u, v, order, fixed, links, node_cost = nodes
     distance, previous, previous_row, closed, reached, tree_row, tree_distance, _, _ = work
     dummy = graph.column_alone.size
-    row = order[parent, place]
+    row = order[parent, child]
     length, num_reached, num_tree = search_path(graph, nodes, forbidden, work, parent, row, alone, np.inf)
     copy_to(edge_of[node], edge_of[parent])
     copy_to(row_of[node], row_of[parent])
     copy_to(u[node], u[parent])
     copy_to(v[node], v[parent])
     copy_to(order[node], order[parent])
-    fixed[node] = place
-    own = edge_of[parent, row]
-    links[node, 0] = parent if place == fixed[parent] else -1
-    links[node, 1] = own + 2 if own >= 0 else 1
+    fixed[node] = child
+    matched = edge_of[parent, row]
+    links[node, 0] = parent if child == fixed[parent] else -1
+    links[node, 1] = matched + 2 if matched >= 0 else 1
     node_cost[node] = node_cost[parent] + length
     for t in range(num_tree):
         u[node, tree_row[t]] += length - tree_distance[t]
     for t in range(num_reached):
         if closed[reached[t]] and reached[t] <= dummy:
             v[node, reached[t]] -= length - distance[reached[t]]
-    item = columns[own] if own >= 0 else dummy
+    item = columns[matched] if matched >= 0 else dummy
     while True:
         i = previous_row[item]
         if i >= 0:
@@ -237,23 +237,23 @@ def _way_round(graph: Graph, nodes: Nodes, forbidden: Forbidden, node: int, row:
     costs, rows, columns, row_alone, column_alone, row_ptr, row_edges, column_ptr, column_edges = graph
     edge_of, u, v = nodes.edge_of, nodes.u, nodes.v
     forbidden_row, forbidden_column = forbidden.row, forbidden.column
-    own = edge_of[node, row]
+    matched = edge_of[node, row]
     z = v[node, column_alone.size]
     out = np.inf
-    if own >= 0 and row_alone[row]:
+    if matched >= 0 and row_alone[row]:
         out = max(0.0, -u[node, row] - z)
     for x in range(row_ptr[row], row_ptr[row + 1]):
         e = row_edges[x]
-        if e != own and not forbidden_column[columns[e]]:
+        if e != matched and not forbidden_column[columns[e]]:
             out = min(out, max(0.0, costs[e] - u[node, row] - v[node, columns[e]]))
-    if own < 0:
+    if matched < 0:
         return out + max(0.0, u[node, row] + z)
     if out == np.inf:
         return out
-    column = columns[own]
+    column = columns[matched]
     into = max(0.0, z - v[node, column]) if column_alone[column] else np.inf
     for x in range(column_ptr[column], column_ptr[column + 1]):
         e = column_edges[x]
-        if e != own and not forbidden_row[rows[e]]:
+        if e != matched and not forbidden_row[rows[e]]:
             into = min(into, max(0.0, costs[e] - u[node, rows[e]] - v[node, column]))
     return out + into

@@ -101,10 +101,10 @@ class Murty:
         """Multipliers of rows and columns that prove the best solution."""
         return self._nodes.u[0], self._nodes.v[0, :-1]
 
-    def edges(self, place: int) -> NDArray[np.int32]:
-        """Return the edges of a solution."""
-        own = self._nodes.edge_of[place]
-        return own[own >= 0]
+    def edges(self, rank: int) -> NDArray[np.int32]:
+        """Return the edges of a solution, the best of which has rank 0."""
+        matched = self._nodes.edge_of[rank]
+        return matched[matched >= 0]
 
     def run(self, evaluations: int) -> None:
         """Rank until done, or until ``evaluations`` more shortest paths are computed."""
@@ -214,11 +214,11 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
         node = 0
         if item >= 0:
             exact = item & 1
-            place = (item >> 1) % num_rows
+            child = (item >> 1) % num_rows
             parent = (item >> 1) // num_rows
-            row = nodes.order[parent, place]
+            row = nodes.order[parent, child]
             alone = may_stay_alone(graph, nodes, parent, row)
-            set_forbidden(graph, nodes, forbidden, parent, place, True)
+            set_forbidden(graph, nodes, forbidden, parent, child, True)
             if exact == 0:
                 counts[3] += 1
                 length, num_reached, _ = search_path(
@@ -240,8 +240,8 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
                     limits[0] = min(limits[0], worst)
             else:
                 node = counts[0]
-                make_node(graph, nodes, forbidden, work, node, parent, place, alone)
-            set_forbidden(graph, nodes, forbidden, parent, place, False)
+                make_node(graph, nodes, forbidden, work, node, parent, child, alone)
+            set_forbidden(graph, nodes, forbidden, parent, child, False)
             if exact == 0:
                 continue
         counts[0] += 1

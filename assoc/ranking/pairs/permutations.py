@@ -2,7 +2,7 @@
 
 Joint events that detect the same tracks by the same measurements differ in who has which measurement. Averaged over
 these permutations, the states of targets side by side come together in the middle (coalescence). So of each such set
-of events only the best one counts, and it gets the probability of the whole set: the probability that a track is
+of events only the best counts, and it gets the probability of the whole set: the probability that a track is
 detected, and that a measurement is a target's, stay as they are.
 
 References
@@ -53,12 +53,12 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
     limit = np.full(free.size, _LEAST)
     for v in range(rows):
         while label[v] < 0:
-            own = members[: cluster(graph.graph, kept, v, v, label, members)]
-            if own.size <= most:
-                _permute(graph, (weights, free), kept, np.sort(own), rows, share, (bit, found))
+            inside = members[: cluster(graph.graph, kept, v, v, label, members)]
+            if inside.size <= most:
+                _permute(graph, (weights, free), kept, np.sort(inside), rows, share, (bit, found))
                 break
-            level = _STEP * limit[own].max()
-            for u in own:
+            level = _STEP * limit[inside].max()
+            for u in inside:
                 label[u] = -1
                 limit[u] = level
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):

@@ -44,8 +44,8 @@ def without_tuple_permutations(
     limit, waiting = _LEAST, np.flatnonzero(rows.any(axis=1) & (share >= _LEAST))
     while len(waiting):
         large = [np.zeros(0, dtype=np.int64)]
-        for own in _clusters(members[waiting] > 0, offset + members[waiting]):
-            which = waiting[own]
+        for together in _clusters(members[waiting] > 0, offset + members[waiting]):
+            which = waiting[together]
             bits, width = _as_sets(members[which] > 0, offset + members[which])
             if width > _BITS:
                 large.append(which)
@@ -89,10 +89,10 @@ def _permuted(track: Array, bits: Array, log_weight: Array) -> Floats:
     sets, total, best = np.zeros(1, dtype=np.int64), np.zeros(1), np.zeros(1)
     steps: list[tuple[Array, Array]] = []
     for t in np.unique(track):
-        own = np.flatnonzero(track == t)
-        before, tuples = np.nonzero((sets[:, None] & bits[own]) == 0)
+        of_track = np.flatnonzero(track == t)
+        before, tuples = np.nonzero((sets[:, None] & bits[of_track]) == 0)
         before = np.concatenate([np.arange(len(sets)), before])
-        tuples = np.concatenate([np.full(len(sets), -1), own[tuples]])
+        tuples = np.concatenate([np.full(len(sets), -1), of_track[tuples]])
         weight = np.append(log_weight, 0.0)[tuples]
         after = sets[before] | np.append(bits, 0)[tuples]
         order = np.lexsort((-(best[before] + weight), after))

@@ -145,11 +145,11 @@ def _bound(
         count = _grown(graph, believed, centre, members, inside) if width > _NARROW else 0
         length = -1
         while count > 1 and length < 0:
-            own = members[:count]
-            for v in own:
+            window = members[:count]
+            for v in window:
                 for x in range(ptr[v], ptr[v + 1]):
                     kept[edge[x]] = inside[ends[edge[x], 0]] and inside[ends[edge[x], 1]]
-            length = planned(graph.graph, kept, own, most, steps, work)
+            length = planned(graph.graph, kept, window, most, steps, work)
             if length < 0:
                 smaller = 4 * count // 5
                 for v in members[smaller:count]:
@@ -157,10 +157,10 @@ def _bound(
                     for x in range(ptr[v], ptr[v + 1]):
                         kept[edge[x]] = False
                 count = smaller
-        own = members[:count]
+        window = members[:count]
         if length >= 0:
             done += float(length << most)
-            for v in own:
+            for v in window:
                 side = 1 if v == ends[edge[ptr[v]], 1] else 0
                 left[:, v] = free[v]
                 for x in range(ptr[v], ptr[v + 1]):
@@ -174,9 +174,9 @@ def _bound(
                     at_b[ends[edge[x], 0] + ends[edge[x], 1] - v] = 0.0
             buffer = np.empty(room(steps[:length]))
             for side in range(2):
-                alone[side, own] = 1.0
+                alone[side, window] = 1.0
                 swept(steps[:length], weights, left[side], pair[side], alone[side], buffer)
-            for v in own:
+            for v in window:
                 side = 1 if v == ends[edge[ptr[v]], 1] else 0
                 for x in range(ptr[v], ptr[v + 1]):
                     e = edge[x]
@@ -188,7 +188,7 @@ def _bound(
                         if alone[side, v] > 2.0 * _FAINT:
                             high[x] = (pair[side, e] + _FAINT) / (alone[side, v] - _FAINT) * left[side, v]
                 _bound_pairs(graph, v, free[v], low, high, bounds)
-        for v in own:
+        for v in window:
             inside[v] = False
             for x in range(ptr[v], ptr[v + 1]):
                 kept[edge[x]] = False
