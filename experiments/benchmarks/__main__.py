@@ -25,7 +25,7 @@ TABLE, PAGES = Path("docs/benchmarks.csv"), (Path("README.md"), Path("paper.md")
 # what a brief run gives other solvers, in seconds
 _BRIEF_LIMIT = 5.0
 FAMILIES = (
-    "paper", "gated", "ghost", "wide gap", "wide gates", "known optimum", "random axial", "planted", "scale", "kbest",
+    "paper", "gated", "ghost", "wide gap", "wide gates", "known optimum", "random axial", "planted", "kbest",
 )  # fmt: skip
 
 
@@ -150,7 +150,7 @@ def _measured_anew(row: Row, families: list[str], options: argparse.Namespace) -
 
 def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[Row]]:
     """Yield the rows of each case as it is done."""
-    from experiments.benchmarks import ranking, run, scale
+    from experiments.benchmarks import ranking, run
     from experiments.benchmarks.families import cases
 
     def log(text: str) -> None:
@@ -167,8 +167,6 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
     if options.processes > 1:
         chosen = [case.on_one_core() for case in chosen]
     yield from run.run_all(chosen, options.seeds, options.processes, log)
-    if "scale" in families:
-        yield scale.run(2 if options.brief else options.seeds, log)
     if "kbest" in families:
         yield ranking.run(2 if options.brief else options.seeds, log)
 

@@ -94,7 +94,7 @@ def judge(rows: Iterable[Row]) -> list[Verdict]:
     results = Results(rows)
     verdicts: list[Verdict] = []
     for rule in (
-        _paper, _gated, _ghost, _wide_gap, _wide_gates, _known_optimum, _random_axial, _planted, _scale, _kbest,
+        _paper, _gated, _ghost, _wide_gap, _wide_gates, _known_optimum, _random_axial, _planted, _kbest,
     ):  # fmt: skip
         verdicts += rule(results)
     return verdicts
@@ -364,25 +364,6 @@ def _planted(results: Results) -> list[Verdict]:
     for size in results.sizes("planted"):
         solvers = ("exact", "lagrangian", *HEURISTICS, "milp")
         verdicts += _always(results, "planted", size, solvers, "optimal")
-    return verdicts
-
-
-def _scale(results: Results) -> list[Verdict]:
-    rows = results.of("scale")
-    if not rows:
-        return []
-    worst = max(row.gap for row in rows)
-    verdicts = [Verdict("scale", "all", "gap <= 0.01 %", False, f"worst {_percent(worst)}", worst <= 1e-4)]
-    times = {int(size): median(r.seconds for r in results.of("scale", size)) for size in results.sizes("scale")}
-    least, most = min(times), max(times)
-    if most > least:
-        factor = (times[most] / times[least]) / (most / least)
-        goal = "time grows at most 1.5 times linearly"
-        text = f"{least} to {most}: {factor:.3g} times linear"
-        verdicts.append(Verdict("scale", "all", goal, False, text, factor <= 1.5))
-    largest = results.of("scale", str(most))
-    peak = max(row.extra for row in largest)
-    verdicts.append(Verdict("scale", str(most), "under 2 GB", False, f"{peak:.0f} MB", peak < 2000))
     return verdicts
 
 

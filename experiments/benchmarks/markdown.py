@@ -25,8 +25,6 @@ ABOUT = {
     "known optimum": "Axial n x n x n with a known unique optimum (Grundel & Pardalos).",
     "random axial": "Axial n x n x n, integer costs uniform in 0..99.",
     "planted": "With dummies and a planted optimum, by number of sensors.",
-    "scale": "Three radars, 0.1 targets per square kilometre, from the scene to the Solution, each run in a "
-    "process of its own; number of targets.",
     "kbest": "The k best solutions; the time for one optimum (exact) beside it.",
 }
 
@@ -81,7 +79,7 @@ def _missing(rows: Sequence[Row]) -> str:
     there = {(row.family, row.size) for row in rows}
     families = {row.family for row in rows}
     absent = [f"{case.family} {case.size}" for case in cases() if (case.family, case.size) not in there]
-    return ", ".join(absent + [family for family in ("scale", "kbest") if family not in families])
+    return ", ".join(absent + ["kbest"] * ("kbest" not in families))
 
 
 def _preface(minutes: float | None, command: str) -> str:
@@ -131,7 +129,7 @@ def _goals(rows: Sequence[Row]) -> str:
 
 
 def _table(results: Results, family: str) -> str:
-    extra = {"scale": "peak MB", "kbest": "ranked"}.get(family)
+    extra = "ranked" if family == "kbest" else None
     head = ["size", "tuples", "solver", "limit s", "runs", "found", "excess median %", "excess worst %",
             "gap median %", "median time", "median CPU", "speed"]  # fmt: skip
     if extra:

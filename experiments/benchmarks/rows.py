@@ -29,8 +29,8 @@ class Row:
     status: "optimal" where the solver itself proves it, "feasible", or "none".
     reference: The optimum where it is known by construction or was proven, else the best cost anyone found.
     proven: Whether the reference is the optimum.
-    extra: Peak memory in MB (family scale), solutions ranked (family kbest), share of the optimum by which the linear
-        program's bound is below it (families of ghosts); 0 elsewhere.
+    extra: Solutions ranked (family kbest), share of the optimum by which the linear program's bound is below it
+        (families of ghosts); 0 elsewhere.
     """
 
     family: str

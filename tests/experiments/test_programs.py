@@ -28,13 +28,3 @@ def test_help(name, monkeypatch, capsys):
     assert stop.value.code == 0
     printed = capsys.readouterr().out
     assert printed.startswith(f"usage: python -m experiments.{name}")
-
-
-@pytest.mark.parametrize("words", [["x", "1"], ["10"], ["0", "1"]])
-def test_scale_refuses_what_it_does_not_understand(words, capsys):
-    from experiments.benchmarks import scale
-
-    with pytest.raises(SystemExit) as stop:
-        scale.program(words)
-    assert stop.value.code == 2
-    assert "experiments.benchmarks.scale: error" in capsys.readouterr().err
