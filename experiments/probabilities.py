@@ -4,9 +4,9 @@
 
 Widths and processor time of one thread of ``assoc.marginals``: two lists of points whose ten nearest of the other list
 are candidates (distances of a unit, cost 2 d^2 - 2, one point per 0.01), position sensors and bearings of the
-benchmarks. Sampled probabilities are compared with chains three times as long; on small problems whose intervals close,
-which are exact sums, also with what the k best alone say. Reliability: crowds with truth, tuples grouped by the
-probability they are given, and the share of each group that is one target's detections and all of them.
+benchmarks. Sampled probabilities are compared with chains three times as long; `experiments.probabilities_beside`
+compares them with exact sums. Reliability: crowds with truth, tuples grouped by the probability they are given, and the
+share of each group that is one target's detections and all of them.
 """
 
 import time
@@ -33,7 +33,7 @@ _GOAL = "goal chosen by us"
 # of the chains compared with; seconds on the clock, where others may use the machine, and the goal for those of a core
 _LONG = 3.0
 _CLOCK, _LIMIT = 40.0, 10.0
-_SMALL, _SCENES = 80, 80
+_SCENES = 80
 _EDGES = np.linspace(0.0, 1.0, 11)
 
 
@@ -120,37 +120,6 @@ def _long(problem: AssignmentProblem, like: Marginals) -> Array:
     return np.array([of.get(key, p) for key, p in zip(keys, like.probability, strict=True)])
 
 
-def calibration(count: int) -> list[Claim]:
-    """Sampled probabilities of small crowds, and those of the ten best alone, against exact sums."""
-    errors: dict[str, list[Array]] = {"sampled": [], "10 best": []}
-    exact = 0
-    for seed in range(count):
-        scene = simulate("crowd", seed, targets=5, scans=1, width=900.0, height=700.0, noise=100.0)
-        problem = assoc.build_problem(scene, 0)
-        truth = assoc.marginals(problem, 10_000, method="certified")
-        if truth.unseen > 1e-6:
-            continue
-        exact += 1
-        sampled = assoc.marginals(problem, method="estimate").probability
-        errors["sampled"].append(np.abs(sampled - truth.probability))
-        solutions = assoc.kbest(problem, 10)
-        weights = np.exp(solutions[0].cost - np.array([solution.cost for solution in solutions]))
-        held = dict.fromkeys(map(tuple, truth.tuples.tolist()), 0.0)
-        for solution, weight in zip(solutions, weights / weights.sum(), strict=True):
-            for key in map(tuple, solution.tuples.tolist()):
-                held[key] += weight
-        errors["10 best"].append(np.abs(np.array(list(held.values())) - truth.probability))
-    claims = [Claim("small crowds: summed exactly", "", None, exact)]
-    for way, found in errors.items():
-        all_of = np.concatenate(found)
-        band = (None, 0.01) if way == "sampled" else None
-        claims += [
-            Claim(f"small crowds: {way}, mean error", "", None, float(all_of.mean()), None, band, source=_GOAL),
-            Claim(f"small crowds: {way}, largest error", "", None, float(all_of.max())),
-        ]
-    return claims
-
-
 def reliability(count: int) -> list[Claim]:
     """Share of tuples that are true among those of about one probability: crowds with truth."""
     said, right = [], []
@@ -183,7 +152,7 @@ def reliability(count: int) -> list[Claim]:
 
 
 def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
-    """Measure these kinds, and calibration and reliability."""
+    """Measure these kinds, and reliability."""
     claims = []
     with one_core():
         # kernels are compiled before anything is timed
@@ -191,9 +160,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
             assoc.marginals(KINDS[name][0](0))
         for name in kinds:
             claims += widths(name, range(1_000, 1_001 if quick else 1_002))
-        share = 10 if quick else 1
-        claims += calibration(_SMALL // share)
-        return claims + reliability(_SCENES // share)
+        return claims + reliability(_SCENES // 10 if quick else _SCENES)
 
 
 def program(arguments: list[str] | None = None) -> int:
