@@ -8,19 +8,12 @@ import numpy as np
 
 from assoc._types import Floats
 
-RESAMPLES = 2000
+RESAMPLES, LEVEL = 2000, 0.95
 _MOST_NUMBERS = 10_000_000
 
 
-def mean_interval(
-    values: Floats,
-    weights: Floats | None = None,
-    *,
-    level: float = 0.95,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
-) -> tuple[float, float]:
-    """Interval of the mean over problems and repeats, (P, R) with NaN where a run is missing, both resampled.
+def mean_interval(values: Floats, weights: Floats | None = None, *, resamples: int = RESAMPLES) -> tuple[float, float]:
+    """95 % interval of the mean over problems and repeats, (P, R) with NaN where a run is missing, both resampled.
 
     The mean is ``sum(weights * values) / sum(weights)``; the seed is fixed, so that the interval is reproducible. NaN
     without values, and both ends equal to a single value.
@@ -31,32 +24,32 @@ def mean_interval(
     share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
     if not share.any():
         return np.nan, np.nan
-    of_rows, of_columns = _draws(*values.shape, resamples, seed)
+    of_rows, of_columns = _draws(*values.shape, resamples)
     # relative to the middle of the values, so that large equal numbers give an interval of width 0
     middle = weighted_mean(values, weights)
     away = np.where(share > 0, values - middle, 0.0)
     total = ((of_rows @ (share * away)) * of_columns).sum(axis=1)
     weight = ((of_rows @ share) * of_columns).sum(axis=1)
     means = middle + total[weight > 0] / weight[weight > 0]
-    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
+    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)
 
 
-def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Floats:
+def resampled_means(tables: Floats) -> Floats:
     """Means (resamples, S) of S settings over the same resampled problems and repeats, for comparison in pairs.
 
     ``tables`` is (S, problems, repeats), without NaN.
     """
     _, rows, columns = tables.shape
-    of_rows, of_columns = _draws(rows, columns, resamples, seed)
+    of_rows, of_columns = _draws(rows, columns, RESAMPLES)
     weights = of_columns / (rows * columns)
     return np.stack([((of_rows @ table) * weights).sum(axis=1) for table in tables], axis=1)
 
 
 @lru_cache(maxsize=8)
-def _draws(rows: int, columns: int, resamples: int, seed: int) -> tuple[Floats, Floats]:
+def _draws(rows: int, columns: int, resamples: int) -> tuple[Floats, Floats]:
     """Number of times that each row and each column is drawn, for each resample."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     resamples = max(200, min(resamples, _MOST_NUMBERS // max(rows, columns)))
     of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples).astype(float)
     of_columns = rng.multinomial(columns, np.full(columns, 1 / columns), resamples).astype(float)

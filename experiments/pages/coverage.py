@@ -172,9 +172,9 @@ def fuzzy_ekf() -> str:
     r = Results("papers.fuzzy_ekf")
     scenarios = "CDEFGH"
 
-    def span(claims: list[Claim], digits: int = 3) -> str:
+    def span(claims: list[Claim]) -> str:
         values = [claim.ours for claim in claims]
-        return f"{number(min(values), digits)} to {number(max(values), digits)}"
+        return f"{number(min(values))} to {number(max(values))}"
 
     raw = [r[f"{s}: RMSE, raw measurements"] for s in scenarios]
     plain = [r.starting(f"{s}: RMSE, best fixed EKF of constant acceleration")[0] for s in scenarios]

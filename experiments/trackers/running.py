@@ -29,10 +29,10 @@ class Run:
     seconds: Array
 
 
-def through(tracker: Tracker, scene: Scene, scans: int | None = None) -> Run:
+def through(tracker: Tracker, scene: Scene) -> Run:
     """Take a scene in, scan by scan."""
     table, confirmed, seconds = TrackTable(), [], []
-    for k in range(scene.num_scans if scans is None else scans):
+    for k in range(scene.num_scans):
         scan = scene.scan(k)
         # CPU time: what else the machine does is not the tracker's
         begin = time.process_time()

@@ -6,7 +6,7 @@ enumeration of all joint events is for a few targets.
 
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -81,32 +81,38 @@ def multi_frame(plane: Plane, window: int, gate: float) -> Iterator[tuple[float,
 
 def nearest(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
     """Global nearest neighbour by 2-D assignment of likelihoods: seconds and positions of each scan."""
-    model, updater, hypothesiser = _parts(plane, gate)
-    associator = GNNWith2DAssignment(hypothesiser)
-    covariance = np.diag((START_DEVIATION**2)[[0, 2, 1, 3]])
-    tracks = {Track(GaussianState(x[[0, 2, 1, 3], None], covariance, _START)) for x in plane.start}
-    for when, detections in _scans(plane, model):
-        started = time.process_time()
-        for track, one in associator.associate(tracks, detections, when).items():
-            track.append(updater.update(one) if one else one.prediction)
-        elapsed = time.process_time() - started
-        yield elapsed, np.array([np.asarray(track.mean, dtype=float)[[0, 2], 0] for track in tracks]).reshape(-1, 2)
+
+    def corrected(updater: Any, one: Any, when: datetime) -> Any:
+        return updater.update(one) if one else one.prediction
+
+    return _one_state(plane, gate, GNNWith2DAssignment, corrected)
 
 
 def probabilistic(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
     """JPDA: each track's mixture of all its measurements as one Gaussian; seconds and positions of each scan."""
+
+    def corrected(updater: Any, many: Any, when: datetime) -> Any:
+        after = [updater.update(one) if one else one.prediction for one in many]
+        weights = np.array([float(one.probability) for one in many])
+        means = np.concatenate([np.asarray(one.mean, dtype=float) for one in after], axis=1)
+        covariances = np.stack([np.asarray(one.covar, dtype=float) for one in after], axis=2)
+        mean, covar = gm_reduce_single(means, covariances, weights / weights.sum())
+        return GaussianStateUpdate(mean, covar, many, when)
+
+    return _one_state(plane, gate, JPDAwithLBP, corrected)
+
+
+def _one_state(
+    plane: Plane, gate: float, kind: Any, corrected: Callable[[Any, Any, datetime], Any]
+) -> Iterator[tuple[float, Array]]:
+    """Tracks with one state each, corrected by what an associator of this kind finds."""
     model, updater, hypothesiser = _parts(plane, gate)
-    associator = JPDAwithLBP(hypothesiser)
+    associator = kind(hypothesiser)
     covariance = np.diag((START_DEVIATION**2)[[0, 2, 1, 3]])
     tracks = {Track(GaussianState(x[[0, 2, 1, 3], None], covariance, _START)) for x in plane.start}
     for when, detections in _scans(plane, model):
         started = time.process_time()
-        for track, many in associator.associate(tracks, detections, when).items():
-            after = [updater.update(one) if one else one.prediction for one in many]
-            weights = np.array([float(one.probability) for one in many])
-            means = np.concatenate([np.asarray(one.mean, dtype=float) for one in after], axis=1)
-            covariances = np.stack([np.asarray(one.covar, dtype=float) for one in after], axis=2)
-            mean, covar = gm_reduce_single(means, covariances, weights / weights.sum())
-            track.append(GaussianStateUpdate(mean, covar, many, when))
+        for track, found in associator.associate(tracks, detections, when).items():
+            track.append(corrected(updater, found, when))
         elapsed = time.process_time() - started
         yield elapsed, np.array([np.asarray(track.mean, dtype=float)[[0, 2], 0] for track in tracks]).reshape(-1, 2)
