@@ -27,6 +27,7 @@ def _work() -> tuple[dict[str, Callable[[], Any]], Callable[[], Any]]:
     from assoc.simulation import simulate
     from assoc.tracking import TRACKERS, track_scene
     from experiments.common.instances import scenes, synthetic
+    from experiments.common.measuring import fresh
     from experiments.common.peers import PEERS
 
     gated, ghosts = scenes.gated(3, 300, 1), assoc.build_problem(scenes.ghost(20, 1), 0)
@@ -34,11 +35,7 @@ def _work() -> tuple[dict[str, Callable[[], Any]], Callable[[], Any]]:
     radars = simulate("three-radar", 1, scans=20)
 
     def solve(problem: assoc.AssignmentProblem, solver: str, **options: Any) -> Callable[[], Any]:
-        # a new problem each time: it keeps what a solver has prepared
-        return lambda: assoc.assign(
-            assoc.AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy),
-            solver, seed=1, advise=False, **options,
-        )  # fmt: skip
+        return lambda: assoc.assign(fresh(problem), solver, seed=1, advise=False, **options)
 
     work = {
         "candidates of 300 targets": lambda: assoc.build_problem(gated, 0),

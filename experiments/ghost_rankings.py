@@ -9,9 +9,7 @@ something better with the ten forbidden: it must not find any. Processor time of
 compiled, from the candidate tuples on: building them counts, too.
 """
 
-import time
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +19,10 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import WIDE_GAPS
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
+from experiments.common.measuring import one_core, timed
 from experiments.common.peers import by_milp
 
 NAME = "ghost_rankings"
@@ -55,13 +53,6 @@ KINDS = {
 }
 
 
-def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    """What a call returns, and the processor time that it takes."""
-    begin = time.thread_time()
-    answer = call()
-    return answer, time.thread_time() - begin
-
-
 def nothing_better(problem: AssignmentProblem, ranking: list[Solution], limit: float) -> bool:
     """Whether HiGHS ends, with these solutions forbidden.
 
@@ -81,10 +72,10 @@ def claims_of(name: str, kind: Kind, seeds: tuple[int, ...]) -> list[Claim]:
     seconds, spent, unseen, proved, checked = [], [], [], 0, 0
     for seed in seeds:
         scene = scenes.ghost(kind.targets, seed)
-        ranking, taken = _timed(lambda scene=scene: assoc.kbest(build_problem(scene, 0), K, time_limit=_LIMIT))
+        ranking, taken = timed(lambda scene=scene: assoc.kbest(build_problem(scene, 0), K, time_limit=_LIMIT))
         seconds.append(taken)
         proved += len(ranking) == K
-        marginals, taken = _timed(
+        marginals, taken = timed(
             lambda scene=scene: assoc.marginals(build_problem(scene, 0), K, time_limit=_LIMIT, method="certified")
         )
         spent.append(taken)

@@ -19,10 +19,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 import assoc
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances.synthetic import wide_gates
+from experiments.common.measuring import one_core, timed
 from experiments.common.peers import by_milp
 
 GATES = {1000: True, 2000: True, 3000: True, 10_000: False}
@@ -40,14 +40,8 @@ BANDS: dict[str, dict[str, tuple[float | None, float | None]]] = {
 }
 
 
-def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    begin = time.process_time()
-    answer = call()
-    return answer, time.process_time() - begin
-
-
 def _exact(problem: assoc.AssignmentProblem) -> tuple[assoc.Solution, float]:
-    answer, spent = _timed(lambda: assoc.assign(problem, advise=False))
+    answer, spent = timed(lambda: assoc.assign(problem, advise=False), time.process_time)
     if answer.status != "optimal":
         raise AssertionError(f"not proved: gap {answer.gap:.3g}, stopped by {answer.stopped_by}")
     return answer, spent
@@ -59,7 +53,7 @@ def gates(targets: int, seed: int, beside: bool) -> tuple[int, float, float]:
     answer, ours = _exact(problem)
     if not beside:
         return problem.num_tuples, ours, np.nan
-    other, theirs = _timed(lambda: by_milp(problem, np.inf))
+    other, theirs = timed(lambda: by_milp(problem, np.inf), time.process_time)
     if not other.success or abs(other.fun - answer.cost) > 1e-6 * abs(answer.cost):
         raise AssertionError(f"{targets} targets, seed {seed}: {answer.cost!r}, HiGHS {other.fun!r}: {other.message}")
     return problem.num_tuples, ours, theirs
@@ -74,7 +68,7 @@ def candidates(count: int, seed: int) -> tuple[int, float, float]:
     costs = 0.1 + rng.random(len(pairs))
     answer, ours = _exact(assoc.AssignmentProblem(pairs + 1, costs, (count, count), dummy=False))
     matrix = csr_array((costs, pairs.T), shape=(count, count))
-    (rows, columns), theirs = _timed(lambda: min_weight_full_bipartite_matching(matrix))
+    (rows, columns), theirs = timed(lambda: min_weight_full_bipartite_matching(matrix), time.process_time)
     _same(answer.cost, float(matrix[rows, columns].sum()))
     return len(pairs), ours, theirs
 
@@ -86,7 +80,7 @@ def dense(
     numbers = np.arange(1.0, count + 1.0)
     matrix = np.random.default_rng(seed).random((count, count)) if kind == "uniform" else np.outer(numbers, numbers)
     answer, ours = _exact(assoc.AssignmentProblem.from_dense(matrix, dummy=False))
-    chosen, theirs = _timed(lambda: peer(matrix))
+    chosen, theirs = timed(lambda: peer(matrix), time.process_time)
     _same(answer.cost, float(matrix[chosen].sum()))
     return matrix.size, ours, theirs
 

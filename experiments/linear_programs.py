@@ -9,7 +9,6 @@ which keeps nothing) begins anew. All bounds must agree to 1e-9 of the optimum. 
 to a core, kernels compiled; ratios are of the same programs.
 """
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -25,10 +24,10 @@ from assoc.packing.prepare import prepare
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks import FIRST_SEED
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances import scenes, synthetic
+from experiments.common.measuring import one_core, timed
 
 KINDS: dict[str, Callable[[int], AssignmentProblem]] = {
     **{
@@ -69,12 +68,6 @@ def highs(packing: Packing, columns: np.ndarray[Any, np.dtype[np.bool_]]) -> flo
     return float(answer.fun)
 
 
-def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    begin = time.thread_time()
-    answer = call()
-    return answer, 1e3 * (time.thread_time() - begin)
-
-
 def measured(packing: Packing, peer: Callable[[Packing, Any], float] = highs) -> dict[str, float]:
     """Milliseconds and ratios of one program, the same bounds asserted."""
     everything = np.ones(packing.num_columns, dtype=np.bool_)
@@ -83,8 +76,8 @@ def measured(packing: Packing, peer: Callable[[Packing, Any], float] = highs) ->
     def ours() -> Any:
         return program.solve(duals=dual_bound(packing))
 
-    relaxed, own = _timed(ours)
-    least, theirs = _timed(lambda: peer(packing, everything))
+    relaxed, own = timed(ours)
+    least, theirs = timed(lambda: peer(packing, everything))
     check(relaxed.bound, least)
     program.mark()
     used = np.flatnonzero((relaxed.primal > 1e-6) & (relaxed.primal < 1.0 - 1e-6))[:MASKED]
@@ -94,12 +87,14 @@ def measured(packing: Packing, peer: Callable[[Packing, Any], float] = highs) ->
         columns = everything.copy()
         columns[j] = False
         program.back()
-        warm, spent = _timed(lambda columns=columns: program.solve(columns=columns))
-        cold, others = _timed(lambda columns=columns: peer(packing, columns))
+        warm, spent = timed(lambda columns=columns: program.solve(columns=columns))
+        cold, others = timed(lambda columns=columns: peer(packing, columns))
         check(warm.bound, cold)
         again.append(spent)
         anew.append(others / spent)
-    values = (packing.num_rows, packing.num_columns, own, theirs / own, np.median(again), np.median(anew))
+    values = (
+        packing.num_rows, packing.num_columns, 1e3 * own, theirs / own, 1e3 * np.median(again), np.median(anew),
+    )  # fmt: skip
     return dict(zip(COLUMNS, map(float, values), strict=True))
 
 

@@ -9,9 +9,7 @@ compares them with exact sums. Reliability: crowds with truth, tuples grouped by
 share of each group that is one target's detections and all of them.
 """
 
-import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.stats import beta
@@ -23,10 +21,10 @@ from assoc.ranking.columns import price_all_columns
 from assoc.ranking.marginals import Marginals
 from assoc.ranking.sampler import estimates
 from assoc.simulation import simulate
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
+from experiments.common.measuring import one_core, timed
 
 NAME = "probabilities"
 _GOAL = "goal chosen by us"
@@ -64,13 +62,6 @@ KINDS: dict[str, tuple[Callable[[int], AssignmentProblem], float, float]] = {
     "ghosts of 40": (_scan(lambda seed: scenes.ghost(40, seed)), 0.2, _LIMIT),
 }
 """What makes a problem from a seed, the mean width that is the goal, and the seconds."""
-
-
-def timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    """Answer and processor time of this thread."""
-    begin = time.thread_time()
-    answer = call()
-    return answer, time.thread_time() - begin
 
 
 def widths(name: str, seeds: Sequence[int]) -> list[Claim]:

@@ -22,11 +22,11 @@ from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import price_all_columns
 from assoc.simulation import simulate
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
-from experiments.probabilities import timed, two_lists
+from experiments.common.measuring import one_core, timed
+from experiments.probabilities import two_lists
 
 NAME = "probabilities_beside"
 _MOVES = 10_000_000

@@ -17,13 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import assoc
-from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.simulation import simulate
-from experiments.benchmarks.run import one_core
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances import scenes
+from experiments.common.measuring import fresh, one_core
 from experiments.common.peers import PEERS
 
 
@@ -65,15 +64,12 @@ def parts_of(scene: Scene) -> dict[str, float]:
     """Milliseconds of each part, for the first scan of a scene."""
     problem = assoc.build_problem(scene, 0)
 
-    def fresh() -> AssignmentProblem:
-        return AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
-
     return {
         "build_problem": median_ms(lambda _: assoc.build_problem(scene, 0)),
         "exact": median_ms(assoc.assign, lambda: assoc.build_problem(scene, 0)),
-        "AssignmentProblem": median_ms(lambda _: fresh()),
-        "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), fresh),
-        "HiGHS": median_ms(lambda one: PEERS["highs"](one, 60.0), fresh),
+        "AssignmentProblem": median_ms(lambda _: fresh(problem)),
+        "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), lambda: fresh(problem)),
+        "HiGHS": median_ms(lambda one: PEERS["highs"](one, 60.0), lambda: fresh(problem)),
     }
 
 

@@ -14,9 +14,10 @@ import assoc
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.rows import Row
-from experiments.benchmarks.run import one_core, timed
+from experiments.benchmarks.run import timed
 from experiments.common.checking import check_answer
 from experiments.common.instances import scenes, synthetic
+from experiments.common.measuring import fresh, one_core
 
 PLANAR, PLANAR_K = "2-D n=100 k=100", 100
 SPATIAL, SPATIAL_K = "3x20 k=20", 20
@@ -54,19 +55,15 @@ def run(seeds: int | None, log: Callable[[str], None], spatial_k: int = SPATIAL_
     return rows
 
 
-def _fresh(problem: AssignmentProblem) -> AssignmentProblem:
-    return AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
-
-
 def _ranked(solver: str, rank: Rank, size: str, problem: AssignmentProblem, k: int, seed: int) -> Ranking:
     """Rank the k best, several times where that is short, as all runs of the benchmark."""
     costs: list[float] = []
 
     def run_once() -> Row:
-        fresh = _fresh(problem)
+        given = fresh(problem)
         with one_core():
             start, before = time.perf_counter(), time.process_time()
-            found = rank(fresh, k)
+            found = rank(given, k)
             seconds, cpu = time.perf_counter() - start, time.process_time() - before
         costs[:] = found(problem)
         best = costs[0]

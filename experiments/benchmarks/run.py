@@ -23,6 +23,7 @@ from experiments.benchmarks.wide_gaps import linear_bound
 from experiments.common import annealing, peers
 from experiments.common.checking import check_answer
 from experiments.common.instances import scenes, synthetic
+from experiments.common.measuring import fresh, one_core
 
 PROVING = ("exact", "milp")
 UNLIMITED = 1_000_000_000
@@ -30,20 +31,6 @@ UNLIMITED = 1_000_000_000
 SHORT, TIMES = 0.1, 5
 # families whose rows tell the gap of the linear program
 GHOSTS = ("ghost", "wide gap")
-
-
-@contextlib.contextmanager
-def one_core() -> Iterator[None]:
-    """Pin this thread, and the threads it starts, to one core (where the system can)."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(before)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
 
 
 def warm_up(ours: set[str], others: set[str]) -> None:
@@ -204,9 +191,7 @@ def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: flo
     with one_core():
         start, before = time.perf_counter(), time.process_time()
         try:
-            # A new problem each time: nothing that an earlier solver prepared may be left in it.
-            fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
-            solution = assoc.assign(fresh, entry.solver, time_limit=entry.limit, callback=callback, **options)
+            solution = assoc.assign(fresh(problem), entry.solver, time_limit=entry.limit, callback=callback, **options)
         except InfeasibleError:
             seconds = time.perf_counter() - start
             return replace(blank, solver=entry.label, limit=entry.limit, seconds=seconds, status="none")

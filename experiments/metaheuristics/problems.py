@@ -56,8 +56,3 @@ PROBLEMS: dict[str, Callable[[int], AssignmentProblem]] = {
 def problem(name: str, number: int) -> AssignmentProblem:
     """Return the problem of a name, numbers from 0."""
     return PROBLEMS[name](FIRST_SEED + number)
-
-
-def fresh(one: AssignmentProblem) -> AssignmentProblem:
-    """Return a copy in which nothing is left that an earlier solver prepared."""
-    return AssignmentProblem(one.tuples, one.costs, one.sizes, dummy=one.dummy)

@@ -12,7 +12,7 @@ from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import TracePoint
 from experiments.common.checking import check_answer
-from experiments.metaheuristics.problems import fresh
+from experiments.common.measuring import fresh
 
 UNLIMITED = 1_000_000_000
 # kernels look at the clock on the wall: their deadline is later by this than the budget would need

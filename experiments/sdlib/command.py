@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from assoc import check
-from experiments.benchmarks.run import one_core
+from experiments.common.measuring import one_core
 from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 

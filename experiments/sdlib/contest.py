@@ -19,8 +19,8 @@ from typing import Any
 from assoc import check
 from assoc.errors import AssocError
 from assoc.problem import AssignmentProblem
-from experiments.benchmarks.run import one_core
 from experiments.benchmarks.run import warm_up as compile_kernels
+from experiments.common.measuring import fresh, one_core
 from experiments.sdlib import store
 from experiments.sdlib.contestants import CONTESTANTS, OURS, Log, is_installed, takes, warm_up
 from experiments.sdlib.instances import Instance
@@ -100,8 +100,6 @@ def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: flo
             file.write(json.dumps(content) + "\n")
             file.flush()
 
-        # a new problem: nothing that a solver prepared before may be left in it
-        fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
         warm_up(name)
         log = Log(
             best,
@@ -110,7 +108,7 @@ def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: flo
         )
         log.allow(_TWICE * seconds)
         try:
-            tuples, proven = CONTESTANTS[name](fresh, seconds, log)
+            tuples, proven = CONTESTANTS[name](fresh(problem), seconds, log)
             write({"seconds": round(log.elapsed(), 4), "tuples": tuples.tolist(), "proved": proven})
         except _FAULTS as error:
             write({"seconds": round(log.elapsed(), 4), "fault": f"{type(error).__name__}: {error}"[:100]})
