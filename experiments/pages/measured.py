@@ -1,9 +1,11 @@
 """Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from experiments.common.claims import Claim
 from experiments.common.results import RESULTS, Results, number, result_file, table
+from experiments.pages.trackers import labels
 
 SCENARIOS = tuple("CDEFGH")
 _FOR = {
@@ -29,6 +31,11 @@ def _judged(claim: Claim, digits: int = 3) -> str:
     """Our figure, bold where it misses its limit."""
     text = number(claim.ours, digits)
     return f"**{text}**" if claim.holds is False else text
+
+
+def _grid(r: Results, kinds: Iterable[str], what: Sequence[str], digits: int = 3) -> list[list[str]]:
+    """A row of judged figures for each kind; a cell is empty where nothing was measured."""
+    return [[kind, *(_judged(r[q], digits) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
 
 
 def fuzzy() -> str:
@@ -157,30 +164,25 @@ def overhead() -> str:
     """The overhead of a run in a parameter study."""
     r = Results("sweep_overhead")
     parts = ("overhead a run", "processor time of the sweep, a run", "in the solver, a run")
-    rows = [
-        [f"{kind}, {backend}", *(_judged(r[f"{kind}, {backend}: {part}"], 2) for part in parts)]
-        for kind in ("greedy", "ant colony")
-        for backend in ("one process", "two processes", "dask")
-    ]
-    return table(["ms", *parts], rows)
+    backends = ("one process", "two processes", "dask")
+    kinds = [f"{kind}, {backend}" for kind in ("greedy", "ant colony") for backend in backends]
+    return table(["ms", *parts], _grid(r, kinds, parts, 2))
 
 
 def scan_time() -> str:
     """From one scan's measurements to a proven answer, part by part."""
     r = Results("scan_time")
-    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": HiGHS / exact")]
-    parts = ("build_problem and exact", "build_problem", "exact", "AssignmentProblem", "greedy", "HiGHS")
-    rows = [[kind, *(_judged(r[f"{kind}: {part}"]) for part in (*parts, "HiGHS / exact"))] for kind in kinds]
-    return table(["ms", "both", *parts[1:], "HiGHS / exact"], rows)
+    parts = ("build_problem", "exact", "AssignmentProblem", "greedy", "HiGHS", "HiGHS / exact")
+    rows = _grid(r, labels(r, ": HiGHS / exact"), ("build_problem and exact", *parts))
+    return table(["ms", "both", *parts], rows)
 
 
 def ghost_rankings() -> str:
     """The ten best of ghost scenes: seconds, and what is proved."""
     r = Results("ghost_rankings")
-    kinds = [c.quantity.removesuffix(": scenes") for c in r.claims if c.quantity.endswith(": scenes")]
     times = ("kbest, median", "kbest, longest", "marginals, median", "marginals, longest")
     rows = []
-    for kind in kinds:
+    for kind in labels(r, ": scenes"):
         claim = r[f"{kind}: proved"]
         proved = f"{claim.ours:.0f} of {r[f'{kind}: scenes'].ours:.0f}"
         proved = proved if claim.holds else f"**{proved}**"
@@ -194,18 +196,15 @@ def ghost_rankings() -> str:
 def probabilities() -> str:
     """Mean width of certified intervals of probabilities, and estimates beside long chains."""
     r = Results("probabilities")
-    kinds = [c.quantity.removesuffix(": mean width") for c in r.claims if c.quantity.endswith(": mean width")]
     what = ("mean width", "seconds", "estimate, seconds", "estimate, mean off long chains",
             "estimate, furthest off long chains")  # fmt: skip
-    rows = [[kind, *(_judged(r[q], 3) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
-    return table(["", *what], rows)
+    return table(["", *what], _grid(r, labels(r, ": mean width"), what))
 
 
 def probabilities_beside() -> str:
     """Errors and times of ways to probabilities, beside exact sums."""
     r = Results("probabilities_beside")
-    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": problems summed exactly")]
-    ways = [c.quantity.split(": ")[0].split(", ", 1) for c in r.claims if c.quantity.endswith(": mean error")]
+    kinds, ways = labels(r, ": problems summed exactly"), [one.split(", ", 1) for one in labels(r, ": mean error")]
     what = ("mean error", "largest error", "seconds")
     rows = [[kind, way, *(number(r[f"{kind}, {way}: {one}"].ours, 2) for one in what)]
             for kind in kinds for of, way in ways if of == kind]  # fmt: skip
@@ -215,11 +214,10 @@ def probabilities_beside() -> str:
 def linear_programs() -> str:
     """Times of our simplex method, and ratios of HiGHS's to them."""
     r = Results("linear_programs")
-    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": rows")]
+    kinds = labels(r, ": rows")
     what = [c.quantity.split(": ")[1] for c in r.claims if c.quantity.startswith(f"{kinds[0]}: ")]
     heads = [f"{one}, ms" if one.startswith("ours") else one for one in what]
-    rows = [[kind, *(number(r[f"{kind}: {one}"].ours) for one in what)] for kind in kinds]
-    return table(["", *heads], rows)
+    return table(["", *heads], _grid(r, kinds, what))
 
 
 def _sizes(r: Results, kind: str) -> list[str]:
@@ -264,8 +262,7 @@ def large_components() -> str:
     r = Results("large_components")
     kinds = dict.fromkeys(c.quantity.rpartition(": ")[0] for c in r.claims)
     what = ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio")
-    rows = [[kind, *(_judged(r[q]) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
-    return table(["problems", *what], rows)
+    return table(["problems", *what], _grid(r, kinds, what))
 
 
 def first_call(folder: Path = RESULTS) -> str:
@@ -273,9 +270,8 @@ def first_call(folder: Path = RESULTS) -> str:
     if not result_file("cold_start", folder).exists():
         return "`make bench-cold` measures the seconds on your machine."
     r = Results("cold_start", folder)
-    labels = [c.quantity.removesuffix(": fresh clone, wall") for c in r.claims if c.quantity.endswith("clone, wall")]
     rows = []
-    for label in labels:
+    for label in labels(r, ": fresh clone, wall"):
         cells = []
         for way in ("fresh clone", "wheel", "again"):
             first = f"{label}: {way}, first scan, wall"
