@@ -40,7 +40,7 @@ _WIDE = 0.02
 # seconds that chains take to begin, for each measurement of each column, at most
 _ENTRY = 5e-7
 # inverse temperatures at which the unseen weight is bounded
-_EXPONENTS = (1.0, 0.75, 0.5, 0.0)
+_EXPONENTS = (1.0, 0.5, 0.0)
 # intervals up to this width need no listing, nor do those of two lists unless they say next to nothing
 _NARROW, _NARROW_PAIRS = 2e-9, 0.5
 # share of the weight that sums may always lose to rounding

@@ -303,6 +303,17 @@ def test_two_sensors_without_duals_of_the_packing():
             assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
 
 
+@pytest.mark.parametrize(("sizes", "share", "width"), [((40, 40), 0.3, 1e-6), ((8, 8, 8, 8), 0.1, 1e-12)])
+def test_decided_problems_too_wide_to_be_summed(sizes, share, width):
+    """Each needs the bound of the unseen weight at another temperature."""
+    rng = np.random.default_rng(2)
+    tuples = np.argwhere(rng.random(sizes) < share)
+    tuples = np.unique(np.concatenate([tuples, np.repeat(np.arange(sizes[0])[:, None], len(sizes), axis=1)]), axis=0)
+    costs = rng.normal(0.0, 100.0 if len(sizes) == 2 else 50.0, len(tuples))
+    result = marginals(AssignmentProblem(tuples + 1, costs, sizes, dummy=False), method="certified")
+    assert result.listed > 0 and result.unseen < width
+
+
 @pytest.mark.parametrize("looks", [0, 1, 2])
 def test_sampling_may_end_at_any_time(looks):
     """Also where all moves made so far are those to be forgotten."""
