@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -204,6 +205,15 @@ def surfaces(kind: str) -> Callable[[Any], None]:
     return draw
 
 
+def stonesoup_fusion(figure: Any) -> None:
+    """Draw three ways to track in Stone Soup, on the ten scenes of the experiment's full run; takes minutes."""
+    from experiments.trackers import fusion_in_stone_soup as fusion
+
+    figure.set_size_inches(11, 4.6)
+    seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()
+    fusion.draw(figure, (fusion.compare(seeds)[0][:, :, :, 0], fusion.simulate(seeds[0])))
+
+
 def reliability(figure: Any) -> None:
     """Share of tuples that are true, over the probability that they are given."""
     claims = [c for c in Results("probabilities").claims if c.quantity.startswith("reliability")]
@@ -231,8 +241,10 @@ PICTURES: dict[str, Callable[[Any], None]] = {
     "surfaces-ghosts-20": surfaces("surfaces-ghosts-20"),
     "surfaces-ghosts-40": surfaces("surfaces-ghosts-40"),
     "surfaces-poor-radars": surfaces("surfaces-poor-radars"),
+    "stonesoup-fusion": stonesoup_fusion,
     "reliability": reliability,
 }
+_NEEDS = {"report": "chromium and chromedriver are", "stonesoup-fusion": "stonesoup is"}
 
 
 def drawn(draw: Callable[[Any], None]) -> bytes:
@@ -295,9 +307,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f"no picture is called {name!r}")
     given.output.mkdir(parents=True, exist_ok=True)
     for name in names:
-        picture = screenshot() if name == "report" else drawn(PICTURES[name])
+        if name == "stonesoup-fusion" and find_spec("stonesoup") is None:
+            picture = None
+        else:
+            picture = screenshot() if name == "report" else drawn(PICTURES[name])
         if picture is None:
-            print(f"{name:<20} left out: chromium and chromedriver are not installed")
+            print(f"{name:<20} left out: {_NEEDS[name]} not installed")
             continue
         if len(picture) > LARGEST:
             raise SystemExit(f"{name}: {len(picture)} bytes, more than {LARGEST}")

@@ -22,6 +22,8 @@ GOALS = (
 )  # fmt: skip
 """Experiments whose goals are listed, in this order."""
 
+_PARTS = ("localisation", "missed", "false")
+
 
 def figure(value: float, digits: int = 3) -> str:
     """A number, whole ones as such."""
@@ -56,6 +58,20 @@ def labels(results: Results, words: str) -> list[str]:
     """Kinds of scenes in the order of the file, by the claims that end so."""
     found = [c.quantity.removesuffix(words) for c in results.claims if c.quantity.endswith(words)]
     return [one for one in found if not one.startswith("goal: ")]
+
+
+def fusion_in_stone_soup() -> str:
+    """Three ways to track three radars in Stone Soup."""
+    r = Results("trackers.fusion_in_stone_soup")
+    ways = [c.quantity.removesuffix(": GOSPA, missed") for c in r.claims if c.quantity.endswith(": GOSPA, missed")]
+    rows = []
+    for way in ways:
+        less, ratio = f"{way} less {ways[0]}: GOSPA", f"{ways[0]} / {way}: time"
+        cells = [mean(r[f"{way}: {part}"]) for part in ("GOSPA", *(f"GOSPA, {one}" for one in _PARTS))]
+        cells += ["" if words not in r else mean(r[words]) for words in (less, less + " from 18 s on")]
+        rows.append([way, *cells, "1" if ratio not in r else number(1.0 / r[ratio].ours, 2)])
+    head = ["GOSPA, m", "mean", *_PARTS, "less the first row's", "that from 18 s on", "time / first row's"]
+    return table(head, rows)
 
 
 def in_stone_soup() -> str:
@@ -234,5 +250,6 @@ TABLES = {
     "live": lambda: plain("trackers.live"),
     "goals": goals,
     "biases": registration,
+    "fusion": fusion_in_stone_soup,
     "in-stone-soup": in_stone_soup,
 }
