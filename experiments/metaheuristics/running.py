@@ -68,8 +68,8 @@ def _by_processor_time(workers: int) -> Iterator[None]:
     def runtime(self: Run) -> float:
         return (time.process_time() - began) / workers
 
-    def deadline(self: Run) -> float:
-        left = self.remaining()
+    def deadline(self: Run, share: float = 1.0) -> float:
+        left = share * self.remaining()
         return time.monotonic() + left * _LATER * _pace.ratio
 
     with mock.patch.object(Run, "runtime", runtime), mock.patch.object(Run, "deadline", deadline):

@@ -23,6 +23,12 @@ def test_a_runs_clock_counts_processor_time_by_worker(monkeypatch):
         assert run.runtime() == 0.5
 
 
+def test_searches_that_dive_run_by_that_clock():
+    """Parts of the work have their deadlines by it, too."""
+    one = problem("ghosts 20", 0)
+    assert running.run(one, "tabu", 5.0, 0, iterations=1) <= assoc.assign(one, "greedy").cost
+
+
 def test_what_comes_after_the_budget_does_not_count(monkeypatch):
     one = problem("ghosts 20", 0)
     clock = iter(np.arange(0.0, 1e6, 10.0))
