@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
@@ -28,6 +28,21 @@ from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.kernels.dispatch import wrap
 
 
+@inner_njit
+def _distance(z: Array, h: Array, L: Array, code: int, v: Array) -> float:
+    """Squared Mahalanobis distance of a measurement from the expected one, by a Cholesky factor; v (d,) is scratch."""
+    for a in range(len(v)):
+        v[a] = z[a] - h[a]
+    wrap(code, v)
+    total = 0.0
+    for a in range(len(v)):
+        for e in range(a):
+            v[a] -= L[a, e] * v[e]
+        v[a] /= L[a, a]
+        total += v[a] * v[a]
+    return total
+
+
 @njit
 def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
     """Log-likelihood and squared Mahalanobis distance, each (B, M), of each measurement under each target.
@@ -44,17 +59,8 @@ def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
         for a in range(d):
             base += 2.0 * math.log(L[a, a])
         for m in range(len(z)):
-            for a in range(d):
-                v[a] = z[m, a] - h[b, a]
-            wrap(code, v)
-            total = 0.0
-            for a in range(d):
-                for e in range(a):
-                    v[a] -= L[a, e] * v[e]
-                v[a] /= L[a, a]
-                total += v[a] * v[a]
-            square[b, m] = total
-            ll[b, m] = -0.5 * (total + base)
+            square[b, m] = _distance(z[m], h[b], L, code, v)
+            ll[b, m] = -0.5 * (square[b, m] + base)
     return GOOD, ll, square
 
 
@@ -143,16 +149,7 @@ def distances(h: Array, S: Array, rows: Array, z: Array, code: int) -> tuple[int
             last = b
             if not factor(S[b], d, L):
                 return BAD_COVARIANCE + STATUSES * b, square
-        for a in range(d):
-            v[a] = z[k, a] - h[b, a]
-        wrap(code, v)
-        total = 0.0
-        for a in range(d):
-            for e in range(a):
-                v[a] -= L[a, e] * v[e]
-            v[a] /= L[a, a]
-            total += v[a] * v[a]
-        square[k] = total
+        square[k] = _distance(z[k], h[b], L, code, v)
     return GOOD, square
 
 

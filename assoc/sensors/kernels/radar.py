@@ -55,25 +55,34 @@ def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Ar
 
 
 @inner_njit
-def add_radar3d(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
-    """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
-    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
+def _range_azimuth(position: Three, measured: Three, at: Three) -> tuple[Three, Three, float, float, Three, Three]:
+    """Residuals of range and azimuth for `add_radar3d` and `add_radar2d`, and what they need of their derivatives.
+
+    Returns the offset from the radar; (residual of range, of azimuth, ground range); ground range and slant range above
+    zero; the derivatives of range and of azimuth.
+    """
     dx, dy, dz = at[0] - position[0], at[1] - position[1], at[2] - position[2]
     flat2 = dx * dx + dy * dy
     turn = math.atan2(dy, dx)
     flat = math.sqrt(flat2)
-    slant2 = flat2 + dz * dz
-    slant = math.sqrt(slant2)
-    v0 = measured[0] - slant
+    slant = math.sqrt(flat2 + dz * dz)
     v1 = measured[1] - turn
     v1 -= TURN * round(v1 / TURN)
+    residual = (measured[0] - slant, v1, flat)
     # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
     # taken if they help
     slant = max(slant, NEAREST)
     flat = max(flat, 1e-5 * slant, NEAREST)
-    r0, r1, r2 = dx / slant, dy / slant, dz / slant
-    t0, t1 = -dy / (flat * flat), dx / (flat * flat)
-    v2 = measured[2] - math.atan2(dz, math.sqrt(flat2))
+    by_range, by_azimuth = (dx / slant, dy / slant, dz / slant), (-dy / (flat * flat), dx / (flat * flat), 0.0)
+    return (dx, dy, dz), residual, flat, slant, by_range, by_azimuth
+
+
+@inner_njit
+def add_radar3d(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
+    """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
+    (dx, dy, dz), (v0, v1, ground), flat, slant, (r0, r1, r2), (t0, t1, _) = _range_azimuth(position, measured, at)
+    v2 = measured[2] - math.atan2(dz, ground)
     e0 = -dx * dz / (flat * slant * slant)
     e1 = -dy * dz / (flat * slant * slant)
     e2 = flat / (slant * slant)
@@ -105,21 +114,7 @@ def add_radar3d(W: Six, position: Three, measured: Three, at: Three, sums: Infor
 def add_radar2d(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
-    dx, dy, dz = at[0] - position[0], at[1] - position[1], at[2] - position[2]
-    flat2 = dx * dx + dy * dy
-    turn = math.atan2(dy, dx)
-    flat = math.sqrt(flat2)
-    slant2 = flat2 + dz * dz
-    slant = math.sqrt(slant2)
-    v0 = measured[0] - slant
-    v1 = measured[1] - turn
-    v1 -= TURN * round(v1 / TURN)
-    # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
-    # taken if they help
-    slant = max(slant, NEAREST)
-    flat = max(flat, 1e-5 * slant, NEAREST)
-    r0, r1, r2 = dx / slant, dy / slant, dz / slant
-    t0, t1 = -dy / (flat * flat), dx / (flat * flat)
+    _, (v0, v1, _), _, _, (r0, r1, r2), (t0, t1, _) = _range_azimuth(position, measured, at)
     # weights of a height that is not measured are 0
     v2 = measured[2] - at[2]
     w0, w1 = W[0] * v0 + W[1] * v1 + W[2] * v2, W[1] * v0 + W[3] * v1 + W[4] * v2
