@@ -140,7 +140,7 @@ def _rematch(packing: PackingArrays, owner: Ints, sensor: Ints, mask: int) -> fl
     num_right = _halves(cols, owner, sensor, mask, 0, half, right_size, right_first)
     left_alone, left_column = np.zeros(num_left), np.full(num_left, -1, np.int64)
     right_alone, right_column = np.zeros(num_right), np.full(num_right, -1, np.int64)
-    left_must = right_must = 0
+    left_must = 0
     for r in range(num_rows):
         if not slack[r]:
             if (mask >> sensor[r]) & 1:
@@ -148,7 +148,6 @@ def _rematch(packing: PackingArrays, owner: Ints, sensor: Ints, mask: int) -> fl
             else:
                 right_alone[half[r]] = np.inf
     for q in range(num_right):
-        right_must += right_alone[q] == np.inf
         if right_size[q] > 1:
             r = right_first[q]
             for k in range(row_ptr[r], row_ptr[r + 1]):

@@ -24,8 +24,8 @@ FORGET = 50
 """Windows after which what is known of tracks that have ended is forgotten."""
 
 
-def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = True) -> Iterator[Step]:
-    """Step a tracker through windows of plots.
+def step_windows(tracker: Tracker, windows: Iterable[Window]) -> Iterator[Step]:
+    """Step a tracker through windows of plots, each plot at its own time.
 
     Parameters
     ----------
@@ -34,8 +34,6 @@ def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = 
         own.
     windows : iterable of Window
         They may overlap a little in time; a plot older than the last window's end gets that time.
-    stamps : bool
-        Whether each plot keeps its own time; otherwise all plots of a window get the time of its end.
 
     Yields
     ------
@@ -49,8 +47,8 @@ def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = 
             times = np.maximum(times, early)
         end = float(times[-1]) if len(times) else float(early or 0.0)
         known, rows = np.stack([window.identities, window.addresses], axis=1), rows_of(tracker, window)
-        own = [times[row] for row in rows] if stamps else None
-        yield tracker.step(end, measured(tracker, window), own, identities=[known[row] for row in rows])
+        stamps, identities = [times[row] for row in rows], [known[row] for row in rows]
+        yield tracker.step(end, measured(tracker, window), stamps, identities=identities)
 
 
 def rows_of(tracker: Tracker, window: Window) -> list[Array]:
