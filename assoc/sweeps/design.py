@@ -86,7 +86,7 @@ def _combinations(solver: str, spaces: Mapping[str, Space], label: str, drawn_by
     for name, space in spaces.items():
         if isinstance(space, Range):
             raise InvalidInputError(
-                f"{label}: {name} is a range, which only a random design takes ({drawn_by}); a grid needs values"
+                f"{label}: {solver}.{name} is a range, which only a random design takes ({drawn_by}); give values"
             )
         lists.append(space.values)
     count = math.prod(map(len, lists))
@@ -163,24 +163,21 @@ def settings_from(
     label : str
         Prefix of errors.
     """
-    found: list[Setting] = []
-    drawn = False
-    for solver, given in tables.items():
-        for table in given if isinstance(given, list) else [given]:
-            if not isinstance(table, Mapping):
-                raise InvalidInputError(f"{label}[{solver}]: expected a table of parameters, got {table!r}")
-            try:
-                spaces = _spaces(solver, {key.replace("-", "_"): value for key, value in table.items()})
-                if random is not None and _is_open(spaces):
-                    found += _drawn(solver, spaces, random, seed, "random")
-                else:
-                    found += _combinations(solver, spaces, f"[{solver}]", "random = N")
-            except (InvalidInputError, LimitExceededError) as error:
-                raise type(error)(f"{label}{error}") from None
-            drawn |= _is_open(spaces)
-    if random is not None and tables and not drawn:
-        raise InvalidInputError(f"{label}random: nothing to draw; give lists of values or ranges")
-    return list(dict.fromkeys(found))
+    try:
+        designs = [
+            (solver, _spaces(solver, _table(solver, table)))
+            for solver, given in tables.items()
+            for table in (given if isinstance(given, list) else [given])
+        ]
+        return designed(designs, random, seed, "random", "random")
+    except (InvalidInputError, LimitExceededError) as error:
+        raise type(error)(f"{label}{error}") from None
+
+
+def _table(solver: str, given: object) -> dict[str, Any]:
+    if not isinstance(given, Mapping):
+        raise InvalidInputError(f"[{solver}]: expected a table of parameters, got {given!r}")
+    return {key.replace("-", "_"): value for key, value in given.items()}
 
 
 def _is_open(spaces: Mapping[str, Space]) -> bool:
@@ -189,15 +186,19 @@ def _is_open(spaces: Mapping[str, Space]) -> bool:
 
 
 def designed(
-    designs: Sequence[tuple[str, Mapping[str, Space]]], random: int | None, seed: int, label: str = "--grid"
+    designs: Sequence[tuple[str, Mapping[str, Space]]],
+    random: int | None,
+    seed: int,
+    label: str = "--grid",
+    drawn_by: str = "--random",
 ) -> list[Setting]:
-    """Settings of several solvers without duplicates: every combination, or ``random`` drawn ones of each solver."""
+    """Settings of several solvers without duplicates: every combination, or ``random`` drawn ones of each design."""
     found: list[Setting] = []
     for solver, spaces in designs:
         if random is not None and _is_open(spaces):
-            found += _drawn(solver, spaces, random, seed, "--random")
+            found += _drawn(solver, spaces, random, seed, drawn_by)
         else:
-            found += _combinations(solver, spaces, label, "--random N")
+            found += _combinations(solver, spaces, label, f"{drawn_by}=N")
     if random is not None and designs and not any(_is_open(spaces) for _, spaces in designs):
-        raise InvalidInputError(f"{label}: nothing to draw at random; give values or ranges")
+        raise InvalidInputError(f"{label}: nothing to draw; give lists of values or ranges")
     return list(dict.fromkeys(found))

@@ -86,7 +86,7 @@ def test_tables_can_be_lists_of_designs():
         (lambda: read_words(["alpha=1", "alpha=2"], ["aco"]), "twice"),
         (lambda: read_words(["milp.backend=scip"], ["aco"]), "no solver of the study"),
         (lambda: settings_from({"aco": 3}), "expected a table"),
-        (lambda: settings_from({"aco": {"alpha": {"low": 1, "high": 2}}}), r"\[aco\]: alpha is .* \(random = N\)"),
+        (lambda: settings_from({"aco": {"alpha": {"low": 1, "high": 2}}}), r"^random: aco.alpha is .* \(random=N\)"),
         (lambda: settings_from({"aco": {"alpha": 1}}, 5), "random: nothing to draw"),
     ],
 )

@@ -184,24 +184,13 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
         except InvalidInputError as error:
             hint = f"; say which it is: columns = {{ ... }} of {where}" if ": no column " in str(error) else ""
             raise InvalidInputError(f"{error}{hint}") from None
-    content, source = read_asterix_plots(file, table.get("radar"), f"{where}: radar")
-    note = content.radars.get(source)
-    return content.plots[source], None if note is None else note.rotation, None if note is None else note.place
-
-
-def read_asterix_plots(file: str, radar: str | None, label: str) -> tuple[Any, tuple[int, int]]:
-    """The content of an ASTERIX file, and the radar chosen in it: the only one, or that named SAC/SIC."""
     from assoc.integrations.asterix import read_asterix
+    from assoc.integrations.asterix.parts import chosen_radar
 
     content = read_asterix(file)
-    known = {f"{sac}/{sic}": (sac, sic) for sac, sic in sorted(content.plots)}
-    if not known:
-        raise InvalidInputError(f"{file}: holds no plots (category 048)")
-    if radar is None and len(known) == 1:
-        return content, next(iter(known.values()))
-    if radar not in known:
-        raise InvalidInputError(f"{label}: the file holds plots of {', '.join(known)}; name one")
-    return content, known[radar]
+    source = chosen_radar(file, content.plots, table.get("radar"), f"{where}: radar")
+    note = content.radars.get(source)
+    return content.plots[source], None if note is None else note.rotation, None if note is None else note.place
 
 
 def _check_keys(where: str, table: dict[str, Any], known: tuple[str, ...]) -> None:

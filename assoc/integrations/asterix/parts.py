@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -51,12 +51,18 @@ class AsterixPlots:
                     yield from waiting.of(rows.rows, last=False)
                     rows.rows = []
         read.check(self._path)
-        known = {_name(source): rows for source, rows in sorted(read.plots.items())}
-        if not known:
-            raise InvalidInputError(f"{os.fspath(self._path)}: holds no plots (categories 001, 010, 020, 048)")
-        if self._radar not in known and (self._radar is not None or len(known) > 1):
-            raise InvalidInputError(f"{self._label}: the file holds plots of {', '.join(known)}; name one")
-        yield from waiting.of(known[self._radar or next(iter(known))].rows, last=True)
+        chosen = chosen_radar(self._path, read.plots, self._radar, self._label)
+        yield from waiting.of(read.plots[chosen].rows, last=True)
+
+
+def chosen_radar(path: str | os.PathLike[str], plots: Iterable[Source], radar: str | None, label: str) -> Source:
+    """The radar of a file whose plots are wanted: the only one, or that named SAC/SIC."""
+    known = {_name(source): source for source in sorted(plots)}
+    if not known:
+        raise InvalidInputError(f"{os.fspath(path)}: holds no plots (categories 001, 010, 020, 048)")
+    if radar not in known and (radar is not None or len(known) > 1):
+        raise InvalidInputError(f"{label}: the file holds plots of {', '.join(known)}; name one")
+    return known[radar or next(iter(known))]
 
 
 def _name(source: Source) -> str:
