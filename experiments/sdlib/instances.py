@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -50,38 +52,36 @@ def instances() -> list[Instance]:
     return [*_from_scenes(), *recorded, *_from_trackers(), *_synthetic()]
 
 
-def _scan(make: Callable[[], Scene], scan: int = 0, **gating: float) -> Callable[[], AssignmentProblem]:
-    return lambda: build_problem(make(), scan, **gating)  # type: ignore[arg-type]
+def _scan(make: Callable[..., Scene], *size: Any, scan: int = 0, **options: Any) -> Callable[[], AssignmentProblem]:
+    return lambda: build_problem(make(*size, **options), scan)
 
 
 def _from_scenes() -> list[Instance]:
     found = [
-        Instance(f"paper-{seed}-{scan}", "paper", _scan(lambda seed=seed: scenes.three_radar(seed), scan))
+        Instance(f"paper-{seed}-{scan}", "paper", _scan(scenes.three_radar, seed, scan=scan))
         for seed, scan in ((1, 0), (1, 50), (2, 25), (2, 75))
     ]
     sizes = ((3, 30), (3, 100), (3, 300), (3, 1000), (3, 3000), (4, 100), (4, 300), (5, 200), (6, 30), (6, 100))
-    for sensors, targets in sizes:
-        for seed in (1, 2) if targets <= 1000 else (1,):
-            make = lambda sensors=sensors, targets=targets, seed=seed: scenes.gated(sensors, targets, seed)  # noqa: E731
-            found.append(Instance(f"gated-{sensors}x{targets}-{seed}", "gated", _scan(make)))
-    for targets, seeds in ((10, 3), (15, 3), (20, 4), (30, 3), (40, 3), (60, 2), (100, 2), (150, 2)):
-        for seed in range(2001, 2001 + seeds):
-            make = lambda targets=targets, seed=seed: scenes.ghost(targets, seed)  # noqa: E731
-            found.append(Instance(f"bearings-{targets}-{seed}", "bearings", _scan(make)))
-    for targets in (20, 100, 300):
-        make = lambda targets=targets: scenes.radar_field(targets, 3)  # noqa: E731
-        found.append(Instance(f"radars-{targets}", "radars", _scan(make)))
-    for targets in (30, 100, 300):
-        for seed in (1, 2):
-            make = lambda targets=targets, seed=seed: simulate(  # noqa: E731
-                "crowd", seed, targets=targets, detection_probability=0.6, false_alarms_per_target=0.3
-            )
-            found.append(Instance(f"low-detection-{targets}-{seed}", "low detection", _scan(make)))
-    for targets in (6, 12, 25):
-        for seed in (1, 2):
-            make = lambda targets=targets, seed=seed: mixed(targets, seed)  # noqa: E731
-            found.append(Instance(f"mixed-{targets}-{seed}", "mixed sensors", _scan(make)))
-    return found
+    found += [
+        Instance(f"gated-{sensors}x{targets}-{seed}", "gated", _scan(scenes.gated, sensors, targets, seed))
+        for sensors, targets in sizes
+        for seed in ((1, 2) if targets <= 1000 else (1,))
+    ]
+    found += [
+        Instance(f"bearings-{targets}-{seed}", "bearings", _scan(scenes.ghost, targets, seed))
+        for targets, seeds in ((10, 3), (15, 3), (20, 4), (30, 3), (40, 3), (60, 2), (100, 2), (150, 2))
+        for seed in range(2001, 2001 + seeds)
+    ]
+    found += [Instance(f"radars-{n}", "radars", _scan(scenes.radar_field, n, 3)) for n in (20, 100, 300)]
+    rare = {"detection_probability": 0.6, "false_alarms_per_target": 0.3}
+    found += [
+        Instance(f"low-detection-{n}-{seed}", "low detection", _scan(simulate, "crowd", seed, targets=n, **rare))
+        for n in (30, 100, 300)
+        for seed in (1, 2)
+    ]
+    return found + [
+        Instance(f"mixed-{n}-{seed}", "mixed sensors", _scan(mixed, n, seed)) for n in (6, 12, 25) for seed in (1, 2)
+    ]
 
 
 def mixed(targets: int, seed: int) -> Scene:
@@ -131,48 +131,41 @@ def _problems(kind: str, scene: Scene) -> list[AssignmentProblem]:
     return found
 
 
-def _posed(kind: str, targets: int, seed: int) -> Callable[[], AssignmentProblem]:
-    def make() -> AssignmentProblem:
-        scene = simulate("crowd", seed, targets=targets, scans=8, interval=4.0, detection_probability=0.8)
-        return max(_problems(kind, scene)[-4:], key=lambda one: one.num_tuples)
-
-    return make
+def _posed(kind: str, targets: int, seed: int) -> AssignmentProblem:
+    """The largest of the last problems that a tracker poses."""
+    scene = simulate("crowd", seed, targets=targets, scans=8, interval=4.0, detection_probability=0.8)
+    return max(_problems(kind, scene)[-4:], key=lambda one: one.num_tuples)
 
 
 def _from_trackers() -> list[Instance]:
-    found = []
     kinds = (
         ("multi-sensor", "tracks and sensors", (20, 60, 150)),
         ("mht", "histories of several scans", (20, 40, 60)),
     )
-    for kind, name, sizes in kinds:
-        for targets in sizes:
-            for seed in (1, 2):
-                posed = _posed(kind, targets, seed)
-                found.append(Instance(f"{kind}-{targets}-{seed}", name, posed, kept=True))
-    return found
+    return [
+        Instance(f"{kind}-{targets}-{seed}", name, partial(_posed, kind, targets, seed), kept=True)
+        for kind, name, sizes in kinds
+        for targets in sizes
+        for seed in (1, 2)
+    ]
 
 
 def _synthetic() -> list[Instance]:
-    found = []
-    for n in (10, 20, 30, 40, 50):
-        for seed in (1, 2) if n <= 40 else (1,):
-            known = lambda n=n, seed=seed: synthetic.axial_known_optimum(n, seed)[0]  # noqa: E731
-            found.append(Instance(f"known-optimum-{n}-{seed}", "axial, known optimum", known))
-    for n in (4, 8, 12, 16, 20, 26):
-        for seed in (1, 2):
-            drawn = lambda n=n, seed=seed: synthetic.axial_random(n, seed)  # noqa: E731
-            found.append(Instance(f"axial-{n}-{seed}", "axial, random", drawn))
-    for sensors in (4, 5, 6):
-        for seed in (1, 2):
-            planted = lambda sensors=sensors, seed=seed: synthetic.planted(sensors, seed)[0]  # noqa: E731
-            found.append(Instance(f"planted-{sensors}-{seed}", "planted", planted))
-    for targets, seed in ((100, 1), (100, 2), (300, 1), (300, 2), (1000, 1)):
-        wide = lambda targets=targets, seed=seed: synthetic.wide_gates(targets, seed)  # noqa: E731
-        found.append(Instance(f"wide-gates-{targets}-{seed}", "wide gates", wide))
-    for seed in (1, 2, 3):
-        found.append(Instance(f"near-ties-{seed}", "near ties", lambda seed=seed: near_ties(seed)))
-    return found
+    kinds: tuple[tuple[str, str, Callable[..., Any], list[tuple[int, int]]], ...] = (
+        ("known-optimum", "axial, known optimum", lambda n, seed: synthetic.axial_known_optimum(n, seed)[0],
+         [(n, seed) for n in (10, 20, 30, 40, 50) for seed in ((1, 2) if n <= 40 else (1,))]),
+        ("axial", "axial, random", synthetic.axial_random,
+         [(n, seed) for n in (4, 8, 12, 16, 20, 26) for seed in (1, 2)]),
+        ("planted", "planted", lambda sensors, seed: synthetic.planted(sensors, seed)[0],
+         [(sensors, seed) for sensors in (4, 5, 6) for seed in (1, 2)]),
+        ("wide-gates", "wide gates", synthetic.wide_gates, [(100, 1), (100, 2), (300, 1), (300, 2), (1000, 1)]),
+    )  # fmt: skip
+    found = [
+        Instance(f"{name}-{size}-{seed}", family, partial(make, size, seed))
+        for name, family, make, sizes in kinds
+        for size, seed in sizes
+    ]
+    return found + [Instance(f"near-ties-{seed}", "near ties", partial(near_ties, seed)) for seed in (1, 2, 3)]
 
 
 def near_ties(seed: int) -> AssignmentProblem:
