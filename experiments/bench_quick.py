@@ -26,9 +26,9 @@ def _work() -> tuple[dict[str, Callable[[], Any]], Callable[[], Any]]:
     import assoc
     from assoc.simulation import simulate
     from assoc.tracking import TRACKERS, track_scene
+    from experiments.common.contestants import run
     from experiments.common.instances import scenes, synthetic
     from experiments.common.measuring import fresh
-    from experiments.common.peers import PEERS
 
     gated, ghosts = scenes.gated(3, 300, 1), assoc.build_problem(scenes.ghost(20, 1), 0)
     small, axial = assoc.build_problem(scenes.gated(3, 100, 1), 0), synthetic.axial_random(12, 1)
@@ -51,7 +51,7 @@ def _work() -> tuple[dict[str, Callable[[], Any]], Callable[[], Any]]:
             for name in ("multi-sensor", "mht", "joint-probabilistic")
         },
     }
-    return work, lambda: PEERS["highs"](small, 60.0)
+    return work, lambda: run("highs", small, 60.0)
 
 
 def _seconds(call: Callable[[], Any]) -> float:

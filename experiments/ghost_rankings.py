@@ -17,11 +17,10 @@ import assoc
 from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
-from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import WIDE_GAPS
 from experiments.common.claims import Claim
 from experiments.common.command import main_of_parts
-from experiments.common.instances import scenes
+from experiments.common.instances import FIRST_SEED, scenes
 from experiments.common.measuring import one_core, timed
 from experiments.common.peers import by_milp
 

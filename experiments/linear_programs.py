@@ -23,10 +23,9 @@ from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.problem import AssignmentProblem
-from experiments.benchmarks import FIRST_SEED
 from experiments.common.claims import Claim
 from experiments.common.command import main
-from experiments.common.instances import scenes, synthetic
+from experiments.common.instances import FIRST_SEED, scenes, synthetic
 from experiments.common.measuring import one_core, timed
 
 KINDS: dict[str, Callable[[int], AssignmentProblem]] = {

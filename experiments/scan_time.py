@@ -21,9 +21,9 @@ from assoc.scene import Scene
 from assoc.simulation import simulate
 from experiments.common.claims import Claim
 from experiments.common.command import main
+from experiments.common.contestants import run
 from experiments.common.instances import scenes
 from experiments.common.measuring import fresh, one_core
-from experiments.common.peers import PEERS
 
 
 class Kind(NamedTuple):
@@ -69,7 +69,7 @@ def parts_of(scene: Scene) -> dict[str, float]:
         "exact": median_ms(assoc.assign, lambda: assoc.build_problem(scene, 0)),
         "AssignmentProblem": median_ms(lambda _: fresh(problem)),
         "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), lambda: fresh(problem)),
-        "HiGHS": median_ms(lambda one: PEERS["highs"](one, 60.0), lambda: fresh(problem)),
+        "HiGHS": median_ms(lambda one: run("highs", one, 60.0), lambda: fresh(problem)),
     }
 
 

@@ -1,9 +1,12 @@
 """Benchmarks against other solvers: ``python -m experiments.benchmarks``.
 
-Instances come from `experiments.common.instances` by family, size and seed; seeds from 1000 on are reported and were
-used for no tuning (0 to 99 are for that). Our solvers run after warm-up, pinned to one core, and are timed
-from the tuples to the Solution; peers (`experiments.common.peers`) run on the same tuples in the same process, with
-both cores where they can use them.
+Instances come from `experiments.common.instances` by family, size and seed. All run after warm-up; ours are pinned to
+one core and timed from the tuples to the Solution; peers run on the same tuples in the same process, with both cores
+where they can use them.
 """
 
-FIRST_SEED = 1000
+import os
+
+# one thread for numerical libraries, before they are loaded: our solvers are measured on one
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")

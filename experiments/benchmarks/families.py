@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
+from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
-from experiments.benchmarks import FIRST_SEED
-from experiments.common.instances import scenes, synthetic
-
-HEURISTICS = ("aco", "genetic", "tabu")
+from experiments.common.contestants import HEURISTICS, ONE_CORE
+from experiments.common.instances import FIRST_SEED, scenes, synthetic
 
 WIDE_GAPS = {20: (2001, 2018, 2022, 2033, 2037), 40: (2014, 2037, 2041, 2068, 2089)}
 """Targets -> the first five seeds of ghosts from 2000 on whose linear program is about 1 % (0.7 % or more) below the
@@ -28,7 +27,7 @@ class Instance:
 class Entry:
     """One solver in a case.
 
-    solver: Name in ``assoc.solvers.names()`` or in `experiments.common.peers.PEERS`.
+    solver: Name in `experiments.common.contestants`.
     limit: Time limit, seconds.
     stop_gap: Stop as soon as the relative gap is this small (our solvers only).
     """
@@ -66,8 +65,7 @@ class Case:
 
     def on_one_core(self) -> Self:
         """Return the same case without peers that need two."""
-        both = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
-        peers = (replace(entry, solver=both.get(entry.solver, entry.solver)) for entry in self.peers)
+        peers = (replace(entry, solver=ONE_CORE.get(entry.solver, entry.solver)) for entry in self.peers)
         return replace(self, peers=tuple(dict.fromkeys(peers)))
 
     def by_seed(self, most: int | None = None) -> list[Self]:
@@ -81,39 +79,16 @@ class Case:
         return replace(self, peers=tuple(dict.fromkeys(peers)))
 
 
-def _from_scene(scene: Scene) -> Iterator[Instance]:
-    from assoc.costs import build_problem
-
-    for scan in range(scene.num_scans):
-        yield Instance(build_problem(scene, scan))
-
-
-def _paper(seed: int) -> Iterator[Instance]:
-    return _from_scene(scenes.three_radar(seed))
+def _scans(make: Callable[..., Scene], *size: int) -> Callable[[int], Iterator[Instance]]:
+    """What makes an instance of each scan of a scene, from the seed, which the scene is given last."""
+    return lambda seed: (
+        Instance(build_problem(scene, scan)) for scene in [make(*size, seed)] for scan in range(scene.num_scans)
+    )
 
 
-def _gated(sensors: int, targets: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: _from_scene(scenes.gated(sensors, targets, seed))
-
-
-def _ghost(targets: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: _from_scene(scenes.ghost(targets, seed))
-
-
-def _known(n: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: iter([Instance(*synthetic.axial_known_optimum(n, seed))])
-
-
-def _axial(n: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: iter([Instance(synthetic.axial_random(n, seed))])
-
-
-def _planted(sensors: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: iter([Instance(*synthetic.planted(sensors, seed))])
-
-
-def _wide_gates(targets: int) -> Callable[[int], Iterator[Instance]]:
-    return lambda seed: iter([Instance(synthetic.wide_gates(targets, seed))])
+def _one(make: Callable[..., Any], *size: int) -> Callable[[int], Iterator[Instance]]:
+    """What makes the one instance of a problem, or of a problem and its optimum, from the seed."""
+    return lambda seed: (Instance(*(found if isinstance(found, tuple) else (found,))) for found in [make(*size, seed)])
 
 
 def _entries(names: tuple[str, ...], limit: float) -> tuple[Entry, ...]:
@@ -135,7 +110,7 @@ def cases() -> list[Case]:
 def _paper_cases() -> Iterator[Case]:
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "greedy", "milp"), 1.0)
     peers = _entries(("highs", "sequential", "nrl_tracker"), 10.0)
-    yield Case("paper", "3 radars", _paper, ours, peers)
+    yield Case("paper", "3 radars", _scans(scenes.three_radar), ours, peers)
 
 
 def _gated_cases() -> Iterator[Case]:
@@ -148,7 +123,7 @@ def _gated_cases() -> Iterator[Case]:
             *_entries(HEURISTICS, limit),
             Entry("greedy", 10.0),
         )
-        yield Case("gated", f"{sensors}x{targets}", _gated(sensors, targets), ours, peers)
+        yield Case("gated", f"{sensors}x{targets}", _scans(scenes.gated, sensors, targets), ours, peers)
 
 
 def _ghost_cases() -> Iterator[Case]:
@@ -172,22 +147,21 @@ def _ghost_cases() -> Iterator[Case]:
         peers += [Entry("kap", late), *(Entry("chils", limit) for limit in sorted({min(limits[0], late), late}))]
         peers += _entries(("branch_reduce", "mmwis"), late) if targets <= 40 else ()
         brief = {20: 10, 40: 5}.get(targets, 2)
-        yield Case("ghost", str(targets), _ghost(targets), ours, tuple(peers), seeds, brief=brief)
+        yield Case("ghost", str(targets), _scans(scenes.ghost, targets), ours, tuple(peers), seeds, brief=brief)
 
 
 def _wide_gap_cases() -> Iterator[Case]:
     ours, peers = _entries(("exact",), 60.0), _entries(("cp_sat", "highs", "scip", "scip_1"), 60.0)
     for targets, seeds in WIDE_GAPS.items():
         brief = 5 if targets == 20 else 2
-        yield Case("wide gap", str(targets), _ghost(targets), ours, peers, len(seeds), seeds, brief)
+        yield Case("wide gap", str(targets), _scans(scenes.ghost, targets), ours, peers, len(seeds), seeds, brief)
 
 
 def _wide_gate_cases() -> Iterator[Case]:
     ours = (Entry("exact", 60.0), Entry("lagrangian", 10.0, stop_gap=1e-3), Entry("greedy", 10.0))
+    peers = _entries(("highs", "scip_1"), 120.0)
     for targets in (1000, 2000, 3000):
-        yield Case(
-            "wide gates", str(targets), _wide_gates(targets), ours, _entries(("highs", "scip_1"), 120.0), brief=1
-        )
+        yield Case("wide gates", str(targets), _one(synthetic.wide_gates, targets), ours, peers, brief=1)
 
 
 def _synthetic_cases() -> Iterator[Case]:
@@ -198,7 +172,7 @@ def _synthetic_cases() -> Iterator[Case]:
         if n == 100:
             # a million tuples, which no other solver takes
             ours, peers = ours[:1], _entries(("sequential",), limit)
-        yield Case("known optimum", f"n={n}", _known(n), ours, peers, seeds)
+        yield Case("known optimum", f"n={n}", _one(synthetic.axial_known_optimum, n), ours, peers, seeds)
     limits = {12: 5.0, 20: 10.0, 26: 10.0}
     # 60 instances of the sizes of Balas and Saltzman, heuristics on three sizes
     for n in range(4, 27, 2):
@@ -206,8 +180,8 @@ def _synthetic_cases() -> Iterator[Case]:
         if n in limits:
             ours += _entries((*HEURISTICS, "lagrangian", "greedy"), limits[n])
             peers += (Entry("cp_sat", 30.0), *_entries(("sequential", "nrl_tracker"), limits[n]))
-        yield Case("random axial", f"n={n}", _axial(n), ours, peers)
+        yield Case("random axial", f"n={n}", _one(synthetic.axial_random, n), ours, peers)
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "milp", "greedy"), 5.0)
     peers = _entries(("highs", "cp_sat", "sequential"), 30.0)
     for sensors in (3, 4, 5, 6):
-        yield Case("planted", f"S={sensors}", _planted(sensors), ours, peers)
+        yield Case("planted", f"S={sensors}", _one(synthetic.planted, sensors), ours, peers)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from experiments.benchmarks import ranking
-from experiments.benchmarks.families import HEURISTICS
 from experiments.benchmarks.rows import Row
+from experiments.common.contestants import HEURISTICS
 
 # median seconds of `exact` in this table before it had linear programs at its nodes
 _FORMER = {("known optimum", "n=30"): 0.180, ("known optimum", "n=50"): 6.03, ("random axial", "n=26"): 0.265}

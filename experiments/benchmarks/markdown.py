@@ -12,6 +12,7 @@ from statistics import median
 from experiments.benchmarks.families import cases
 from experiments.benchmarks.goals import Results, judge
 from experiments.benchmarks.rows import Row
+from experiments.common.results import plain_table
 
 ABOUT = {
     "paper": "The 100 scans of the ant colony paper's scene: three targets, three radars, P_d 0.9.",
@@ -49,29 +50,28 @@ solver found the reference in every run. For it, and for the goals, a time is th
 shorter one, ours and theirs: what else ran on the machine does not count."""
 
 
-def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str | None = None) -> str:
+def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> str:
     """Return the report.
 
-    command: How to repeat it.
+    head: What `head` says of the run; None: nothing.
     remark: What readers should know of these rows.
     """
-    parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW]
-    if remark:
-        parts += ["", f"**These rows**: {remark}"]
-    missing = _missing(rows)
-    if missing:
-        parts += ["", f"**Not in these rows** (not run): {missing}."]
-    parts += ["", "## Goals", "", _goals(rows)]
     results = Results(rows)
+    parts = ["# Benchmarks", *([head] if head else []), HOW]
+    parts += [f"**These rows**: {remark}"] if remark else []
+    missing = _missing(rows)
+    parts += [f"**Not in these rows** (not run): {missing}."] if missing else []
+    parts += ["## Goals", _goals(rows)]
     for family in dict.fromkeys(row.family for row in rows):
-        parts += ["", f"## {family}", "", ABOUT.get(family, ""), "", _table(results, family)]
-    return "\n".join(parts) + "\n"
+        parts += [f"## {family}", ABOUT.get(family, ""), _table(results, family)]
+    return "\n\n".join(parts) + "\n"
 
 
-def remark_of(report: str) -> str | None:
-    """Return the remark of a report written by `render`."""
-    found = re.search(r"^\*\*These rows\*\*: (.*)$", report, re.MULTILINE)
-    return found[1] if found else None
+def head_and_remark(report: str) -> tuple[str | None, str | None]:
+    """What a report written by `render` says of its run, and its remark."""
+    patterns = r"^(Written by .*)$", r"^\*\*These rows\*\*: (.*)$"
+    said, remark = (re.search(pattern, report, re.MULTILINE) for pattern in patterns)
+    return said and said[1], remark and remark[1]
 
 
 def _missing(rows: Sequence[Row]) -> str:
@@ -82,12 +82,10 @@ def _missing(rows: Sequence[Row]) -> str:
     return ", ".join(absent + ["kbest"] * ("kbest" not in families))
 
 
-def _preface(minutes: float | None, command: str) -> str:
-    versions = ", ".join(
-        f"{name} {version}"
-        for name in ("numpy", "scipy", "numba", "ortools", "nrl-tracker")
-        if (version := _version(name))
-    )
+def head(minutes: float | None, command: str) -> str:
+    """Say how to repeat a run, how long it took, and on what machine."""
+    names = ("numpy", "scipy", "numba", "ortools", "nrl-tracker")
+    versions = ", ".join(f"{name} {version}" for name in names if (version := _version(name)))
     took = "" if minutes is None else f" in {minutes:.1f} minutes"
     return (
         f"Written by `{command}`{took}, on {os.cpu_count()} cores of {_processor()}, "
@@ -113,43 +111,32 @@ def _processor() -> str:
 
 def _goals(rows: Sequence[Row]) -> str:
     verdicts = judge(rows)
-    firm = [v for v in verdicts if not v.stretch]
-    stretch = [v for v in verdicts if v.stretch]
-    lines = [
-        f"{sum(v.met for v in firm)} of {len(firm)} goals met, "
-        f"and {sum(v.met for v in stretch)} of {len(stretch)} stretch goals (marked *).",
-        "",
-        "| family | size | goal | measured | met |",
-        "|---|---|---|---|---|",
+    firm, stretch = ([v.met for v in verdicts if v.stretch == kind] for kind in (False, True))
+    said = [
+        [v.family, v.size, f"* {v.goal}" if v.stretch else v.goal, v.measured, "yes" if v.met else "**no**"]
+        for v in verdicts
     ]
-    for v in verdicts:
-        star = "* " if v.stretch else ""
-        lines.append(f"| {v.family} | {v.size} | {star}{v.goal} | {v.measured} | {'yes' if v.met else '**no**'} |")
-    return "\n".join(lines)
+    return (
+        f"{sum(firm)} of {len(firm)} goals met, and {sum(stretch)} of {len(stretch)} stretch goals (marked *).\n\n"
+        + plain_table(["family", "size", "goal", "measured", "met"], said)
+    )
 
 
 def _table(results: Results, family: str) -> str:
-    extra = "ranked" if family == "kbest" else None
     head = ["size", "tuples", "solver", "limit s", "runs", "found", "excess median %", "excess worst %",
             "gap median %", "median time", "median CPU", "speed"]  # fmt: skip
-    if extra:
-        head.append(extra)
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    head += ["ranked"] if family == "kbest" else []
+    lines = []
     for size in results.sizes(family):
         rows = results.of(family, size)
         tuples = median(row.tuples for row in rows)
-        for solver, limit in dict.fromkeys((row.solver, row.limit) for row in _ours_first(rows)):
+        # ours first
+        for solver, limit in dict.fromkeys((row.solver, row.limit) for row in sorted(rows, key=lambda row: row.peer)):
             mine = [row for row in rows if (row.solver, row.limit) == (solver, limit)]
             cells = [size, f"{tuples:,.0f}", solver, f"{limit:g}" if limit else "", str(len(mine))]
-            cells += _figures(results, mine)
-            if extra:
-                cells.append(f"{median(row.extra for row in mine):.0f}")
-            lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
-def _ours_first(rows: Sequence[Row]) -> list[Row]:
-    return sorted(rows, key=lambda row: row.peer)
+            ranked = [f"{median(row.extra for row in mine):.0f}"] if family == "kbest" else []
+            lines.append([*cells, *_figures(results, mine), *ranked])
+    return plain_table(head, lines)
 
 
 def _figures(results: Results, rows: Sequence[Row]) -> list[str]:

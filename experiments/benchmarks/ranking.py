@@ -12,11 +12,10 @@ import numpy as np
 
 import assoc
 from assoc.problem import AssignmentProblem
-from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import timed
 from experiments.common.checking import check_answer
-from experiments.common.instances import scenes, synthetic
+from experiments.common.instances import FIRST_SEED, scenes, synthetic
 from experiments.common.measuring import fresh, one_core
 
 PLANAR, PLANAR_K = "2-D n=100 k=100", 100

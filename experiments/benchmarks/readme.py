@@ -4,10 +4,11 @@ import math
 from collections.abc import Sequence
 from statistics import median
 
-from experiments.benchmarks.families import HEURISTICS
 from experiments.benchmarks.goals import PROVING_PEERS, Results, judge
 from experiments.benchmarks.markdown import as_percent, as_time
 from experiments.benchmarks.rows import Row
+from experiments.common.contestants import HEURISTICS
+from experiments.common.results import table
 
 BEGIN = "<!-- from here to the end mark: written by python -m experiments.benchmarks -->"
 END = "<!-- end mark -->"
@@ -47,26 +48,24 @@ def insert(page: str, rows: Sequence[Row]) -> str:
 def render(rows: Sequence[Row]) -> str:
     """Return the tables and the number of goals met."""
     results = Results(rows)
-    lines = [
-        "| | `exact` | fastest other solver with a proof | assigning one sensor at a time |",
-        "|---|---:|---:|---:|",
+    met = [verdict.met for verdict in judge(rows) if not verdict.stretch]
+    head = ["", "`exact`", "fastest other solver with a proof", "assigning one sensor at a time"]
+    parts = [
+        table(head, [_timed(results, *key, name) for key, name in TIMED.items() if results.of(*key)], tight=True),
+        _ghosts(results),
+        f"{sum(met)} of {len(met)} goals are met; [benchmarks](docs/benchmarks.md) lists each.",
     ]
-    lines += [_timed(results, *key, name) for key, name in TIMED.items() if results.of(*key)]
-    lines += ["", *_ghosts(results)]
-    verdicts = [v for v in judge(rows) if not v.stretch]
-    met = sum(v.met for v in verdicts)
-    lines += ["", f"{met} of {len(verdicts)} goals are met; [benchmarks](docs/benchmarks.md) lists each."]
-    return "\n".join(lines)
+    return "\n\n".join(parts)
 
 
-def _timed(results: Results, family: str, size: str, name: str) -> str:
+def _timed(results: Results, family: str, size: str, name: str) -> list[str]:
     """One instance family: median times to a proven optimum, and the excess cost of one sensor at a time."""
     mine = results.of(family, size, "exact")
     proved = all(row.status == "optimal" for row in mine)
     ours = as_time(median(row.taken for row in mine)) if proved else "no proof"
     fastest = results.fastest_proof(family, size)
     other = "no proof" if fastest is None else f"{as_time(fastest[0])} ({PEERS[fastest[1]]})"
-    return f"| {name} | {ours} | {other} | {_excess(results.of(family, size, 'sequential'))} |"
+    return [name, ours, other, _excess(results.of(family, size, "sequential"))]
 
 
 def _excess(rows: Sequence[Row]) -> str:
@@ -76,27 +75,27 @@ def _excess(rows: Sequence[Row]) -> str:
     return f"{as_percent(middle)} %" if middle < _FAR else f"{1 + middle:.0f} times the cost"
 
 
-def _ghosts(results: Results) -> list[str]:
+def _ghosts(results: Results) -> str:
     """Bearings only: what is reached in a short time, as the worst excess over the best cost known."""
     limits = [row.limit for row in results.of("ghost") if row.solver in PROVING_PEERS and row.limit <= LONG]
     longest = max(limits, default=LONG)
-    kinds = [*(f"`{name}`, {_SHORT:g} s" for name in HEURISTICS), f"best other solver, {longest:g} s"]
-    lines = ["| bearings only | " + " | ".join(kinds) + " | optimum |", "|---|" + "---:|" * len(kinds) + "---|"]
+    head = ["bearings only", *(f"`{name}`, {_SHORT:g} s" for name in HEURISTICS)]
+    head += [f"best other solver, {longest:g} s", "optimum"]
+    lines = []
     for size in GHOSTS:
         rows = results.of("ghost", size)
         if not rows:
             continue
-        cells = [_worst([row for row in rows if row.solver == name]) for name in HEURISTICS]
         found = {}
         for row in rows:
             if row.peer and row.limit <= LONG:
                 instance = row.seed, row.item
                 if instance not in found or row.cost < found[instance].cost:
                     found[instance] = row
-        cells.append(_worst(list(found.values())))
+        runs = [*([row for row in rows if row.solver == name] for name in HEURISTICS), list(found.values())]
         known = "proven" if all(row.proven for row in rows) else "best known"
-        lines.append(f"| {size} targets | " + " | ".join(cells) + f" | {known} |")
-    return lines
+        lines.append([f"{size} targets", *map(_worst, runs), known])
+    return table(head, lines, lambda column: 0 < column < len(head) - 1, tight=True)
 
 
 def _worst(rows: Sequence[Row]) -> str:

@@ -1,10 +1,8 @@
 """Run one case: peers and exact methods first (they give the reference), then the rest."""
 
-import contextlib
 import math
 import multiprocessing
 import os
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -12,41 +10,17 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-import assoc
-from assoc.costs import build_problem
-from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
-from assoc.solution import TracePoint
-from experiments.benchmarks.families import HEURISTICS, Case, Entry, Instance
+from experiments.benchmarks.families import Case, Entry, Instance
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.wide_gaps import linear_bound
-from experiments.common import annealing, peers
-from experiments.common.checking import check_answer
-from experiments.common.instances import scenes, synthetic
-from experiments.common.measuring import fresh, one_core
+from experiments.common.contestants import OURS, STOPPED, run, takes, warm_up
 
 PROVING = ("exact", "milp")
-UNLIMITED = 1_000_000_000
 # runs of fewer seconds are made so many times
 SHORT, TIMES = 0.1, 5
 # families whose rows tell the gap of the linear program
 GHOSTS = ("ghost", "wide gap")
-
-
-def warm_up(ours: set[str], others: set[str]) -> None:
-    """Compile the kernels and import the packages of all solvers on small problems."""
-    small = [synthetic.planted(s, 0, targets=6)[0] for s in (2, 3, 4)]
-    small += [synthetic.axial_random(5, 0), synthetic.planar_random(6, 0)]
-    # only a hard problem meets all kernels
-    small.append(build_problem(scenes.ghost(20, 0), 0))
-    annealing.make_known()
-    for name in sorted(ours):
-        for problem in small:
-            with contextlib.suppress(InfeasibleError):
-                # twice: in a limit that compiling used up the later kernels were not called
-                assoc.assign(problem, name, time_limit=1.0)
-                assoc.assign(problem, name, time_limit=1.0)
-    peers.warm_up(sorted(others))
 
 
 def run_all(
@@ -100,10 +74,7 @@ def _run_unit(place: int) -> tuple[list[Row], list[str]]:
 
 
 def _warm_up_for(cases: Sequence[Case]) -> None:
-    warm_up(
-        {entry.solver for case in cases for entry in case.ours},
-        {entry.solver for case in cases for entry in case.peers},
-    )
+    warm_up({entry.solver for case in cases for entry in (*case.ours, *case.peers)})
 
 
 def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None) -> list[Row]:
@@ -111,7 +82,6 @@ def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = 
 
     seeds: Number of seeds at the most; by default all of the case.
     """
-    annealing.make_known()
     rows: list[Row] = []
     for one in case.by_seed(seeds):
         (seed,) = one.chosen
@@ -128,22 +98,42 @@ def _brief(row: Row) -> str:
 
 
 def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[Row]:
-    problem = instance.problem
+    problem, optimum = instance.problem, instance.optimum
     blank = Row(case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, "")
-    rows = [
-        timed(partial(_run_peer, entry, problem, blank))
-        for entry in case.peers
-        if peers.available(entry.solver, problem)
-    ]
-    first = [entry for entry in case.ours if entry.solver in PROVING]
-    rows += [timed(partial(_run_ours, entry, problem, blank, None)) for entry in first]
-    optimum = instance.optimum
+    entries = [entry for entry in (*case.peers, *case.ours) if takes(entry.solver, problem)]
+    first = [entry for entry in entries if entry.solver in PROVING or entry.solver not in OURS]
+    rows = [timed(partial(_run, entry, problem, blank, None)) for entry in first]
     if optimum is None:
-        optimum = _proven_optimum(rows)
-    rows += [timed(partial(_run_ours, entry, problem, blank, optimum)) for entry in case.ours if entry not in first]
+        optimum = min((row.cost for row in rows if row.status == "optimal"), default=None)
+    rows += [timed(partial(_run, entry, problem, blank, optimum)) for entry in entries if entry not in first]
     reference = optimum if optimum is not None else min(row.cost for row in rows)
+    for row in rows:
+        if optimum is not None and not row.peer and row.bound > optimum + 1e-6 * max(1.0, abs(optimum)):
+            raise AssertionError(f"{row.solver}: bound {row.bound} above the optimum {optimum}")
     gap = (reference - linear_bound(problem)) / max(1.0, abs(reference)) if case.family in GHOSTS else 0.0
     return [replace(row, reference=reference, proven=optimum is not None, extra=gap) for row in rows]
+
+
+def _run(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: float | None) -> Row:
+    def stop(cost: float, bound: float) -> bool:
+        """Whether the entry's gap, or else the known optimum, is reached."""
+        if entry.stop_gap is not None:
+            return cost - bound <= entry.stop_gap * max(1.0, abs(cost))
+        return optimum is not None and cost <= optimum + 1e-9 * max(1.0, abs(optimum))
+
+    listening = entry.stop_gap is not None or entry.solver in STOPPED
+    answer = run(entry.solver, problem, entry.limit, stop if listening else None)
+    return replace(
+        blank,
+        solver=entry.label,
+        peer=entry.solver not in OURS,
+        limit=entry.limit,
+        cost=answer.cost,
+        bound=-math.inf if answer.bound is None else answer.bound,
+        seconds=answer.seconds,
+        status="optimal" if answer.proven else "feasible" if math.isfinite(answer.cost) else "none",
+        cpu=answer.cpu,
+    )
 
 
 def timed(run: Callable[[], Row]) -> Row:
@@ -153,61 +143,3 @@ def timed(run: Callable[[], Row]) -> Row:
         return row
     rows = [row, *(run() for _ in range(TIMES - 1))]
     return replace(row, seconds=median(one.seconds for one in rows), cpu=median(one.cpu for one in rows))
-
-
-def _proven_optimum(rows: list[Row]) -> float | None:
-    """Return the least cost that any method says is proven."""
-    proven = [row for row in rows if row.status == "optimal"]
-    return min((row.cost for row in proven), default=None)
-
-
-def _run_peer(entry: Entry, problem: AssignmentProblem, blank: Row) -> Row:
-    answer = peers.PEERS[entry.solver](problem, entry.limit)
-    status = "optimal" if answer.proven else "feasible" if math.isfinite(answer.cost) else "none"
-    return replace(
-        blank,
-        solver=entry.label,
-        peer=True,
-        limit=entry.limit,
-        cost=answer.cost,
-        bound=-math.inf if answer.bound is None else answer.bound,
-        seconds=answer.seconds,
-        status=status,
-        cpu=answer.cpu,
-    )
-
-
-def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: float | None) -> Row:
-    def stop(point: TracePoint) -> bool:
-        """Whether the entry's gap, or else the known optimum, is reached."""
-        if entry.stop_gap is not None:
-            return point.cost - point.lower_bound <= entry.stop_gap * max(1.0, abs(point.cost))
-        return optimum is not None and point.cost <= optimum + 1e-9 * max(1.0, abs(optimum))
-
-    watched = entry.solver not in PROVING and entry.solver != "lagrangian"
-    callback = stop if watched or entry.stop_gap is not None else None
-    # what a limit gives them they use: by default they leave a part that has not become better for a while
-    options = {"patience": UNLIMITED, "iterations": UNLIMITED} if entry.solver in HEURISTICS else {}
-    with one_core():
-        start, before = time.perf_counter(), time.process_time()
-        try:
-            solution = assoc.assign(fresh(problem), entry.solver, time_limit=entry.limit, callback=callback, **options)
-        except InfeasibleError:
-            seconds = time.perf_counter() - start
-            return replace(blank, solver=entry.label, limit=entry.limit, seconds=seconds, status="none")
-        seconds, cpu = time.perf_counter() - start, time.process_time() - before
-    cost = check_answer(problem, solution.tuples)
-    if abs(cost - solution.cost) > 1e-7 * max(1.0, abs(cost)):
-        raise AssertionError(f"{entry.solver}: says {solution.cost}, its tuples cost {cost}")
-    if optimum is not None and solution.lower_bound > optimum + 1e-6 * max(1.0, abs(optimum)):
-        raise AssertionError(f"{entry.solver}: bound {solution.lower_bound} above the optimum {optimum}")
-    return replace(
-        blank,
-        solver=entry.label,
-        limit=entry.limit,
-        cost=cost,
-        bound=solution.lower_bound,
-        seconds=seconds,
-        status=solution.status,
-        cpu=cpu,
-    )

@@ -69,6 +69,13 @@ def whole(least: int) -> Callable[[str], int]:
     return number
 
 
+def seconds(text: str) -> float:
+    """Read an option that is a number of seconds above 0."""
+    if not 0.0 < float(text) < 1e6:
+        raise argparse.ArgumentTypeError(f"expected seconds above 0, got {text}")
+    return float(text)
+
+
 def add_seeds(parser: argparse.ArgumentParser, default: int, of: str, least: int = 2) -> None:
     """Add the option that says how many scenes or runs there are."""
     parser.add_argument("--seeds", type=whole(least), default=default, metavar="N", help=f"{of} (default {default})")

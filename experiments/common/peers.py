@@ -1,30 +1,7 @@
-"""Other solvers that could be used instead of assoc, run on the same tuples.
-
-Every peer takes a problem and a time limit and returns a `PeerAnswer`; its time runs from the tuples to the
-chosen tuples: it includes building the model, but not importing the package. The cost of its answer is
-computed by `experiments.common.checking`, not by the peer.
-
-======================  ==========================================================================
-``cp_sat``              OR-Tools CP-SAT, two workers, costs times 1e6 rounded to integers
-``cp_sat_1``            the same with one worker
-``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
-``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
-``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
-``nrl_tracker``         PyPI ``nrl-tracker``: 100 iterations on a dense axial tensor; takes no limit
-``chils``               CHILS, local search for the heaviest independent set (packing_peers.py)
-``branch_reduce``       KaMIS's branch and reduce for it
-``mmwis``               KaMIS's memetic algorithm for it
-``kap``                 PyPI ``kap``: multiple Hungarian method on the costs of pairs
-``stone_soup``          Stone Soup's multi-frame assignment (multi_frame_peer.py); takes no limit
-======================  ==========================================================================
-"""
+"""Peers that are general solvers, and one of its own kind: how each is given the tuples, and what it chooses."""
 
 import datetime
-import importlib.util
-import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,48 +10,10 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csc_array
 
 from assoc.problem import AssignmentProblem
-from experiments.common import multi_frame_peer, packing_peers
-from experiments.common.checking import check_answer
-from experiments.common.sequential import assign_in_turn
+from experiments.common.packing_peers import Chosen
 
-PACKING_PEERS = ("chils", "branch_reduce", "mmwis", "kap")
 CP_SAT_SCALE = 1e6
 DENSE_LIMIT = 8_000_000
-
-
-@dataclass(frozen=True)
-class PeerAnswer:
-    """What a peer found.
-
-    cost: Cost of its solution as our checker reads it; ``inf`` when it found none in time.
-    bound: Its lower bound, where it gives one.
-    seconds: Wall time from the tuples to the chosen tuples.
-    proven: Whether the peer itself says that this is the optimum.
-    cpu: The same time as the process's CPU time, all threads together.
-    """
-
-    cost: float
-    bound: float | None
-    seconds: float
-    tuples: NDArray[np.int32]
-    proven: bool = False
-    cpu: float = 0.0
-
-
-Chosen = tuple[NDArray[np.intp] | None, float | None, bool]
-Peer = Callable[[AssignmentProblem, float], PeerAnswer]
-
-
-def _answer(
-    solve: Callable[[AssignmentProblem, float], Chosen], problem: AssignmentProblem, limit: float
-) -> PeerAnswer:
-    start, before = time.perf_counter(), time.process_time()
-    indices, bound, proven = solve(problem, limit)
-    seconds, cpu = time.perf_counter() - start, time.process_time() - before
-    if indices is None:
-        return PeerAnswer(float("inf"), bound, seconds, problem.tuples[:0], cpu=cpu)
-    tuples = problem.tuples[indices]
-    return PeerAnswer(check_answer(problem, tuples), bound, seconds, tuples, proven, cpu)
 
 
 def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -87,11 +26,10 @@ def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int
     return row, column.astype(np.int64), must.astype(np.bool_)
 
 
-Told = Callable[[float, float], bool]
-"""Told of a cost and a bound; a true answer stops the peer."""
-
-
-def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int, told: Told | None = None) -> Chosen:
+def cp_sat(
+    workers: int, problem: AssignmentProblem, time_limit: float, told: Callable[[float, float], bool] | None = None
+) -> Chosen:
+    """CP-SAT, which may be listened to as it finds solutions: `told` of a cost and a bound; a true answer stops it."""
     from ortools.sat import cp_model_pb2
     from ortools.sat.python import cp_model
 
@@ -121,7 +59,7 @@ def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int, told: T
     return np.flatnonzero(values), bound, status == cp_model_pb2.CpSolverStatus.OPTIMAL
 
 
-def _listener(told: Told) -> Any:
+def _listener(told: Callable[[float, float], bool]) -> Any:
     from ortools.sat.python import cp_model
 
     class Listener(cp_model.CpSolverSolutionCallback):
@@ -132,7 +70,8 @@ def _listener(told: Told) -> Any:
     return Listener()
 
 
-def _scip(problem: AssignmentProblem, time_limit: float, threads: int) -> Chosen:
+def scip(threads: int, problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """SCIP on so many threads."""
     from ortools.math_opt import model_pb2
     from ortools.math_opt.python import mathopt
 
@@ -186,7 +125,8 @@ def by_milp(problem: AssignmentProblem, time_limit: float, forbidden: Iterable[N
     )
 
 
-def _highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
+def highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """HiGHS on one thread."""
     result = by_milp(problem, time_limit)
     bound = None if result.mip_dual_bound is None else float(result.mip_dual_bound)
     if result.x is None:
@@ -205,7 +145,8 @@ def dense_elements(problem: AssignmentProblem) -> float:
     return float(np.prod(problem.sizes.astype(float)))
 
 
-def _nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
+def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """The relaxation of ``nrl-tracker`` on a dense tensor; it takes no time limit."""
     if dense_elements(problem) > DENSE_LIMIT:
         raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
     from pytcl.assignment_algorithms.nd_assignment import (  # type: ignore[import-untyped,unused-ignore]
@@ -247,46 +188,3 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
             slice(index - 1, index) if index else slice(size, None) for index, size in zip(key, sizes, strict=True)
         )
         np.minimum(tensor[cells], cost, out=tensor[cells])
-
-
-def cp_sat_1(problem: AssignmentProblem, time_limit: float, told: Told | None = None) -> PeerAnswer:
-    """CP-SAT with one worker, which may be listened to as it finds solutions."""
-    return _answer(lambda p, limit: _cp_sat(p, limit, 1, told), problem, time_limit)
-
-
-PEERS: dict[str, Peer] = {
-    "cp_sat": partial(_answer, lambda problem, limit: _cp_sat(problem, limit, 2)),
-    "cp_sat_1": cp_sat_1,
-    "scip": partial(_answer, lambda problem, limit: _scip(problem, limit, 2)),
-    "scip_1": partial(_answer, lambda problem, limit: _scip(problem, limit, 1)),
-    "highs": partial(_answer, _highs),
-    "sequential": partial(_answer, assign_in_turn),
-    "nrl_tracker": partial(_answer, _nrl_tracker),
-    "stone_soup": partial(_answer, multi_frame_peer.multi_frame),
-    **{name: partial(_answer, getattr(packing_peers, name)) for name in PACKING_PEERS},
-}
-
-
-def warm_up(names: Iterable[str]) -> None:
-    """Import each peer's package by solving a tiny problem, so that no measured run pays for it."""
-    problem = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
-    for name in names:
-        if available(name, problem):
-            PEERS[name](problem, 1.0)
-
-
-def not_installed() -> list[str]:
-    """Packages of peers that are not installed (extra ``peers``)."""
-    packages = {"chszlablib": "chszlablib", "kap": "kap", "pytcl": "nrl-tracker"}
-    return [package for module, package in packages.items() if importlib.util.find_spec(module) is None]
-
-
-def available(name: str, problem: AssignmentProblem) -> bool:
-    """Whether a peer is installed and can take this problem."""
-    if name == "nrl_tracker":
-        return importlib.util.find_spec("pytcl") is not None and dense_elements(problem) <= DENSE_LIMIT
-    if name == "stone_soup":
-        return multi_frame_peer.available(problem)
-    if name in PACKING_PEERS:
-        return packing_peers.available(name, problem)
-    return name in PEERS

@@ -55,7 +55,23 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:,.{decimals}f}"
 
 
-def table(head: list[str], rows: list[list[str]], right: Callable[[int], bool] = lambda column: column > 0) -> str:
-    """A table in Markdown; all columns but the first are set to the right unless told otherwise."""
+def table(
+    head: list[str],
+    rows: list[list[str]],
+    right: Callable[[int], bool] = lambda column: column > 0,
+    *,
+    tight: bool = False,
+) -> str:
+    """A table in Markdown; all columns but the first are set to the right unless told otherwise.
+
+    tight: Without blanks in the rule below the head.
+    """
     rule = ["---:" if right(column) else "---" for column in range(len(head))]
-    return "\n".join(f"| {' | '.join(row)} |" for row in (head, rule, *rows))
+    lines = [f"| {' | '.join(row)} |" for row in (head, rule, *rows)]
+    lines[1] = lines[1].replace(" ", "") if tight else lines[1]
+    return "\n".join(lines)
+
+
+def plain_table(head: list[str], rows: list[list[str]]) -> str:
+    """A table whose columns are all set to the left."""
+    return table(head, rows, lambda column: False, tight=True)

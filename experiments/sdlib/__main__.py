@@ -16,17 +16,17 @@ import datetime
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from assoc.problem import AssignmentProblem
+from experiments.common.command import seconds
 from experiments.sdlib import recorded, store
 from experiments.sdlib.command import run_command
 from experiments.sdlib.comparison import write_comparison
-from experiments.sdlib.contest import contest, representatives
-from experiments.sdlib.contestants import CONTESTANTS
+from experiments.sdlib.contest import CONTESTANTS, contest, representatives
 from experiments.sdlib.instances import Instance, instances
 from experiments.sdlib.solve import check_row, solve
 
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make.add_argument("--recording", metavar="FILE", help="of air traffic: without it, recorded ones stay as they are")
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
-        part.add_argument("--seconds", type=_seconds, default=60.0, help="limit for each instance (default 60)")
+        part.add_argument("--seconds", type=seconds, default=60.0, help="limit for each instance (default 60)")
         part.add_argument("--family", help="only this family")
         part.add_argument("names", nargs="*", metavar="NAME", help="only these instances")
     improve = parts.choices["solve"]
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run = parts.choices["run"]
     who = run.add_mutually_exclusive_group()
     who.add_argument("--command", help="your solver, with {instance} and {solution} in it")
-    who.add_argument("--solvers", type=_solvers, default=list(CONTESTANTS), help="names, with commas (default: all)")
+    who.add_argument("--solvers", type=_solvers, default=CONTESTANTS, help="names, with commas (default: all)")
     run.add_argument("--all", action="store_true", help="all instances, not two of each family")
     run.add_argument("--output", metavar="FILE", help="write the rows, with what was found when, as JSON")
     check = parts.add_parser("check", help="check every solution and proof")
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return 2
             os.environ[recorded.PATH] = chosen.recording
         return _make(instances(), compare=chosen.compare)
-    picked = list(_picked(parser, chosen.names, getattr(chosen, "family", None)))
+    picked = _picked(parser, chosen.names, getattr(chosen, "family", None))
     if chosen.part == "solve":
         return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
@@ -75,13 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
 
 
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 < seconds < 1e6:
-        raise argparse.ArgumentTypeError(f"expected seconds above 0, got {text}")
-    return seconds
-
-
 def _solvers(text: str) -> list[str]:
     names = text.split(",")
     for name in names:
@@ -90,16 +83,14 @@ def _solvers(text: str) -> list[str]:
     return names
 
 
-def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | None) -> Iterator[Instance]:
+def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | None) -> list[Instance]:
     every = instances()
-    unknown = set(names) - {one.name for one in every}
-    if unknown:
+    if unknown := {*names} - {one.name for one in every}:
         parser.error(f"{min(unknown)}: no instance of this name")
-    if family is not None and family not in {one.family for one in every}:
-        parser.error(f"--family: expected one of {', '.join(sorted({one.family for one in every}))}")
-    for one in every:
-        if (not names or one.name in names) and family in (None, one.family):
-            yield one
+    families = {one.family for one in every}
+    if family not in {None, *families}:
+        parser.error(f"--family: expected one of {', '.join(sorted(families))}")
+    return [one for one in every if one.name in (names or [one.name]) and family in (None, one.family)]
 
 
 def _make(known: Sequence[Instance], *, compare: bool) -> int:
@@ -126,10 +117,10 @@ def _alike(one: AssignmentProblem, other: AssignmentProblem) -> bool:
     return same and np.allclose(one.costs, other.costs, rtol=0.0, atol=1.001e-6)
 
 
-def _solve(picked: list[Instance], solver: str, seconds: float) -> int:
+def _solve(picked: list[Instance], solver: str, limit: float) -> int:
     for one in picked:
         rows = store.table()
-        row = rows[one.name] = solve(one, rows.get(one.name), solver, seconds, datetime.date.today().isoformat())
+        row = rows[one.name] = solve(one, rows.get(one.name), solver, limit, datetime.date.today().isoformat())
         store.write_table(rows)
         words = f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
         print(words, flush=True)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import FIRST_SEED, goals, markdown, ranking, readme, rows
+from experiments.benchmarks import goals, markdown, ranking, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all, run_case, timed
-from experiments.common import peers
-from experiments.common.instances import synthetic
+from experiments.common import contestants
+from experiments.common.instances import FIRST_SEED, synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
 PEER = replace(ROW, solver="highs", peer=True, seconds=0.3)
@@ -206,7 +206,7 @@ def test_rankings_are_run_and_compared() -> None:
 
 
 def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
-    text = markdown.render([ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], 1.0, "make bench")
+    text = markdown.render([ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], None)
     assert "## gated" in text
     assert "## planted" in text
     assert "| 3x300 | 9,000 | exact | 60 | 1 | 1 | 0 | 0 | 0 | 10 ms | - | 30 |" in text
@@ -262,7 +262,7 @@ def test_program_refuses_and_reports(
         main(["--processes", "0"])
     assert stop.value.code == 2
     assert "--processes: expected at least 1, got 0" in capsys.readouterr().err
-    monkeypatch.setattr(peers, "not_installed", lambda: ["kap"])
+    monkeypatch.setattr(contestants, "not_installed", lambda: ["kap"])
     with pytest.raises(SystemExit) as stop:
         main([])
     assert stop.value.code == 2
@@ -305,16 +305,18 @@ def test_a_brief_run_is_whole() -> None:
 
 
 def test_report_says_what_its_reader_should_know() -> None:
-    assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "make bench", "two runs.")
-    assert "These rows" not in markdown.render([ROW, PEER], None, "make bench")
+    assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "two runs.")
+    assert "These rows" not in markdown.render([ROW, PEER], None)
 
 
-def test_a_report_written_again_keeps_its_remark(tmp_path: Path) -> None:
-    path = tmp_path / "b.csv"
+def test_a_report_written_again_keeps_its_head_and_remark(tmp_path: Path) -> None:
+    path, report = tmp_path / "b.csv", tmp_path / "b.md"
     rows.save(path, [ROW, PEER])
+    report.write_text(markdown.render([ROW, PEER], markdown.head(1.5, "make bench")))
     assert main(["--report-only", "--csv", str(path), "--remark", "two runs."]) == 0
     assert main(["--report-only", "--csv", str(path)]) == 0
-    assert "**These rows**: two runs." in (tmp_path / "b.md").read_text()
+    assert "\nWritten by `make bench` in 1.5 minutes, on " in report.read_text()
+    assert "**These rows**: two runs." in report.read_text()
 
 
 def test_time_that_others_took_does_not_count():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import assoc
 from assoc.problem import AssignmentProblem
-from experiments.common import packing_peers, peers
+from experiments.common import contestants, packing_peers, peers
 from experiments.common.instances import synthetic
 from tests import oracles
 
@@ -25,7 +26,7 @@ def problems() -> list[AssignmentProblem]:
 def test_exact_peers_find_the_optimum(name: str) -> None:
     for problem in problems():
         best = oracles.brute_force(problem)
-        answer = peers.PEERS[name](problem, 20.0)
+        answer = contestants.run(name, problem, 20.0)
         assert answer.proven
         assert answer.cost == pytest.approx(best, abs=2e-5)
         assert answer.bound is not None
@@ -39,9 +40,9 @@ def test_heuristic_peers_are_feasible_and_not_better(name: str) -> None:
         pytest.importorskip("pytcl")
     found = 0
     for problem in problems():
-        if not peers.available(name, problem):
+        if not contestants.takes(name, problem):
             continue
-        answer = peers.PEERS[name](problem, 20.0)
+        answer = contestants.run(name, problem, 20.0)
         best = oracles.brute_force(problem)
         assert answer.cost >= best - 1e-9
         assert answer.bound is None or answer.bound <= best + 1e-6
@@ -52,19 +53,43 @@ def test_heuristic_peers_are_feasible_and_not_better(name: str) -> None:
 def test_two_sensors_sequential_is_exact() -> None:
     for problem in oracles.small_problems(60, seed=3, dummy=True):
         if problem.num_sensors == 2 and (problem.costs[np.count_nonzero(problem.tuples, axis=1) == 1] == 0).all():
-            answer = peers.PEERS["sequential"](problem, 1.0)
+            answer = contestants.run("sequential", problem, 1.0)
             assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["exact", "tabu", "annealing", "cp_sat_1"])
+def test_those_listened_to_tell_what_they_find(name: str) -> None:
+    problem, heard = synthetic.axial_random(6, 0), []
+    answer = contestants.run(name, problem, 5.0, lambda cost, bound: bool(heard.append((cost, bound))))
+    assert min(cost for cost, _ in heard) == pytest.approx(answer.cost) and answer.seconds > 0.0 < answer.cpu
+    assert max(bound for _, bound in heard) <= oracles.brute_force(problem) + 1e-6
+
+
+def test_what_a_solver_says_of_itself_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = synthetic.axial_random(3, 0)
+    found = assoc.assign(problem)
+    says = {"cost": found.cost, "indices": found.indices}
+    monkeypatch.setitem(
+        contestants.LISTENED, "exact", lambda problem, limit, told: (says["indices"], None, True, says["cost"])
+    )
+    assert contestants.run("exact", problem, 1.0).cost == found.cost
+    says["cost"] += 0.1
+    with pytest.raises(AssertionError, match="exact: says"):
+        contestants.run("exact", problem, 1.0)
+    says["indices"] = found.indices[:2]
+    with pytest.raises(AssertionError, match="is in 0 chosen tuples"):
+        contestants.run("exact", problem, 1.0)
 
 
 def test_limits() -> None:
     large = synthetic.axial_random(26, 0)
-    assert peers.available("cp_sat", large)
-    assert not peers.available("nobody", large)
+    assert contestants.takes("cp_sat", large)
+    assert not contestants.takes("nobody", large)
     dense = AssignmentProblem([[1, 1, 1]], [-1.0], [100, 100, 100])
     assert peers.dense_elements(dense) == 300**3
-    assert not peers.available("nrl_tracker", dense)
+    assert not contestants.takes("nrl_tracker", dense)
     with pytest.raises(MemoryError):
-        peers.PEERS["nrl_tracker"](dense, 1.0)
+        contestants.run("nrl_tracker", dense, 1.0)
 
 
 @pytest.mark.parametrize("name", ["chils", "mmwis", "branch_reduce"])
@@ -73,7 +98,7 @@ def test_independent_sets_are_associations(name: str) -> None:
     rng = np.random.default_rng(5)
     for sizes in ((4, 4, 3), (3, 2, 3, 2), (5, 4)):
         problem = oracles.gated_problem(rng, sizes, 0.6, "mixed", listed_singletons=0.3)
-        answer = peers.PEERS[name](problem, 0.5)
+        answer = contestants.run(name, problem, 0.5)
         # a graph of some ten vertices: each of them finds its heaviest set, to the rounding of weights
         assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-4)
 
@@ -82,7 +107,7 @@ def test_independent_sets_are_associations(name: str) -> None:
 def test_a_graph_without_edges_is_taken_whole(name: str) -> None:
     pytest.importorskip("chszlablib")
     problem = AssignmentProblem([[1, 1], [2, 2]], [-3.0, -1.0], [2, 2])
-    answer = peers.PEERS[name](problem, 0.5)
+    answer = contestants.run(name, problem, 0.5)
     assert (answer.cost, answer.proven) == (-4.0, True)
 
 
@@ -101,7 +126,7 @@ def test_conflict_graph() -> None:
     }  # fmt: skip
     with pytest.raises(ValueError, match="dummies"):
         packing_peers.conflict_graph(synthetic.axial_random(3, 0))
-    assert not peers.available("chils", synthetic.axial_random(3, 0))
+    assert not contestants.takes("chils", synthetic.axial_random(3, 0))
 
 
 def test_pairs_of_two_sensors_are_matched_exactly() -> None:
@@ -109,5 +134,5 @@ def test_pairs_of_two_sensors_are_matched_exactly() -> None:
     rng = np.random.default_rng(6)
     for _ in range(10):
         problem = oracles.gated_problem(rng, (5, 4), 0.8, "mixed", listed_singletons=0.3)
-        answer = peers.PEERS["kap"](problem, 1.0)
+        answer = contestants.run("kap", problem, 1.0)
         assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)
