@@ -10,6 +10,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+from assoc.solvers import registry
+
 # fixtures of several folders
 pytest_plugins = ["tests.dask_cluster"]
 
@@ -41,6 +43,15 @@ def _same_signals() -> Iterator[None]:
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, before[1])
     assert after == before, "the test left signals blocked or handled"
+
+
+@pytest.fixture(autouse=True)
+def _same_solvers() -> Iterator[None]:
+    """Forget the solvers that a test registers, which cannot be taken back otherwise: later tests ask for all names."""
+    known = dict(registry._REGISTERED)
+    yield
+    registry._REGISTERED.clear()
+    registry._REGISTERED.update(known)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -13,6 +13,7 @@ from assoc.costs import positions_and_covariances
 from assoc.scene import Scene, Truth
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
+from assoc.solvers import Outcome, registry
 
 REGION = np.array([[0.0, 1000.0], [0.0, 1000.0], [0.0, 1000.0]])
 
@@ -105,20 +106,17 @@ def test_the_seed_of_a_scan_does_not_depend_on_what_was_solved_before():
         assert one.solution.iterations == other.solution.iterations
 
 
-def test_each_scan_has_random_numbers_of_its_own(monkeypatch):
-    import assoc.association.plan as module
-
+def test_each_scan_has_random_numbers_of_its_own():
     drawn = []
 
-    def watched(problem, solver, *, seed, **options):
-        drawn.append(float(np.random.default_rng(seed).random()))
-        return assign(problem, solver, seed=seed, **options)
+    def draw(packing, parameters, run):
+        drawn.append(run.rng.random())
+        return Outcome([], 1)
 
-    assign = module.assign
-    monkeypatch.setattr(module, "assign", watched)
+    registry.register("draw", registry.parameters("greedy"), draw)
     scene = simulate("three-radar", scans=3)
     for seed in (0, 1):
-        associate(scene, "greedy", seed=seed)
+        associate(scene, "draw", seed=seed)
     assert len(set(drawn)) == 6
 
 

@@ -121,17 +121,17 @@ def tables() -> str:
     return "\n".join(lines)
 
 
-def listed() -> dict[str, tuple[str, str]]:
-    """Oldest version and licence of each package in the page's first table."""
-    text = PAGE.read_text().split(MARK)[1].split("\n\nWhat")[0]
+def listed(page: str) -> dict[str, tuple[str, str]]:
+    """Oldest version and licence of each package in the first table of the page's text."""
+    text = page.split(MARK)[1].split("\n\nWhat")[0]
     lines = [line for line in text.splitlines() if line.startswith("| ")]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return {name: (oldest, licence) for name, oldest, _, licence in rows[1:]}
 
 
-def complaints() -> list[str]:
+def complaints(text: str) -> list[str]:
     """What the page says that is not so, or does not say; packages that are not installed are not compared."""
-    page, found = listed(), []
+    page, found = listed(text), []
     needed = direct(read())
     for name, (oldest, _) in needed.items():
         if name not in page:
@@ -153,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
     if parser.parse_args(arguments).write:
         before = PAGE.read_text().split(MARK)[0]
         PAGE.write_text(f"{before}{MARK}\n\n{tables()}\n")
-    found = complaints()
+    found = complaints(PAGE.read_text())
     print("\n".join(found) or f"{PAGE.name}: as required and installed")
     return 1 if found else 0
 

@@ -123,7 +123,7 @@ def test_ranking_returns_a_good_solution_when_none_is_proved():
 
 
 @pytest.mark.slow
-def test_a_solver_that_gives_up_or_finds_little_is_helped_out(monkeypatch, problem, greedy_cost):
+def test_a_solver_that_gives_up_or_finds_little_is_helped_out(problem, greedy_cost):
     from assoc.solvers import registry
 
     def give_up(packing, parameters, run):
@@ -133,10 +133,9 @@ def test_a_solver_that_gives_up_or_finds_little_is_helped_out(monkeypatch, probl
         run.stopped_by = "time_limit"
         return Outcome(np.zeros(0, dtype=np.int64), 0)
 
-    parameters = registry.parameters("greedy")
     for solve in (give_up, take_nothing):
-        monkeypatch.setitem(registry._REGISTERED, "poor", (parameters, solve))
-        assert assign(fresh(problem), "poor", time_limit=5.0).cost == greedy_cost
+        registry.register(solve.__name__, registry.parameters("greedy"), solve)
+        assert assign(fresh(problem), solve.__name__, time_limit=5.0).cost == greedy_cost
 
 
 @pytest.mark.slow

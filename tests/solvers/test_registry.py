@@ -35,8 +35,7 @@ def last_first(packing, parameters, run):
 
 
 @pytest.fixture
-def registered(monkeypatch):
-    monkeypatch.setattr(registry, "_REGISTERED", {})
+def registered():
     assoc.solvers.register("last", LastParameters, last_first)
 
 
@@ -167,12 +166,9 @@ def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():
 
     problem = assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1])
     for solve, error in ((disturbed, KeyboardInterrupt), (broken, SystemError)):
-        registry.register("interrupted", LastParameters, solve)
-        try:
-            with pytest.raises(error):
-                assoc.assign(problem, "interrupted")
-        finally:
-            del registry._REGISTERED["interrupted"]
+        registry.register(solve.__name__, LastParameters, solve)
+        with pytest.raises(error):
+            assoc.assign(problem, solve.__name__)
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,6 @@ def lazy(monkeypatch, tmp_path):
     def kernel(x):
         return np.linalg.norm(np.full((3, 3), x))
 
-    monkeypatch.setattr(registry, "_REGISTERED", {})
     registry.register("lazy", GreedyParameters, solve)
     yield met
     sys.modules.pop("a_slow_module", None)
@@ -55,16 +54,19 @@ def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
     assert lazy.count(1) == 3 and lazy.count(2) == 3 and lazy.count(3) == 3
 
 
-def test_a_run_done_again_is_the_same(study, tmp_path, monkeypatch):
-    from assoc.sweeps import worker
+def test_a_run_done_again_has_the_same_random_numbers(tmp_path, monkeypatch):
+    """Where something is imported in every run, each is done four times."""
+    drawn = []
 
-    study.run(tmp_path / "once")
-    calls = []
-    monkeypatch.setattr(worker, "loaded", lambda: calls.append(1) or len(calls))
-    study.run(tmp_path / "again")
-    assert len(calls) == 8 * study.size
-    frames = [load(tmp_path / name).drop(columns="time") for name in ("once", "again")]
-    assert frames[0].equals(frames[1])
+    def solve(packing, parameters, run):
+        monkeypatch.setitem(sys.modules, f"a_module_{len(drawn)}", sys)
+        drawn.append(run.rng.random())
+        return Outcome(np.arange(packing.num_columns), 1)
+
+    registry.register("restless", GreedyParameters, solve)
+    Study([StudySource(chain(2), "two")], [Setting("restless", {})], 3).run(tmp_path / "s")
+    # after one to warm up
+    assert len(drawn) == 13 and [drawn.count(one) for one in dict.fromkeys(drawn[1:])] == [4, 4, 4]
 
 
 def test_a_worker_with_other_code_is_refused(study):
