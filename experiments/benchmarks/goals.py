@@ -1,16 +1,19 @@
 """The goals of the benchmark, each read off the rows: what was asked, what was measured, met or not."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from statistics import median
 
 from experiments.benchmarks import ranking
 from experiments.benchmarks.rows import Row
 from experiments.common.contestants import HEURISTICS
+from experiments.common.results import as_percent
 
 # median seconds of `exact` in this table before it had linear programs at its nodes
 _FORMER = {("known optimum", "n=30"): 0.180, ("known optimum", "n=50"): 6.03, ("random axial", "n=26"): 0.265}
+EXACT = ("exact",)
 PROVING_PEERS = ("cp_sat", "cp_sat_1", "highs", "scip", "scip_1")
 
 
@@ -19,16 +22,16 @@ class Verdict:
     """A goal of one family and size.
 
     family, size, goal: What was asked.
-    stretch: Whether it is a stretch goal (marked * in the report).
     measured: What was measured, with the numbers.
+    stretch: Whether it is a stretch goal (marked * in the report).
     """
 
     family: str
     size: str
     goal: str
-    stretch: bool
     measured: str
     met: bool
+    stretch: bool = False
 
 
 class Results:
@@ -89,19 +92,15 @@ class Results:
         return [o for o in self.of(row.family, row.size) if (o.seed, o.item) == (row.seed, row.item)]
 
 
+Judged = Callable[[list[Row]], tuple[str, bool]]
+"""From the rows of one solver to what was measured, and whether that is enough."""
+
+
 def judge(rows: Iterable[Row]) -> list[Verdict]:
     """Return the verdict on every goal whose rows were measured."""
+    rules = _paper, _gated, _ghost, _wide_gap, _wide_gates, _known_optimum, _random_axial, _planted, _kbest
     results = Results(rows)
-    verdicts: list[Verdict] = []
-    for rule in (
-        _paper, _gated, _ghost, _wide_gap, _wide_gates, _known_optimum, _random_axial, _planted, _kbest,
-    ):  # fmt: skip
-        verdicts += rule(results)
-    return verdicts
-
-
-def _percent(value: float) -> str:
-    return "0 %" if abs(value) < 1e-9 else f"{100 * value:.3g} %"
+    return [verdict for rule in rules for verdict in rule(results)]
 
 
 def _each(
@@ -110,16 +109,24 @@ def _each(
     size: str,
     solvers: Iterable[str],
     goal: str,
-    judged: Callable[[list[Row]], tuple[str, bool]],
+    judged: Judged,
     *,
     stretch: bool = False,
 ) -> list[Verdict]:
     """One verdict for each solver: what was measured of its rows, and whether the goal is met."""
     found = ((solver, results.of(family, size, solver)) for solver in solvers)
-    return [Verdict(family, size, f"{solver}: {goal}", stretch, *judged(rows)) for solver, rows in found if rows]
+    return [Verdict(family, size, f"{solver}: {goal}", *judged(rows), stretch) for solver, rows in found if rows]
 
 
-def _share(needed: float = 1.0) -> Callable[[list[Row]], tuple[str, bool]]:
+def _spread(values: Sequence[float]) -> str:
+    return f"median {as_percent(median(values))} %, worst {as_percent(max(values))} %"
+
+
+def _proved(rows: Iterable[Row]) -> list[Row]:
+    return [row for row in rows if row.status == "optimal"]
+
+
+def _share(needed: float = 1.0) -> Judged:
     """The reference is found on a share of the runs."""
 
     def judged(rows: list[Row]) -> tuple[str, bool]:
@@ -129,254 +136,220 @@ def _share(needed: float = 1.0) -> Callable[[list[Row]], tuple[str, bool]]:
     return judged
 
 
-def _within(allowed: float) -> Callable[[list[Row]], tuple[str, bool]]:
+def _within(allowed: float) -> Judged:
     """No excess is larger."""
 
     def judged(rows: list[Row]) -> tuple[str, bool]:
         excess = [row.excess for row in rows]
-        text = f"median {_percent(median(excess))}, worst {_percent(max(excess))} above"
-        return text, max(excess) <= allowed
+        return f"{_spread(excess)} above", max(excess) <= allowed
 
     return judged
 
 
-def _paper(results: Results) -> list[Verdict]:
-    verdicts = []
+def _in_time(seconds: float, *, ms: bool = False) -> Judged:
+    """The median time is no longer."""
+
+    def judged(rows: list[Row]) -> tuple[str, bool]:
+        time = median(row.taken for row in rows)
+        return f"median {1e3 * time:.3g} ms" if ms else f"median {time:.3g} s", time <= seconds
+
+    return judged
+
+
+def _ahead(
+    results: Results, times: float, least: float, peers: Sequence[str] = PROVING_PEERS, *, proofs: bool = False
+) -> Judged:
+    """So many times as fast as the fastest of these peers, in the median and at the least.
+
+    Where a solver proves nothing it is not faster; where no peer does, the longest limit of these peers stands for
+    their time: they are slower than that. With `proofs` one is told how many it has.
+    """
+
+    def judged(rows: list[Row]) -> tuple[str, bool]:
+        theirs = {row: results.least_of_peers(row, peers) for row in rows}
+        ratios = [
+            time / row.taken if row.status == "optimal" else 0.0 for row, time in theirs.items() if math.isfinite(time)
+        ]
+        text = f"proves {len(_proved(rows))} of {len(rows)}, " if proofs else ""
+        if not ratios:
+            return f"{text}not measured", False
+        text += f"median {median(ratios):.3g} times, least {min(ratios):.3g}"
+        return text, median(ratios) >= times and min(ratios) >= least
+
+    return judged
+
+
+def _paper(results: Results) -> Iterator[Verdict]:
     for size in results.sizes("paper"):
-        solvers = ("exact", "lagrangian", *HEURISTICS)
-        verdicts += _each(results, "paper", size, solvers, "optimal on every scan", _share())
-        for solver in HEURISTICS:
-            times = [row.taken for row in results.of("paper", size, solver)]
-            if times:
-                text = f"median {1e3 * median(times):.3g} ms"
-                goal = f"{solver}: a scan in less than 1 ms"
-                verdicts.append(Verdict("paper", size, goal, False, text, median(times) < 1e-3))
-    return verdicts
+        say = partial(_each, results, "paper", size)
+        yield from say(("exact", "lagrangian", *HEURISTICS), "optimal on every scan", _share())
+        yield from say(HEURISTICS, "a scan in less than 1 ms", _in_time(1e-3, ms=True))
 
 
 def _no_slower(results: Results, family: str, size: str) -> list[Verdict]:
     """Whether exact still is as fast as it was."""
-    times = [row.taken for row in results.of(family, size, "exact")]
-    if not times:
-        return []
-    now, former = median(times), _FORMER[family, size]
-    text = f"median {now:.3g} s"
-    return [Verdict(family, size, f"exact: no slower than it was ({former:.3g} s)", False, text, now <= former)]
+    former = _FORMER[family, size]
+    return _each(results, family, size, EXACT, f"no slower than it was ({former:.3g} s)", _in_time(former))
 
 
-def _gated(results: Results) -> list[Verdict]:
-    verdicts = []
+def _gated(results: Results) -> Iterator[Verdict]:
+    def optimum(rows: list[Row]) -> tuple[str, bool]:
+        found = all(row.hit and row.status == "optimal" for row in rows)
+        return f"worst excess {max(row.excess for row in rows):.2g}", found
+
     for size in results.sizes("gated"):
-        exact = results.of("gated", size, "exact")
-        if exact:
-            same = all(row.hit and row.status == "optimal" for row in exact)
-            worst = max(row.excess for row in exact)
-            verdicts.append(
-                Verdict("gated", size, "exact: the optimum, proven", False, f"worst excess {worst:.2g}", same)
-            )
-            asked = 30 if size == "3x300" else 20
-            text, times, least = _ahead(results, exact)
-            goal = f"exact: {asked} times faster (median) than the fastest peer, never slower"
-            verdicts.append(Verdict("gated", size, goal, False, text, times >= asked and least >= 1))
-            if size in ("3x100", "3x300"):
-                verdicts.append(Verdict("gated", size, "exact: 100 times (median)", True, text, times >= 100))
-        verdicts += _lagrangian_speed(results, size)
+        say = partial(_each, results, "gated", size)
+        yield from say(EXACT, "the optimum, proven", optimum)
+        asked = 30 if size == "3x300" else 20
+        goal = f"{asked} times faster (median) than the fastest peer, never slower"
+        yield from say(EXACT, goal, _ahead(results, asked, 1.0))
+        if size in ("3x100", "3x300"):
+            yield from say(EXACT, "100 times (median)", _ahead(results, 100.0, 0.0), stretch=True)
+        yield from _lagrangian_speed(results, size)
         if size == "3x300":
-            goal = "within 0.01 % of the optimum in 1 s"
-            verdicts += _each(results, "gated", size, HEURISTICS, goal, _within(1e-4))
-    return verdicts
+            yield from say(HEURISTICS, "within 0.01 % of the optimum in 1 s", _within(1e-4))
 
 
-def _lagrangian_speed(results: Results, size: str) -> list[Verdict]:
+def _lagrangian_speed(results: Results, size: str) -> Iterator[Verdict]:
     rows = results.of("gated", size, "lagrangian@0.1%")
     theirs = results.of("gated", size, "cp_sat") or results.of("gated", size, "cp_sat_1")
     peer = {row.seed: row.taken for row in theirs}
     ratios = [peer[row.seed] / row.taken for row in rows if row.seed in peer]
-    if not ratios:
-        return []
-    text = f"worst gap {_percent(max(row.gap for row in rows))}, median 1/{median(ratios):.3g} of its time"
-    met = median(ratios) >= 50 and all(row.gap <= 1e-3 for row in rows)
-    goal = "lagrangian: gap <= 0.1 % in 1/50 of CP-SAT's time"
-    return [Verdict("gated", size, goal, False, text, met)]
+    if ratios:
+        text = f"worst gap {as_percent(max(row.gap for row in rows))} %, median 1/{median(ratios):.3g} of its time"
+        met = median(ratios) >= 50 and all(row.gap <= 1e-3 for row in rows)
+        yield Verdict("gated", size, "lagrangian: gap <= 0.1 % in 1/50 of CP-SAT's time", text, met)
 
 
-def _ahead(results: Results, exact: Sequence[Row], peers: Sequence[str] = PROVING_PEERS) -> tuple[str, float, float]:
-    """How many times as fast as the fastest peer exact proves its answers: in words, the median and the least.
-
-    Where exact proves nothing it is not faster; where no peer does, the longest limit of these peers stands for their
-    time: they are slower than that.
-    """
-    ratios = []
-    for row in exact:
-        theirs = results.least_of_peers(row, peers)
-        if math.isfinite(theirs):
-            ratios.append(theirs / row.taken if row.status == "optimal" else 0.0)
-    if not ratios:
-        return "not measured", 0.0, 0.0
-    return f"median {median(ratios):.3g} times, least {min(ratios):.3g}", median(ratios), min(ratios)
-
-
-def _ghost(results: Results) -> list[Verdict]:
-    verdicts = []
+def _ghost(results: Results) -> Iterator[Verdict]:
     for size in results.sizes("ghost"):
-        exact = results.of("ghost", size, "exact")
-        if exact:
-            verdicts += _ghost_proofs(results, size, exact)
+        say = partial(_each, results, "ghost", size, EXACT)
+        if size == "20":
+            yield from say("faster than every peer on each seed", _ahead(results, 0.0, 1.0))
+            yield from say("10 times as fast as the fastest peer (median)", _ahead(results, 10.0, 0.0), stretch=True)
+        elif size == "40":
+            ahead = _ahead(results, 5.0, 1.0, ("highs",), proofs=True)
+            yield from say("5 times as fast as HiGHS (median), never slower", ahead)
+            yield from say("at most 3 s where the linear program's gap is below 0.2 %", _longest_of_small_gap(3.0))
+            yield from say("at most 1 s there", _longest_of_small_gap(1.0), stretch=True)
+        elif size == "60":
+            yield from say("proof in 60 s on 3 of 5", _proofs_and_gaps(share=0.6))
+            yield from say("all in 10 s", _proofs_and_gaps(share=1.0, longest=10.0), stretch=True)
+        else:
+            yield from say("gap at most 0.01 % in 30 s (median)", _proofs_and_gaps(middle=1e-4))
+            yield from say("gap at most 0.01 % in 30 s (each seed)", _proofs_and_gaps(most=1e-4))
+            yield from say("gap at most 0.003 % in 30 s (median)", _proofs_and_gaps(middle=3e-5), stretch=True)
         for solver in HEURISTICS:
-            verdicts += _ghost_heuristic(results, size, solver)
-    return verdicts
+            yield from _ghost_heuristic(results, size, solver)
 
 
-def _ghost_proofs(results: Results, size: str, exact: Sequence[Row]) -> list[Verdict]:
-    proved = [row for row in exact if row.status == "optimal"]
-    text = f"proves {len(proved)} of {len(exact)}"
+def _longest_of_small_gap(seconds: float) -> Judged:
+    """None of the scenes whose linear program is less than 0.2 % below the optimum takes longer."""
 
-    def verdict(goal: str, stretch: bool, measured: str, met: bool) -> Verdict:
-        return Verdict("ghost", size, f"exact: {goal}", stretch, measured, met)
+    def judged(rows: list[Row]) -> tuple[str, bool]:
+        near = [row.taken if row.status == "optimal" else math.inf for row in rows if 0 < row.extra < 2e-3]
+        if not near:
+            return "no such scene measured", False
+        return f"at most {max(near):.3g} s on the {len(near)} of gap below 0.2 %", max(near) <= seconds
 
-    if size == "20":
-        speed, times, least = _ahead(results, exact)
-        return [
-            verdict("faster than every peer on each seed", False, speed, least > 1),
-            verdict("10 times as fast as the fastest peer (median)", True, speed, times >= 10),
-        ]
-    if size == "40":
-        speed, times, least = _ahead(results, exact, ("highs",))
-        near = [row.taken if row.status == "optimal" else math.inf for row in exact if 0 < row.extra < 2e-3]
-        longest = max(near, default=math.inf)
-        most = f"at most {longest:.3g} s on the {len(near)} of gap below 0.2 %" if near else "no such scene measured"
-        return [
-            verdict(
-                "5 times as fast as HiGHS (median), never slower", False, f"{text}, {speed}", least >= 1 and times >= 5
-            ),
-            verdict("at most 3 s where the linear program's gap is below 0.2 %", False, most, longest <= 3.0),
-            verdict("at most 1 s there", True, most, longest <= 1.0),
-        ]
-    gaps = [row.gap for row in exact]
-    text += f"; gap median {_percent(median(gaps))}, worst {_percent(max(gaps))}"
-    slowest = max((row.taken for row in proved), default=math.inf)
-    if size == "60":
-        return [
-            verdict("proof in 60 s on 3 of 5", False, text, len(proved) >= 0.6 * len(exact)),
-            verdict("all in 10 s", True, text, len(proved) == len(exact) and slowest <= 10.0),
-        ]
-    return [
-        verdict("gap at most 0.01 % in 30 s (median)", False, text, median(gaps) <= 1e-4),
-        verdict("gap at most 0.01 % in 30 s (each seed)", False, text, max(gaps) <= 1e-4),
-        verdict("gap at most 0.003 % in 30 s (median)", True, text, median(gaps) <= 3e-5),
-    ]
+    return judged
 
 
-def _wide_gap(results: Results) -> list[Verdict]:
-    verdicts = []
-    for size in results.sizes("wide gap"):
-        exact = results.of("wide gap", size, "exact")
-        text, times, least = _ahead(results, exact, ("highs", "scip", "scip_1"))
-        text = f"proves {sum(row.status == 'optimal' for row in exact)} of {len(exact)}, {text}"
-        verdicts.append(Verdict("wide gap", size, "exact: faster than SCIP and HiGHS", False, text, least > 1))
-        verdicts.append(Verdict("wide gap", size, "exact: 10 times (median)", True, text, times >= 10))
-    return verdicts
+def _proofs_and_gaps(
+    share: float = 0.0, longest: float = math.inf, middle: float = math.inf, most: float = math.inf
+) -> Judged:
+    """A share is proved, none of them in more than so many seconds; the median and the widest gap are no wider."""
+
+    def judged(rows: list[Row]) -> tuple[str, bool]:
+        proved, gaps = _proved(rows), [row.gap for row in rows]
+        met = len(proved) >= share * len(rows) and all(row.taken <= longest for row in proved)
+        met = met and median(gaps) <= middle and max(gaps) <= most
+        return f"proves {len(proved)} of {len(rows)}; gap {_spread(gaps)}", met
+
+    return judged
 
 
-def _wide_gates(results: Results) -> list[Verdict]:
-    verdicts = []
-    for size in results.sizes("wide gates"):
-        exact = results.of("wide gates", size, "exact")
-        text, times, least = _ahead(results, exact, ("highs",))
-        goal = "exact: 3 times as fast as HiGHS, 5 in the median"
-        verdicts.append(Verdict("wide gates", size, goal, False, text, least >= 3 and times >= 5))
-    return verdicts
-
-
-def _ghost_heuristic(results: Results, size: str, solver: str) -> list[Verdict]:
-    rows = results.of("ghost", size, solver)
-    if not rows:
-        return []
-
-    def above(row: Row, within: float) -> float:
-        other = results.best_peer(row, within)
-        return (row.cost - other) / max(1.0, abs(other)) if math.isfinite(other) else -math.inf
-
+def _ghost_heuristic(results: Results, size: str, solver: str) -> Iterator[Verdict]:
     limits = [row.limit for row in results.of("ghost", size) if row.peer and row.solver in PROVING_PEERS]
     longest = max(limits, default=5.0)
-    early = [above(row, 5.0) for row in rows]
-    late = [above(row, longest) for row in rows]
 
-    def text(values: list[float]) -> str:
-        return f"median {_percent(median(values))}, worst {_percent(max(values))} above"
+    def above(within: float, summary: Callable[[Sequence[float]], float], most: float = 1e-9) -> Judged:
+        """The median or largest cost, relative to the best of any peer within so many seconds, is no higher."""
 
-    after = f"any peer after {longest:g} s"
+        def judged(rows: list[Row]) -> tuple[str, bool]:
+            best = [results.best_peer(row, within) for row in rows]
+            excess = [
+                (row.cost - other) / max(1.0, abs(other)) if math.isfinite(other) else -math.inf
+                for row, other in zip(rows, best, strict=True)
+            ]
+            return f"{_spread(excess)} above", summary(excess) <= most
+
+        return judged
+
+    say, after = partial(_each, results, "ghost", size, [solver]), f"any peer after {longest:g} s"
+    yield from say("in 5 s at or below any peer after 5 s (each seed)", above(5.0, max))
+    yield from say(f"in 5 s at or below {after} (median)", above(longest, median))
+    yield from say(f"in 5 s at or below {after} (each seed)", above(longest, max))
     # at 20 all are at the optimum long before
-    return [
-        Verdict("ghost", size, f"{solver}: in 5 s at or below any peer after 5 s (each seed)", False, text(early),
-                max(early) <= 1e-9),
-        Verdict("ghost", size, f"{solver}: in 5 s at or below {after} (median)", False, text(late),
-                median(late) <= 1e-9),
-        Verdict("ghost", size, f"{solver}: in 5 s at or below {after} (each seed)", False, text(late),
-                max(late) <= 1e-9),
-        *([] if size == "20" else [
-            Verdict("ghost", size, f"{solver}: in 5 s 0.01 % below {after} (median)", True, text(late),
-                    median(late) <= -1e-4),
-        ]),
-    ]  # fmt: skip
+    if size != "20":
+        yield from say(f"in 5 s 0.01 % below {after} (median)", above(longest, median, -1e-4), stretch=True)
 
 
-def _known_optimum(results: Results) -> list[Verdict]:
-    family = "known optimum"
-    verdicts = []
-    for size, stretch in (("n=30", False), ("n=50", False), ("n=100", True)):
-        exact = results.of(family, size, "exact")
-        if exact:
-            proved = sum(row.status == "optimal" for row in exact)
-            slowest = max(row.taken for row in exact)
-            text = f"{proved} of {len(exact)}, at most {slowest:.3g} s"
-            verdicts.append(Verdict(family, size, "exact: proof in 20 s", stretch, text, proved == len(exact)))
-        if (family, size) in _FORMER:
-            verdicts += _no_slower(results, family, size)
-    return [
-        *verdicts,
-        *_each(results, family, "n=10", HEURISTICS, "the optimum, always", _share()),
-        *_each(results, family, "n=20", HEURISTICS, "the optimum in 90 % of runs, 5 s", _share(0.9)),
-        *_each(results, family, "n=30", HEURISTICS, "within 1 %, 5 s", _within(0.01)),
-        *_each(results, family, "n=30", HEURISTICS, "the optimum in 80 % of runs, 5 s", _share(0.8), stretch=True),
-        *_each(results, family, "n=50", HEURISTICS, "within 0.5 %, 10 s", _within(0.005), stretch=True),
-    ]
+def _wide_gap(results: Results) -> Iterator[Verdict]:
+    for size in results.sizes("wide gap"):
+        say, peers = partial(_each, results, "wide gap", size, EXACT), ("highs", "scip", "scip_1")
+        yield from say("faster than SCIP and HiGHS", _ahead(results, 0.0, 1.0, peers, proofs=True))
+        yield from say("10 times (median)", _ahead(results, 10.0, 0.0, peers, proofs=True), stretch=True)
 
 
-def _random_axial(results: Results) -> list[Verdict]:
-    goal = "the optimum in 80 % of runs, 10 s"
+def _wide_gates(results: Results) -> Iterator[Verdict]:
+    for size in results.sizes("wide gates"):
+        goal = "3 times as fast as HiGHS, 5 in the median"
+        yield from _each(results, "wide gates", size, EXACT, goal, _ahead(results, 5.0, 3.0, ("highs",)))
+
+
+def _known_optimum(results: Results) -> Iterator[Verdict]:
+    def proofs(rows: list[Row]) -> tuple[str, bool]:
+        proved, slowest = len(_proved(rows)), max(row.taken for row in rows)
+        return f"{proved} of {len(rows)}, at most {slowest:.3g} s", proved == len(rows)
+
+    say = partial(_each, results, "known optimum")
+    for size in ("n=30", "n=50", "n=100"):
+        yield from say(size, EXACT, "proof in 20 s", proofs, stretch=size == "n=100")
+        if ("known optimum", size) in _FORMER:
+            yield from _no_slower(results, "known optimum", size)
+    yield from say("n=10", HEURISTICS, "the optimum, always", _share())
+    yield from say("n=20", HEURISTICS, "the optimum in 90 % of runs, 5 s", _share(0.9))
+    yield from say("n=30", HEURISTICS, "within 1 %, 5 s", _within(0.01))
+    yield from say("n=30", HEURISTICS, "the optimum in 80 % of runs, 5 s", _share(0.8), stretch=True)
+    yield from say("n=50", HEURISTICS, "within 0.5 %, 10 s", _within(0.005), stretch=True)
+
+
+def _random_axial(results: Results) -> Iterator[Verdict]:
     exact = results.of("random axial", solver="exact")
-    proved = sum(row.status == "optimal" for row in exact)
-    largest = [row.taken for row in exact if row.size == "n=26"]
-    times = f", n=26 median {median(largest):.3g} s" if largest else ""
-    text = f"{proved} of {len(exact)}{times}"
-    every = [Verdict("random axial", "all", "exact: proof in 60 s", False, text, proved == len(exact))] if exact else []
-    return [
-        *every,
-        *_no_slower(results, "random axial", "n=26"),
-        *_each(results, "random axial", "n=12", HEURISTICS, "the optimum, always, 5 s", _share()),
-        *_each(results, "random axial", "n=26", HEURISTICS, goal, _share(0.8), stretch=True),
-    ]
+    if exact:
+        proved, largest = len(_proved(exact)), [row.taken for row in exact if row.size == "n=26"]
+        times = f", n=26 median {median(largest):.3g} s" if largest else ""
+        text = f"{proved} of {len(exact)}{times}"
+        yield Verdict("random axial", "all", "exact: proof in 60 s", text, proved == len(exact))
+    yield from _no_slower(results, "random axial", "n=26")
+    say = partial(_each, results, "random axial")
+    yield from say("n=12", HEURISTICS, "the optimum, always, 5 s", _share())
+    yield from say("n=26", HEURISTICS, "the optimum in 80 % of runs, 10 s", _share(0.8), stretch=True)
 
 
-def _planted(results: Results) -> list[Verdict]:
-    verdicts = []
+def _planted(results: Results) -> Iterator[Verdict]:
     for size in results.sizes("planted"):
-        solvers = ("exact", "lagrangian", *HEURISTICS, "milp")
-        verdicts += _each(results, "planted", size, solvers, "optimal", _share())
-    return verdicts
+        yield from _each(results, "planted", size, ("exact", "lagrangian", *HEURISTICS, "milp"), "optimal", _share())
 
 
-def _kbest(results: Results) -> list[Verdict]:
-    verdicts = []
-    planar = results.of("kbest", ranking.PLANAR, "kbest")
+def _kbest(results: Results) -> Iterator[Verdict]:
+    planar = [row.seconds for row in results.of("kbest", ranking.PLANAR, "kbest")]
     if planar:
-        time = 1e3 * median(row.seconds for row in planar)
-        verdicts.append(Verdict("kbest", ranking.PLANAR, "under 15 ms", False, f"median {time:.3g} ms", time < 15))
+        time = 1e3 * median(planar)
+        yield Verdict("kbest", ranking.PLANAR, "under 15 ms", f"median {time:.3g} ms", time < 15)
     exact = {row.seed: row.seconds for row in results.of("kbest", ranking.SPATIAL, "exact")}
     spatial = [row.seconds / exact[row.seed] for row in results.of("kbest", ranking.SPATIAL, "kbest")]
     if spatial:
-        text = f"median {median(spatial):.3g} times"
-        goal = "at most 20 times one exact solve"
-        verdicts.append(Verdict("kbest", ranking.SPATIAL, goal, False, text, median(spatial) <= 20))
-    return verdicts
+        goal, times = "at most 20 times one exact solve", median(spatial)
+        yield Verdict("kbest", ranking.SPATIAL, goal, f"median {times:.3g} times", times <= 20)

@@ -12,7 +12,7 @@ from statistics import median
 from experiments.benchmarks.families import cases
 from experiments.benchmarks.goals import Results, judge
 from experiments.benchmarks.rows import Row
-from experiments.common.results import plain_table
+from experiments.common.results import as_percent, as_time, plain_table
 
 ABOUT = {
     "paper": "The 100 scans of the ant colony paper's scene: three targets, three radars, P_d 0.9.",
@@ -153,15 +153,3 @@ def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
         as_time(cpu) if (cpu := median(row.cpu for row in rows)) else "-",
         f"{speed:.3g}" if math.isfinite(speed) and all(row.hit for row in rows) else "-",
     ]
-
-
-def as_percent(value: float) -> str:
-    """Return a share as a number of percent, three digits; "-" where there is none."""
-    if not math.isfinite(value):
-        return "-"
-    return "0" if abs(value) < 1e-9 else f"{100 * value:.3g}"
-
-
-def as_time(seconds: float) -> str:
-    """Return a time in milliseconds or seconds, three digits."""
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"

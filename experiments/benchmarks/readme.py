@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from statistics import median
 
 from experiments.benchmarks.goals import PROVING_PEERS, Results, judge
-from experiments.benchmarks.markdown import as_percent, as_time
 from experiments.benchmarks.rows import Row
 from experiments.common.contestants import HEURISTICS
-from experiments.common.results import table
+from experiments.common.results import as_percent, as_time, table
 
 BEGIN = "<!-- from here to the end mark: written by python -m experiments.benchmarks -->"
 END = "<!-- end mark -->"

@@ -1,6 +1,7 @@
 """The published results: one small file for each experiment, from which the pages take their figures."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,18 @@ def number(value: float, digits: int = 3) -> str:
     while 0 < size < 1 and decimals < 8:
         size, decimals = size * 10, decimals + 1
     return f"{value:,.{decimals}f}"
+
+
+def as_percent(value: float) -> str:
+    """Return a share as a number of percent, three digits; "-" where there is none."""
+    if not math.isfinite(value):
+        return "-"
+    return "0" if abs(value) < 1e-9 else f"{100 * value:.3g}"
+
+
+def as_time(seconds: float) -> str:
+    """Return a time in milliseconds or seconds, three digits."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
 
 
 def table(

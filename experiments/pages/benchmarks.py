@@ -5,11 +5,10 @@ from statistics import mean, median
 from typing import NamedTuple
 
 from experiments.benchmarks.goals import Results
-from experiments.benchmarks.markdown import as_percent, as_time
 from experiments.benchmarks.readme import LONG
 from experiments.benchmarks.rows import Row, load
 from experiments.common.contestants import HEURISTICS
-from experiments.common.results import table
+from experiments.common.results import as_percent, as_time, table
 
 ROWS = Path(__file__).resolve().parents[2] / "docs" / "benchmarks.csv"
 """What the benchmarks wrote."""
