@@ -36,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         "python -m experiments.sdlib", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    every = instances()
     parts = parser.add_subparsers(dest="part", required=True)
     make = parts.add_parser("make", help="write the instances")
     make.add_argument("--compare", action="store_true", help="write nothing: compare them with what is stored")
@@ -43,8 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
         part.add_argument("--seconds", type=seconds, default=60.0, help="limit for each instance (default 60)")
-        part.add_argument("--family", help="only this family")
-        part.add_argument("names", nargs="*", metavar="NAME", help="only these instances")
+        part.add_argument("--family", choices=sorted({one.family for one in every}), help="only this family")
+        part.add_argument("names", nargs="*", type=_name, metavar="NAME", help="only these instances")
     improve = parts.choices["solve"]
     improve.add_argument("--solver", default="exact", help="of ours (default exact, which alone proves)")
     run = parts.choices["run"]
@@ -54,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run.add_argument("--all", action="store_true", help="all instances, not two of each family")
     run.add_argument("--output", metavar="FILE", help="write the rows, with what was found when, as JSON")
     check = parts.add_parser("check", help="check every solution and proof")
-    check.add_argument("names", nargs="*", metavar="NAME")
+    check.add_argument("names", nargs="*", type=_name, metavar="NAME")
     chosen = parser.parse_args(arguments)
     if chosen.part == "make":
         if chosen.recording is not None:
@@ -62,15 +63,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{chosen.recording}: there is no such file", file=sys.stderr)
                 return 2
             os.environ[recorded.PATH] = chosen.recording
-        return _make(instances(), compare=chosen.compare)
-    picked = _picked(parser, chosen.names, getattr(chosen, "family", None))
+        return _make(every, compare=chosen.compare)
+    family = getattr(chosen, "family", None)
+    picked = [one for one in every if one.name in (chosen.names or [one.name]) and one.family == (family or one.family)]
     if chosen.part == "solve":
         return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
         return _check(picked)
     if chosen.command is not None and not ("{instance}" in chosen.command and "{solution}" in chosen.command):
         parser.error("--command: must have {instance} and {solution} in it")
-    if not (chosen.all or chosen.names or chosen.family):
+    if not (chosen.all or chosen.names or family):
         picked = representatives(picked)
     return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
 
@@ -83,14 +85,10 @@ def _solvers(text: str) -> list[str]:
     return names
 
 
-def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | None) -> list[Instance]:
-    every = instances()
-    if unknown := {*names} - {one.name for one in every}:
-        parser.error(f"{min(unknown)}: no instance of this name")
-    families = {one.family for one in every}
-    if family not in {None, *families}:
-        parser.error(f"--family: expected one of {', '.join(sorted(families))}")
-    return [one for one in every if one.name in (names or [one.name]) and family in (None, one.family)]
+def _name(text: str) -> str:
+    if text not in {one.name for one in instances()}:
+        raise argparse.ArgumentTypeError(f"{text}: no instance of this name")
+    return text
 
 
 def _make(known: Sequence[Instance], *, compare: bool) -> int:

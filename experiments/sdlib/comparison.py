@@ -3,7 +3,7 @@
 import datetime
 import json
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,9 @@ _EARLY = (1.0, 5.0)
 _ROUNDING = 1e-9
 
 Row = dict[str, Any]
+Told = list[tuple[Row, float]]
+"""Rows of a solver on instances that it takes, and the best value of each."""
+Measure = Callable[[Row, float], float | None]
 
 
 def write_comparison(path: str | Path, rows: list[Row], seconds: float, command: str) -> None:
@@ -64,87 +67,70 @@ def is_wrong(row: Row, best: float) -> bool:
     return bool(row.get("proved")) and float(row["cost"]) > best + _SAME * max(1.0, abs(best))
 
 
+def _within(measure: Measure) -> Callable[[Told, float], str]:
+    """How many times are within so many seconds."""
+
+    def counted(told: Told, seconds: float) -> str:
+        times = [measure(row, best) for row, best in told]
+        return str(sum(time is not None and time <= seconds for time in times))
+
+    return counted
+
+
+def _quality(told: Told, seconds: float) -> str:
+    """The mean excess after so many seconds, percent."""
+    found = [excess(row, best, seconds) for row, best in told]
+    known = [one for one in found if one is not None]
+    if not found or len(known) < len(found):
+        return f"none on {len(found) - len(known)}"
+    return f"{100 * sum(known) / len(found):.3g} %"
+
+
+def _seconds(row: Row, best: float, measure: Measure) -> str:
+    if "trace" not in row:
+        return "-"
+    time = measure(row, best)
+    return ">" if time is None else f"{time:.2g}" if time < 10.0 else f"{time:.0f}"
+
+
 def comparison_tables(path: Path = PUBLISHED) -> str:
     """Return the tables of a comparison as text."""
     content = json.loads(path.read_text())
     rows, limit = content["rows"], float(content["seconds"])
     known = {name: float(row["value"]) for name, row in store.table().items()}
-    by_place = {(row["instance"], row["solver"]): row for row in rows}
-    instances = list(dict.fromkeys(row["instance"] for row in rows))
-    solvers = list(dict.fromkeys(row["solver"] for row in rows))
-
-    def told(solver: str) -> list[tuple[Row, float]]:
-        own = [by_place.get((name, solver), {"fault": "was not run"}) for name in instances]
-        return [(row, known[name]) for row, name in zip(own, instances, strict=True) if "trace" in row]
-
-    def within(solver: str, seconds: float) -> str:
-        found = [time_to_near(row, best) for row, best in told(solver)]
-        return str(sum(time is not None and time <= seconds for time in found))
-
-    def quality(solver: str, seconds: float) -> str:
-        found = [excess(row, best, seconds) for row, best in told(solver)]
-        if not found or any(one is None for one in found):
-            missing = sum(one is None for one in found)
-            return f"none on {missing}"
-        return f"{100 * sum(one or 0.0 for one in found) / len(found):.3g} %"
-
-    def proofs(solver: str, seconds: float) -> str:
-        found = [time_to_proof(row, best) for row, best in told(solver)]
-        return str(sum(time is not None and time <= seconds for time in found))
-
+    instances: dict[str, dict[str, Row]] = {}
+    told: dict[str, Told] = {}
+    for row in rows:
+        instances.setdefault(row["instance"], {})[row["solver"]] = row
+        told.setdefault(row["solver"], []).extend([(row, known[row["instance"]])] if "trace" in row else [])
     marks = (0.01, 0.1, *_EARLY, limit)
-    spoken = [f"{mark:g} s" for mark in marks]
+
+    def summary(cell: Callable[[Told, float], str], marks: Sequence[float] = marks) -> str:
+        head = ["solver", "takes", *(f"{mark:g} s" for mark in marks)]
+        lines = [[name, str(len(own)), *(cell(own, mark) for mark in marks)] for name, own in told.items()]
+        return table(head, lines)
+
+    def matrix(measure: Measure, solvers: list[str]) -> str:
+        lines = [
+            [name, *(_seconds(own.get(solver, {}), known[name], measure) for solver in solvers)]
+            for name, own in instances.items()
+        ]
+        return table(["instance", *solvers], lines)
+
     wrong = [f"{row['solver']} on {row['instance']}" for row in rows if is_wrong(row, known[row["instance"]])]
-    every = [[solver, str(len(told(solver)))] for solver in solvers]
-    lines = [
+    proving = [name for name, own in told.items() if any(time_to_proof(*one) is not None for one in own)]
+    return "\n\n".join((
         f"`{content['command']}`, {content['date']}, {content['machine']}: {len(instances)} instances, "
-        f"{len(solvers)} solvers, {limit:g} s of CPU time each.",
-        "",
+        f"{len(told)} solvers, {limit:g} s of CPU time each.",
         "**Time to 0.1 %**: instances on which a solver was that near to the best value known, after so long.",
-        "",
-        table(["solver", "takes", *spoken], [[*one, *(within(one[0], mark) for mark in marks)] for one in every]),
-        "",
+        summary(_within(time_to_near)),
         "**Time to proof**: instances on which it said, truly, that it had the optimum.",
-        "",
-        table(["solver", "takes", *spoken], [[*one, *(proofs(one[0], mark) for mark in marks)] for one in every]),
-        "",
+        summary(_within(time_to_proof)),
         f"Said to be optimal, and not: {', '.join(wrong) if wrong else 'none'}.",
-        "",
         "**Quality**: mean excess over the best value; *none on N*: it had found nothing on N instances.",
-        "",
-        table(
-            ["solver", "takes", *spoken[2:]], [[*one, *(quality(one[0], mark) for mark in marks[2:])] for one in every]
-        ),
-        "",
+        summary(_quality, marks[2:]),
         "**Seconds to 0.1 %** (-: cannot take the instance; >: not in the time)",
-        "",
-        _matrix(instances, solvers, by_place, known, time_to_near),
-        "",
+        matrix(time_to_near, list(told)),
         "**Seconds to proof** (of those that prove)",
-        "",
-        _matrix(
-            instances,
-            [solver for solver in solvers if any(time_to_proof(row, best) is not None for row, best in told(solver))],
-            by_place,
-            known,
-            time_to_proof,
-        ),
-    ]
-    return "\n".join(lines)
-
-
-def _matrix(
-    instances: list[str],
-    solvers: list[str],
-    by_place: dict[tuple[str, str], Row],
-    known: dict[str, float],
-    measure: Callable[[Row, float], float | None],
-) -> str:
-    def cell(name: str, solver: str) -> str:
-        row = by_place.get((name, solver), {})
-        if "trace" not in row:
-            return "-"
-        time = measure(row, known[name])
-        return ">" if time is None else f"{time:.2g}" if time < 10.0 else f"{time:.0f}"
-
-    return table(["instance", *solvers], [[name, *(cell(name, solver) for solver in solvers)] for name in instances])
+        matrix(time_to_proof, proving),
+    ))  # fmt: skip
