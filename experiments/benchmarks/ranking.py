@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 import assoc
+from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import timed
@@ -22,9 +23,8 @@ PLANAR, PLANAR_K = "2-D n=100 k=100", 100
 SPATIAL, SPATIAL_K = "3x20 k=20", 20
 PEER = "nrl_tracker"
 
-Costs = Callable[[AssignmentProblem], list[float]]
-"""Checks what was found against the problem, and returns its costs; not timed."""
-Rank = Callable[[AssignmentProblem, int], Costs]
+Rank = Callable[[AssignmentProblem, int], Callable[[AssignmentProblem], list[float]]]
+"""Ranks the k best; what it returns checks them against the problem and returns their costs, and is not timed."""
 
 
 class Ranking(NamedTuple):
@@ -36,11 +36,10 @@ class Ranking(NamedTuple):
 
 def run(seeds: int | None, log: Callable[[str], None], spatial_k: int = SPATIAL_K) -> list[Row]:
     """Time both goals' instances."""
-    from assoc.costs import build_problem
-
     rows: list[Row] = []
-    assoc.kbest(synthetic.planar_random(5, 0), 3)
-    assoc.kbest(build_problem(scenes.gated(3, 5, 0), 0), 3)
+    spatial = build_problem(scenes.gated(3, 5, 0), 0)
+    for problem in (synthetic.planar_random(5, 0), spatial):
+        assoc.kbest(problem, 3)
     for seed in range(FIRST_SEED, FIRST_SEED + (seeds or 5)):
         planar = synthetic.planar_random(100, seed)
         spatial = build_problem(scenes.gated(3, 20, seed), 0)
@@ -65,10 +64,10 @@ def _ranked(solver: str, rank: Rank, size: str, problem: AssignmentProblem, k: i
             found = rank(given, k)
             seconds, cpu = time.perf_counter() - start, time.process_time() - before
         costs[:] = found(problem)
-        best = costs[0]
+        best, peer = costs[0], solver == PEER
         return Row(
-            "kbest", size, seed, 0, problem.num_tuples, solver, solver == PEER, 0.0, best,
-            -math.inf if solver == PEER else best, seconds, "optimal", best, True, cpu=cpu,
+            "kbest", size, seed, 0, problem.num_tuples, solver, peer, 0.0, best,
+            -math.inf if peer else best, seconds, "optimal", best, True, cpu=cpu,
         )  # fmt: skip
 
     return Ranking(timed(run_once), costs)
@@ -95,18 +94,18 @@ def compared(rankings: Sequence[Ranking]) -> list[Row]:
     return rows
 
 
-def _kbest(problem: AssignmentProblem, k: int) -> Costs:
+def _kbest(problem: AssignmentProblem, k: int) -> Callable[[AssignmentProblem], list[float]]:
     found = assoc.kbest(problem, k)
     return lambda original: [check_answer(original, solution.tuples) for solution in found]
 
 
-def _exact(problem: AssignmentProblem, k: int) -> Costs:
+def _exact(problem: AssignmentProblem, k: int) -> Callable[[AssignmentProblem], list[float]]:
     """The first alone."""
     found = assoc.assign(problem, "exact")
     return lambda original: [check_answer(original, found.tuples)]
 
 
-def _murty_peer(problem: AssignmentProblem, k: int) -> Costs:
+def _murty_peer(problem: AssignmentProblem, k: int) -> Callable[[AssignmentProblem], list[float]]:
     from pytcl.assignment_algorithms.two_dimensional.kbest import (  # type: ignore[import-untyped,unused-ignore]
         murty,
     )

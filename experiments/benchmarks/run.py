@@ -5,6 +5,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from statistics import median
@@ -31,32 +32,35 @@ def run_all(
     seeds: Number of seeds at the most; None: all of each case.
     processes: More than 1: so many seeds at once, each process on a core of its own.
     """
-    if processes == 1:
-        _warm_up_for(cases)
-        for case in cases:
-            yield run_case(case, seeds, log)
-        return
     units = [case.by_seed(seeds) for case in cases]
-    context = multiprocessing.get_context("fork")
-    # instances are made by functions that cannot be sent: each process has all units from its start
     flat = [one for ones in units for one in ones]
-    started = context.Value("i", 0)
-    with ProcessPoolExecutor(processes, context, _take_a_core, (started, cases, flat)) as pool:
-        found = pool.map(_run_unit, range(len(flat)))
+    with _running(flat, processes) as found:
         for ones in units:
             rows: list[Row] = []
-            for _ in ones:
-                more, lines = next(found)
-                for line in lines:
-                    log(line)
-                rows += more
+            for one in ones:
+                rows += (more := next(found))
+                told = ", ".join(f"{row.solver} {row.cost:.7g} {row.seconds:.3g}s" for row in more if row.item == 0)
+                log(f"{one.family} {one.size} seed {one.chosen[0]}: {told}")
             yield rows
 
 
+@contextmanager
+def _running(units: list[Case], processes: int) -> Iterator[Iterator[list[Row]]]:
+    """Rows of each unit, as they are run: here, or in processes that are forked."""
+    if processes == 1:
+        _warm_up(units)
+        yield map(run_case, units)
+        return
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(processes, context, _take_a_core, (context.Value("i", 0), units)) as pool:
+        yield pool.map(_run_unit, range(len(units)))
+
+
+# instances are made by functions that cannot be sent: each process has all units from its start
 _UNITS: list[Case] = []
 
 
-def _take_a_core(started: Any, cases: Sequence[Case], units: list[Case]) -> None:
+def _take_a_core(started: Any, units: list[Case]) -> None:
     """Begin a process: on a core of its own, warm, with what there is to run."""
     with started.get_lock():
         number = started.value
@@ -64,37 +68,26 @@ def _take_a_core(started: Any, cases: Sequence[Case], units: list[Case]) -> None
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {cores[number % len(cores)]})
-    _warm_up_for(cases)
+    _warm_up(units)
     _UNITS[:] = units
 
 
-def _run_unit(place: int) -> tuple[list[Row], list[str]]:
-    lines: list[str] = []
-    return run_case(_UNITS[place], log=lines.append), lines
+def _run_unit(place: int) -> list[Row]:
+    return run_case(_UNITS[place])
 
 
-def _warm_up_for(cases: Sequence[Case]) -> None:
+def _warm_up(cases: Sequence[Case]) -> None:
     warm_up({entry.solver for case in cases for entry in (*case.ours, *case.peers)})
 
 
-def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None) -> list[Row]:
-    """Run everybody on every instance of a case.
-
-    seeds: Number of seeds at the most; by default all of the case.
-    """
-    rows: list[Row] = []
-    for one in case.by_seed(seeds):
-        (seed,) = one.chosen
-        for item, instance in enumerate(case.make(seed)):
-            found = _run_instance(case, instance, seed, item)
-            rows += found
-            if item == 0:
-                log(f"{case.family} {case.size} seed {seed}: " + ", ".join(_brief(row) for row in found))
-    return rows
-
-
-def _brief(row: Row) -> str:
-    return f"{row.solver} {row.cost:.7g} {row.seconds:.3g}s"
+def run_case(case: Case, seeds: int | None = None) -> list[Row]:
+    """Run everybody on every instance of a case, of so many seeds at the most."""
+    return [
+        row
+        for one in case.by_seed(seeds)
+        for item, instance in enumerate(case.make(one.chosen[0]))
+        for row in _run_instance(case, instance, one.chosen[0], item)
+    ]
 
 
 def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[Row]:
