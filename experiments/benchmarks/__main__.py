@@ -1,6 +1,7 @@
 """Our solvers and others' on families of problems: docs/benchmarks.csv and .md, tables of README.md and paper.md."""
 
 import argparse
+import math
 import shlex
 import sys
 import time
@@ -11,7 +12,7 @@ from pathlib import Path
 from assoc._files.output import write_text
 from experiments.benchmarks import markdown, ranking, readme
 from experiments.benchmarks import rows as storage
-from experiments.benchmarks.families import Case, cases
+from experiments.benchmarks.families import Case, Entry, cases, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all
 from experiments.common import contestants
@@ -119,14 +120,16 @@ def _measure(options: argparse.Namespace) -> Iterator[list[Row]]:
 
     chosen = [case for case in cases() if _to_run(case, options)]
     if options.brief:
-        chosen = [replace(case, seeds=case.brief, chosen=case.chosen[: case.brief]) for case in chosen]
-        options.peer_limit = options.peer_limit or _BRIEF_LIMIT
-    if options.peer_limit is not None:
-        chosen = [case.with_peers_within(options.peer_limit) for case in chosen]
-    if options.solvers:
-        chosen = [case.restricted_to(options.solvers) for case in chosen]
-    if options.processes > 1:
-        chosen = [case.on_one_core() for case in chosen]
+        chosen = [replace(case, seeds=case.seeds[: case.brief]) for case in chosen]
+    limit = options.peer_limit or (_BRIEF_LIMIT if options.brief else math.inf)
+
+    def change(entry: Entry) -> Entry | None:
+        if options.solvers and entry.solver not in options.solvers:
+            return None
+        changed = replace(entry, limit=min(entry.limit, limit)) if entry.peer else entry
+        return on_one_core(changed) if options.processes > 1 else changed
+
+    chosen = [case.changed(change) for case in chosen]
     yield from run_all(chosen, options.seeds, options.processes, log)
     if "kbest" in (options.families or FAMILIES):
         yield ranking.run(2 if options.brief else options.seeds, log)

@@ -1,18 +1,22 @@
 """Which instances are run, by whom, for how long."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
-from experiments.common.contestants import HEURISTICS, ONE_CORE
+from experiments.common.contestants import HEURISTICS, ONE_CORE, OURS
 from experiments.common.instances import FIRST_SEED, scenes, synthetic
 
 WIDE_GAPS = {20: (2001, 2018, 2022, 2033, 2037), 40: (2014, 2037, 2041, 2068, 2089)}
 """Targets -> the first five seeds of ghosts from 2000 on whose linear program is about 1 % (0.7 % or more) below the
 optimum: ``python -m experiments.benchmarks.wide_gaps`` finds them."""
+
+
+def _seeds(count: int) -> range:
+    return range(FIRST_SEED, FIRST_SEED + count)
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,15 @@ class Entry:
         """The name under which it is reported."""
         return self.solver if self.stop_gap is None else f"{self.solver}@{100 * self.stop_gap:g}%"
 
+    @property
+    def peer(self) -> bool:
+        """Whether it is somebody else's."""
+        return self.solver not in OURS
+
 
 @dataclass(frozen=True)
 class Case:
-    """One size of a family: how to make its instances and who runs on them, on so many seeds or on those chosen.
+    """One size of a family: how to make its instances, and who runs on them, peers first.
 
     ``brief`` is the number of seeds of a whole run in little time.
     """
@@ -52,31 +61,22 @@ class Case:
     family: str
     size: str
     make: Callable[[int], Iterator[Instance]]
-    ours: tuple[Entry, ...]
-    peers: tuple[Entry, ...]
-    seeds: int = 5
-    chosen: tuple[int, ...] = ()
+    entries: tuple[Entry, ...]
+    seeds: Sequence[int] = _seeds(5)
     brief: int = 2
 
-    def restricted_to(self, solvers: Collection[str]) -> Self:
-        """Return the same case with only these solvers and peers."""
-        ours = tuple(entry for entry in self.ours if entry.solver in solvers)
-        return replace(self, ours=ours, peers=tuple(entry for entry in self.peers if entry.solver in solvers))
-
-    def on_one_core(self) -> Self:
-        """Return the same case without peers that need two."""
-        peers = (replace(entry, solver=ONE_CORE.get(entry.solver, entry.solver)) for entry in self.peers)
-        return replace(self, peers=tuple(dict.fromkeys(peers)))
+    def changed(self, change: Callable[[Entry], Entry | None]) -> Self:
+        """Return the same case with each entry changed, or left out where there is none then; equal ones once."""
+        return replace(self, entries=tuple(dict.fromkeys(one for one in map(change, self.entries) if one is not None)))
 
     def by_seed(self, most: int | None = None) -> list[Self]:
         """Return a case for each seed, of so many at the most."""
-        every = self.chosen or tuple(range(FIRST_SEED, FIRST_SEED + self.seeds))
-        return [replace(self, chosen=(seed,)) for seed in every[:most]]
+        return [replace(self, seeds=(seed,)) for seed in self.seeds[:most]]
 
-    def with_peers_within(self, limit: float) -> Self:
-        """Return the same case with peers that get this time limit at the most."""
-        peers = (replace(entry, limit=min(entry.limit, limit)) for entry in self.peers)
-        return replace(self, peers=tuple(dict.fromkeys(peers)))
+
+def on_one_core(entry: Entry) -> Entry:
+    """The same solver, on one core."""
+    return replace(entry, solver=ONE_CORE.get(entry.solver, entry.solver))
 
 
 def _scans(make: Callable[..., Scene], *size: int) -> Callable[[int], Iterator[Instance]]:
@@ -110,7 +110,7 @@ def cases() -> list[Case]:
 def _paper_cases() -> Iterator[Case]:
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "greedy", "milp"), 1.0)
     peers = _entries(("highs", "sequential", "nrl_tracker"), 10.0)
-    yield Case("paper", "3 radars", _scans(scenes.three_radar), ours, peers)
+    yield Case("paper", "3 radars", _scans(scenes.three_radar), peers + ours)
 
 
 def _gated_cases() -> Iterator[Case]:
@@ -123,7 +123,7 @@ def _gated_cases() -> Iterator[Case]:
             *_entries(HEURISTICS, limit),
             Entry("greedy", 10.0),
         )
-        yield Case("gated", f"{sensors}x{targets}", _scans(scenes.gated, sensors, targets), ours, peers)
+        yield Case("gated", f"{sensors}x{targets}", _scans(scenes.gated, sensors, targets), peers + ours)
 
 
 def _ghost_cases() -> Iterator[Case]:
@@ -147,21 +147,21 @@ def _ghost_cases() -> Iterator[Case]:
         peers += [Entry("kap", late), *(Entry("chils", limit) for limit in sorted({min(limits[0], late), late}))]
         peers += _entries(("branch_reduce", "mmwis"), late) if targets <= 40 else ()
         brief = {20: 10, 40: 5}.get(targets, 2)
-        yield Case("ghost", str(targets), _scans(scenes.ghost, targets), ours, tuple(peers), seeds, brief=brief)
+        yield Case("ghost", str(targets), _scans(scenes.ghost, targets), (*peers, *ours), _seeds(seeds), brief)
 
 
 def _wide_gap_cases() -> Iterator[Case]:
     ours, peers = _entries(("exact",), 60.0), _entries(("cp_sat", "highs", "scip", "scip_1"), 60.0)
     for targets, seeds in WIDE_GAPS.items():
         brief = 5 if targets == 20 else 2
-        yield Case("wide gap", str(targets), _scans(scenes.ghost, targets), ours, peers, len(seeds), seeds, brief)
+        yield Case("wide gap", str(targets), _scans(scenes.ghost, targets), peers + ours, seeds, brief)
 
 
 def _wide_gate_cases() -> Iterator[Case]:
     ours = (Entry("exact", 60.0), Entry("lagrangian", 10.0, stop_gap=1e-3), Entry("greedy", 10.0))
     peers = _entries(("highs", "scip_1"), 120.0)
     for targets in (1000, 2000, 3000):
-        yield Case("wide gates", str(targets), _one(synthetic.wide_gates, targets), ours, peers, brief=1)
+        yield Case("wide gates", str(targets), _one(synthetic.wide_gates, targets), peers + ours, brief=1)
 
 
 def _synthetic_cases() -> Iterator[Case]:
@@ -172,7 +172,7 @@ def _synthetic_cases() -> Iterator[Case]:
         if n == 100:
             # a million tuples, which no other solver takes
             ours, peers = ours[:1], _entries(("sequential",), limit)
-        yield Case("known optimum", f"n={n}", _one(synthetic.axial_known_optimum, n), ours, peers, seeds)
+        yield Case("known optimum", f"n={n}", _one(synthetic.axial_known_optimum, n), peers + ours, _seeds(seeds))
     limits = {12: 5.0, 20: 10.0, 26: 10.0}
     # 60 instances of the sizes of Balas and Saltzman, heuristics on three sizes
     for n in range(4, 27, 2):
@@ -180,8 +180,8 @@ def _synthetic_cases() -> Iterator[Case]:
         if n in limits:
             ours += _entries((*HEURISTICS, "lagrangian", "greedy"), limits[n])
             peers += (Entry("cp_sat", 30.0), *_entries(("sequential", "nrl_tracker"), limits[n]))
-        yield Case("random axial", f"n={n}", _one(synthetic.axial_random, n), ours, peers)
+        yield Case("random axial", f"n={n}", _one(synthetic.axial_random, n), peers + ours)
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "milp", "greedy"), 5.0)
     peers = _entries(("highs", "cp_sat", "sequential"), 30.0)
     for sensors in (3, 4, 5, 6):
-        yield Case("planted", f"S={sensors}", _one(synthetic.planted, sensors), ours, peers)
+        yield Case("planted", f"S={sensors}", _one(synthetic.planted, sensors), peers + ours)

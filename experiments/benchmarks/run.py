@@ -15,7 +15,7 @@ from assoc.problem import AssignmentProblem
 from experiments.benchmarks.families import Case, Entry, Instance
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.wide_gaps import linear_bound
-from experiments.common.contestants import OURS, STOPPED, run, takes, warm_up
+from experiments.common.contestants import STOPPED, run, takes, warm_up
 
 PROVING = ("exact", "milp")
 # runs of fewer seconds are made so many times
@@ -40,7 +40,7 @@ def run_all(
             for one in ones:
                 rows += (more := next(found))
                 told = ", ".join(f"{row.solver} {row.cost:.7g} {row.seconds:.3g}s" for row in more if row.item == 0)
-                log(f"{one.family} {one.size} seed {one.chosen[0]}: {told}")
+                log(f"{one.family} {one.size} seed {one.seeds[0]}: {told}")
             yield rows
 
 
@@ -77,7 +77,7 @@ def _run_unit(place: int) -> list[Row]:
 
 
 def _warm_up(cases: Sequence[Case]) -> None:
-    warm_up({entry.solver for case in cases for entry in (*case.ours, *case.peers)})
+    warm_up({entry.solver for case in cases for entry in case.entries})
 
 
 def run_case(case: Case, seeds: int | None = None) -> list[Row]:
@@ -85,16 +85,16 @@ def run_case(case: Case, seeds: int | None = None) -> list[Row]:
     return [
         row
         for one in case.by_seed(seeds)
-        for item, instance in enumerate(case.make(one.chosen[0]))
-        for row in _run_instance(case, instance, one.chosen[0], item)
+        for item, instance in enumerate(case.make(one.seeds[0]))
+        for row in _run_instance(case, instance, one.seeds[0], item)
     ]
 
 
 def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[Row]:
     problem, optimum = instance.problem, instance.optimum
     blank = Row(case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, "")
-    entries = [entry for entry in (*case.peers, *case.ours) if takes(entry.solver, problem)]
-    first = [entry for entry in entries if entry.solver in PROVING or entry.solver not in OURS]
+    entries = [entry for entry in case.entries if takes(entry.solver, problem)]
+    first = [entry for entry in entries if entry.peer or entry.solver in PROVING]
     rows = [timed(partial(_run, entry, problem, blank, None)) for entry in first]
     if optimum is None:
         optimum = min((row.cost for row in rows if row.status == "optimal"), default=None)
@@ -119,7 +119,7 @@ def _run(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: float | 
     return replace(
         blank,
         solver=entry.label,
-        peer=entry.solver not in OURS,
+        peer=entry.peer,
         limit=entry.limit,
         cost=answer.cost,
         bound=-math.inf if answer.bound is None else answer.bound,

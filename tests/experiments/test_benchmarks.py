@@ -10,7 +10,7 @@ import pytest
 
 from experiments.benchmarks import goals, markdown, ranking, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
-from experiments.benchmarks.families import Case, Entry, Instance, cases
+from experiments.benchmarks.families import Case, Entry, Instance, cases, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all, run_case, timed
 from experiments.common import contestants
@@ -121,9 +121,10 @@ def test_a_limit_for_peers_and_chosen_seeds() -> None:
         yield Instance(*synthetic.planted(3, seed, targets=4))
 
     peers = (Entry("highs", 5.0), Entry("highs", 60.0), Entry("sequential", 5.0))
-    case = Case("planted", "S=3", make, (Entry("exact", 5.0),), peers, 2, (7, 9))
-    short = case.with_peers_within(4.0)
-    assert short.peers == (Entry("highs", 4.0), Entry("sequential", 4.0)) and short.ours == case.ours
+    case = Case("planted", "S=3", make, (*peers, Entry("exact", 5.0)), (7, 9))
+    short = case.changed(lambda entry: replace(entry, limit=4.0) if entry.peer else entry)
+    assert short.entries == (Entry("highs", 4.0), Entry("sequential", 4.0), Entry("exact", 5.0))
+    assert case.changed(lambda entry: None if entry.peer else entry).entries == (Entry("exact", 5.0),)
     found = run_case(short, 1)
     assert {row.seed for row in found} == {7} and {row.seed for row in run_case(short)} == {7, 9}
     assert all(row.cpu > 0 for row in found if row.solver != "sequential")
@@ -134,10 +135,11 @@ def test_several_processes_measure_the_same_on_one_core_each() -> None:
         yield Instance(*synthetic.planted(3, seed, targets=4))
 
     peers = (Entry("cp_sat", 5.0), Entry("scip", 5.0), Entry("scip_1", 5.0), Entry("sequential", 5.0))
-    case = Case("planted", "S=3", make, (Entry("exact", 5.0),), peers, 3).on_one_core()
-    assert [entry.solver for entry in case.peers] == ["cp_sat_1", "scip_1", "sequential"]
-    assert [one.chosen for one in case.by_seed(2)] == [(1000,), (1001,)]
-    other = replace(case, size="again", chosen=(7, 5))
+    case = Case("planted", "S=3", make, (*peers, Entry("exact", 5.0)), (1000, 1001, 1002))
+    case = case.changed(on_one_core)
+    assert [entry.solver for entry in case.entries] == ["cp_sat_1", "scip_1", "sequential", "exact"]
+    assert [one.seeds for one in case.by_seed(2)] == [(1000,), (1001,)]
+    other = replace(case, size="again", seeds=(7, 5))
     lines: list[str] = []
     found = list(run_all([case, other], None, 2, lines.append))
     alone = [run_case(one) for one in (case, other)]
@@ -216,7 +218,8 @@ def test_run_case_checks_and_compares() -> None:
     def make(seed: int):  # type: ignore[no-untyped-def]
         yield Instance(*synthetic.planted(3, seed, targets=6))
 
-    case = Case("planted", "S=3", make, (Entry("greedy", 5.0),), (Entry("highs", 5.0), Entry("sequential", 5.0)), 2)
+    entries = tuple(Entry(name, 5.0) for name in ("highs", "sequential", "greedy"))
+    case = Case("planted", "S=3", make, entries, range(FIRST_SEED, FIRST_SEED + 2))
     found = run_case(case)
     assert {row.seed for row in found} == {FIRST_SEED, FIRST_SEED + 1}
     assert [row.solver for row in found[:3]] == ["highs", "sequential", "greedy"]
@@ -247,7 +250,7 @@ def test_cases_cover_the_families() -> None:
     full = cases()
     assert {case.family for case in full} == set(FAMILIES) - {"kbest"}
     assert {c.size for c in full if c.family == "gated"} == {"3x100", "3x300", "3x1000", "4x300", "5x200"}
-    assert all(case.seeds >= 5 for case in full if case.size != "n=100")
+    assert all(len(case.seeds) >= 5 for case in full if case.size != "n=100")
     assert {int(case.size[2:]) for case in full if case.family == "random axial"} == set(range(4, 27, 2))
 
 
@@ -301,7 +304,7 @@ def test_the_readme_says_how_long_others_had() -> None:
 
 def test_a_brief_run_is_whole() -> None:
     assert {(case.family, case.size): case.brief for case in cases()}["ghost", "20"] == 10
-    assert all(1 <= case.brief <= case.seeds for case in cases())
+    assert all(1 <= case.brief <= len(case.seeds) for case in cases())
 
 
 def test_report_says_what_its_reader_should_know() -> None:
