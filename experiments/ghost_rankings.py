@@ -9,6 +9,7 @@ something better with the ten forbidden: it must not find any. Processor time of
 compiled, from the candidate tuples on: building them counts, too.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -108,9 +109,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
     return claims
 
 
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main_of_parts(NAME, list(KINDS), experiment, __doc__, arguments)
+program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
 
 
 if __name__ == "__main__":

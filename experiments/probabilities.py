@@ -10,6 +10,7 @@ share of each group that is one target's detections and all of them.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.stats import beta
@@ -154,9 +155,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
         return claims + reliability(_SCENES // 10 if quick else _SCENES)
 
 
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main_of_parts(NAME, list(KINDS), experiment, __doc__, arguments)
+program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
 
 
 if __name__ == "__main__":

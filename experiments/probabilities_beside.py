@@ -218,9 +218,7 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
         return [claim for name in kinds for claim in compared(name, range(2_000, 2_001 if quick else 2_005))]
 
 
-def program(arguments: list[str] | None = None) -> int:
-    """Run the comparison; returns its exit code."""
-    return main_of_parts(NAME, list(KINDS), experiment, __doc__, arguments)
+program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from experiments.benchmarks.families import Case, Entry, cases, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all
 from experiments.common import contestants
-from experiments.common.command import seconds, whole
+from experiments.common.command import above_zero, whole
 
 TABLE, PAGES = Path("docs/benchmarks.csv"), (Path("README.md"), Path("paper.md"))
 # what a brief run gives other solvers, in seconds
@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--seeds", type=whole(1), metavar="N", help="seeds of each size at the most (default: each family's own number)"
     )
-    add("--peer-limit", type=seconds, metavar="S", help="time limit of other solvers at the most, in seconds")
+    add("--peer-limit", type=above_zero, metavar="S", help="time limit of other solvers at the most, in seconds")
     text = f"everything in some 25 minutes: two seeds (ghosts up to ten), and other solvers get {_BRIEF_LIMIT:g} s"
     add("--brief", action="store_true", help=text)
     text = "seeds at a time, everybody on one core (default 1)"

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,33 +14,50 @@ from assoc._types import Array
 from experiments.common.claims import Claim, load_json, print_table, save_json
 from experiments.common.results import result_file
 
-Experiment = Callable[[bool, np.random.Generator], Any]
-"""From whether it is to be quick, to its claims; with a figure, to these and what the figure shows."""
+Experiment = Callable[..., Any]
+"""From whether it is to be quick and a random generator, or from all options if it has some of its own, to its claims;
+with a figure, to these and what the figure shows."""
 Draw = Callable[[Any, Any], None]
 Figure = tuple[Draw, tuple[float, float]]
 """What draws it, and its size in inches."""
 
 
 def main(
-    name: str, experiment: Experiment, about: str, arguments: Sequence[str] | None = None, figure: Figure | None = None
+    name: str,
+    experiment: Experiment,
+    about: str,
+    arguments: Sequence[str] | None = None,
+    *,
+    figure: Figure | None = None,
+    options: Sequence[Callable[[argparse.ArgumentParser], object]] = (),
+    said: str = "",
+    **defaults: Any,
 ) -> int:
-    """Run ``python -m experiments.NAME``: print its claims, write what is asked; `about` describes it."""
+    """Run ``python -m experiments.NAME``: print its claims, write what is asked; `about` describes it.
+
+    options: What adds options of its own.
+    said: What a result file says of these, with their names in braces.
+    defaults: Of options that all experiments have.
+    """
     parser = make_parser(name, about, figure)
-    return run(parser, parser.parse_args(arguments), experiment, about, figure)
+    for add in options:
+        add(parser)
+    parser.set_defaults(**defaults)
+    chosen = parser.parse_args(arguments)
+    call = (lambda *_: experiment(chosen)) if options else experiment
+    return run(parser, chosen, call, about + said.format(**vars(chosen)), figure)
 
 
 def main_of_parts(
     name: str,
-    parts: list[str],
-    experiment: Callable[[bool, list[str]], Any],
+    parts: Sequence[str],
+    experiment: Callable[[bool, Sequence[str]], Any],
     about: str,
     arguments: Sequence[str] | None = None,
 ) -> int:
     """As `main`, of an experiment that takes the names of its parts that are to run."""
-    parser = make_parser(name, about)
-    add_only(parser, parts)
-    chosen = parser.parse_args(arguments)
-    return run(parser, chosen, lambda quick, _: experiment(quick, chosen.only or parts), about)
+    only = partial(add_only, names=parts)
+    return main(name, lambda chosen: experiment(chosen.quick, chosen.only or parts), about, arguments, options=[only])
 
 
 def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse.ArgumentParser:
@@ -69,16 +87,22 @@ def whole(least: int) -> Callable[[str], int]:
     return number
 
 
-def seconds(text: str) -> float:
-    """Read an option that is a number of seconds above 0."""
+def above_zero(text: str) -> float:
+    """Read an option that is a number above 0, but no immense one: seconds, for example."""
     if not 0.0 < float(text) < 1e6:
-        raise argparse.ArgumentTypeError(f"expected seconds above 0, got {text}")
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text}")
     return float(text)
 
 
 def add_seeds(parser: argparse.ArgumentParser, default: int, of: str, least: int = 2) -> None:
     """Add the option that says how many scenes or runs there are."""
     parser.add_argument("--seeds", type=whole(least), default=default, metavar="N", help=f"{of} (default {default})")
+
+
+def add_recording(parser: argparse.ArgumentParser) -> None:
+    """Add the file of recorded trajectories."""
+    text = "recorded trajectories, as for the scenario from-tracks (default: simulated ones only)"
+    parser.add_argument("file", nargs="?", metavar="FILE.csv", help=text)
 
 
 def add_publish(parser: argparse.ArgumentParser, name: str) -> None:

@@ -11,6 +11,7 @@ which shows whether they are overfitted. About three minutes of one core.
 import argparse
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from assoc._types import Array
 from assoc.errors import AssocError
 from assoc.filters import tuned_data
 from assoc.filters.base import Filter
+from experiments.common.command import whole
 from experiments.filters.kinds import fuzzy_filter, imm
 from experiments.filters.manoeuvres import Batch, errors, random_flights
 
@@ -111,32 +113,24 @@ def search(name: str, objective: Callable[[Array], float], start: Array, evaluat
     return best
 
 
+def parsed(
+    name: str, about: str, arguments: list[str] | None, *, evaluations: int, flights: int, seed: int, output: Path
+) -> argparse.Namespace:
+    """Options of a program that tunes on random flights, with these defaults."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=about)
+    add = partial(parser.add_argument, metavar="N")
+    text = f"evaluations of each search (default {evaluations})"
+    add("--evaluations", type=whole(1), default=evaluations, help=text)
+    add("--flights", type=whole(1), default=flights, help=f"number of random flights (default {flights})")
+    add("--seed", type=whole(0), default=seed, help=f"seed of flights, noise and search (default {seed})")
+    parser.add_argument("--output", type=Path, default=output, metavar="FILE", help="the file to write")
+    return parser.parse_args(arguments)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Tune and write; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.filters.tune", description="Tune the fuzzy rules and the IMM on random flights."
-    )
-    parser.add_argument(
-        "--evaluations",
-        type=int,
-        default=500,
-        metavar="N",
-        help="evaluations of each of the two searches (default 500)",
-    )
-    parser.add_argument("--flights", type=int, default=120, metavar="N", help="number of random flights (default 120)")
-    parser.add_argument(
-        "--seed", type=int, default=20_000, metavar="N", help="seed of flights, noise and search (default 20000)"
-    )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=OUTPUT,
-        metavar="FILE",
-        help="the parameter file to write (default: the package's own)",
-    )
-    chosen = parser.parse_args(arguments)
-    if chosen.evaluations < 1 or chosen.flights < 1 or chosen.seed < 0:
-        parser.error("--evaluations and --flights must be at least 1, --seed at least 0")
+    about = "Tune the fuzzy rules and the IMM on random flights; by default into the package's own file."
+    chosen = parsed("filters.tune", about, arguments, evaluations=500, flights=120, seed=20_000, output=OUTPUT)
     rng = np.random.default_rng(chosen.seed)
     batch = Batch.draw(random_flights(chosen.flights, rng), 1, rng)
     others = Batch.draw(random_flights(chosen.flights, rng), 1, rng)

@@ -10,11 +10,10 @@ own, so that peak memory is its own; processor time of all threads, kernels load
 
 import math
 from collections.abc import Callable, Sequence
-
-import numpy as np
+from functools import partial
 
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run
+from experiments.common.command import main_of_parts
 from experiments.scale import one_scan, trackers
 from experiments.scale.alone import Measured, alone
 
@@ -114,17 +113,12 @@ PARTS: dict[str, Callable[[bool], list[Claim]]] = {
 }  # fmt: skip
 
 
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; its exit code."""
-    assert __doc__ is not None
-    parser = make_parser("scale", __doc__)
-    add_only(parser, list(PARTS))
-    chosen = parser.parse_args(arguments)
+def experiment(quick: bool, names: Sequence[str]) -> list[Claim]:
+    """Measure these parts."""
+    return [claim for name in names for claim in PARTS[name](quick)]
 
-    def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
-        return [claim for name in chosen.only or PARTS for claim in PARTS[name](quick)]
 
-    return run(parser, chosen, experiment, __doc__)
+program = partial(main_of_parts, "scale", list(PARTS), experiment, __doc__)
 
 
 if __name__ == "__main__":

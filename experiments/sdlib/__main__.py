@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from assoc.problem import AssignmentProblem
-from experiments.common.command import seconds
+from experiments.common.command import above_zero
 from experiments.sdlib import recorded, store
 from experiments.sdlib.command import run_command
 from experiments.sdlib.comparison import write_comparison
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make.add_argument("--recording", metavar="FILE", help="of air traffic: without it, recorded ones stay as they are")
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
-        part.add_argument("--seconds", type=seconds, default=60.0, help="limit for each instance (default 60)")
+        part.add_argument("--seconds", type=above_zero, default=60.0, help="limit for each instance (default 60)")
         part.add_argument("--family", choices=sorted({one.family for one in every}), help="only this family")
         part.add_argument("names", nargs="*", type=_name, metavar="NAME", help="only these instances")
     improve = parts.choices["solve"]

@@ -13,6 +13,7 @@ them (8), half as many for recorded traffic and late plots.
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, make_parser, run
+from experiments.common.command import add_only, add_recording, add_seeds, main
 from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
 from experiments.trackers.running import through
 
@@ -141,21 +142,14 @@ def experiment(
     return claims
 
 
-NAME = "trackers.asynchronous"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    parser.add_argument("file", nargs="?", metavar="FILE", help="recorded trajectories (.csv), as for from-tracks")
-    add_seeds(parser, SEEDS, "scenes of airliners")
-    add_only(parser, NAMES)
-    chosen = parser.parse_args(arguments)
-    return run(
-        parser, chosen,
-        lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds, chosen.only or NAMES),
-        f"{__doc__} {chosen.seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
-    )  # fmt: skip
+program = partial(
+    main, "trackers.asynchronous",
+    lambda chosen: experiment(chosen.file, chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
+    options=(
+        add_recording, partial(add_seeds, default=SEEDS, of="scenes of airliners"), partial(add_only, names=NAMES),
+    ),
+    said=" {seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
+)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ follow, --seeds of them (20).
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from assoc._types import Array
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, make_parser, run
+from experiments.common.command import add_only, add_seeds, main
 from experiments.trackers.judging import goal, make, mean_claim
 from experiments.trackers.running import through
 
@@ -79,20 +80,12 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
     return claims
 
 
-NAME = "trackers.bearings"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    add_seeds(parser, SEEDS, "scenes")
-    add_only(parser, NAMES)
-    parser.set_defaults(seed=FIRST)
-    chosen = parser.parse_args(arguments)
-    return run(
-        parser, chosen, lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds, chosen.only or NAMES),
-        f"{__doc__} {chosen.seeds} scenes.",
-    )  # fmt: skip
+program = partial(
+    main, "trackers.bearings",
+    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
+    options=(partial(add_seeds, default=SEEDS, of="scenes"), partial(add_only, names=NAMES)),
+    said=" {seeds} scenes.", seed=FIRST,
+)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -11,8 +11,10 @@ peer, too. GOSPA has a cutoff of 50 m; times are CPU times of a scan, the median
 their time is over (--budget, 30 s of CPU for a setting): then both are compared on the scans that were done.
 """
 
+import argparse
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +23,7 @@ from assoc._types import Array
 from assoc.metrics import gospa
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import Claim
-from experiments.common.command import make_parser, mean_interval, run
+from experiments.common.command import above_zero, main, mean_interval
 from experiments.trackers import labelled
 from experiments.trackers.judging import GOAL
 from experiments.trackers.plane import Plane, simulate
@@ -121,32 +123,23 @@ def _paired(ours: list[Result], peer: list[Result]) -> tuple[float, tuple[float,
     return _median(peer) / _median(mine), (float(differences.mean()), interval), scans
 
 
-def experiment(quick: bool, rng: np.random.Generator, most: float = BUDGET) -> list[Claim]:
+def experiment(chosen: argparse.Namespace) -> list[Claim]:
     """All settings."""
-    seed = int(rng.integers(2**31))
+    seed = int(np.random.default_rng(chosen.seed).integers(2**31))
     claims = []
     for targets in TARGETS:
         for clutter in CLUTTER:
-            scans, seeds, budget = (5, 2, 10.0) if quick else (SCANS, SEEDS[targets], most)
+            scans, seeds, budget = (5, 2, 10.0) if chosen.quick else (SCANS, SEEDS[targets], chosen.budget)
             claims += against_peers(targets, clutter, scans, [seed + k for k in range(seeds)], budget)
     return claims
 
 
-NAME = "trackers.benchmark"
+def _add_budget(parser: argparse.ArgumentParser) -> None:
+    text = f"CPU seconds of each peer for a setting (default {BUDGET:g})"
+    parser.add_argument("--budget", type=above_zero, default=BUDGET, metavar="S", help=text)
 
 
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment as a program; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    parser.add_argument(
-        "--budget", type=float, default=BUDGET, metavar="S",
-        help=f"CPU seconds of each peer for a setting (default {BUDGET:g})",
-    )  # fmt: skip
-    chosen = parser.parse_args(arguments)
-    if not chosen.budget > 0:
-        parser.error("--budget must be above 0")
-    about = f"{__doc__} Budget {chosen.budget:g} s."
-    return run(parser, chosen, lambda quick, rng: experiment(quick, rng, chosen.budget), about)
+program = partial(main, "trackers.benchmark", experiment, __doc__, options=[_add_budget], said=" Budget {budget:g} s.")
 
 
 if __name__ == "__main__":

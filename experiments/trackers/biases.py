@@ -10,6 +10,7 @@ truth is used but to judge.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import add_seeds, make_parser, run
+from experiments.common.command import add_recording, add_seeds, main
 from experiments.trackers.judging import distances, goal, mean_claim
 from experiments.trackers.running import through
 
@@ -138,19 +139,12 @@ def experiment(file: str | None, quick: bool, seed: int, count: int = SEEDS) -> 
     return claims
 
 
-NAME = "trackers.biases"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
-    add_seeds(parser, SEEDS, "scenes of flights")
-    chosen = parser.parse_args(arguments)
-    return run(
-        parser, chosen, lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds),
-        f"{__doc__} Cutoff of GOSPA 500 m. {chosen.seeds} scenes of flights, half as many (at least 2) recorded.",
-    )  # fmt: skip
+program = partial(
+    main, "trackers.biases",
+    lambda chosen: experiment(chosen.file, chosen.quick, chosen.seed, chosen.seeds), __doc__,
+    options=(add_recording, partial(add_seeds, default=SEEDS, of="scenes of flights")),
+    said=" Cutoff of GOSPA 500 m. {seeds} scenes of flights, half as many (at least 2) recorded.",
+)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -9,9 +9,10 @@ that follow, --seeds of them (20).
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, make_parser, run
+from experiments.common.command import add_only, add_seeds, main
 from experiments.trackers.close_scenes import SCANS, SETTINGS, simulate
 from experiments.trackers.judging import NAMES, claims_of, goal, judge, means
 
@@ -35,20 +36,12 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
     return claims
 
 
-NAME = "trackers.close_targets"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    add_seeds(parser, SEEDS, "scenes of each kind")
-    add_only(parser, NAMES)
-    parser.set_defaults(seed=FIRST)
-    chosen = parser.parse_args(arguments)
-    return run(
-        parser, chosen, lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds, chosen.only or NAMES),
-        f"{__doc__} {chosen.seeds} scenes of each kind.",
-    )  # fmt: skip
+program = partial(
+    main, "trackers.close_targets",
+    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
+    options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=NAMES)),
+    said=" {seeds} scenes of each kind.", seed=FIRST,
+)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -9,14 +9,16 @@ from-tracks, --seeds of them). Tracks count while they are reported. GOSPA and w
 OSPA(2), HOTA, all with a cutoff of 500 m, identity switches a scene, and CPU time of a scan.
 """
 
+import argparse
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from assoc import simulation
 from assoc.scene import Scene
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, make_parser, run
+from experiments.common.command import add_only, add_recording, add_seeds, main
 from experiments.trackers.judging import NAMES, claims_of, goal, judge, mean_claim, means
 
 WITHIN_ORACLE = 1.02
@@ -47,38 +49,33 @@ def compare(label: str, scenes: list[Scene], names: Sequence[str]) -> list[Claim
     return claims
 
 
-def experiment(
-    file: str | None, scans: int | None, seeds: int, names: Sequence[str], quick: bool, rng: np.random.Generator
-) -> list[Claim]:
+def experiment(chosen: argparse.Namespace) -> list[Claim]:
     """Compare on the three-radar scene, and on the file's traffic."""
-    seed = int(rng.integers(2**31))
-    count, length = (2, 15) if quick else (10, 100)
+    seed, names = int(np.random.default_rng(chosen.seed).integers(2**31)), chosen.only or NAMES
+    count, length = (2, 15) if chosen.quick else (10, 100)
     scenes = [simulation.simulate("three-radar", seed + k, scans=length) for k in range(count)]
     claims = compare("three radars", scenes, names)
-    if file is not None:
-        values = {} if scans is None else {"scans": scans}
-        runs = range(1 if quick else seeds)
-        traffic = [simulation.simulate("from-tracks", seed + k, file=file, **values) for k in runs]
-        claims += compare("recorded traffic", traffic, names)
+    if chosen.file is not None:
+        values = {"file": chosen.file} | ({} if chosen.scans is None else {"scans": chosen.scans})
+        runs = range(1 if chosen.quick else chosen.seeds)
+        claims += compare(
+            "recorded traffic", [simulation.simulate("from-tracks", seed + k, **values) for k in runs], names
+        )
     return claims
 
 
-NAME = "trackers.comparison"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
+def _add_scans(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scans", type=int, metavar="N", help="scans of the recorded trajectories (default: all)")
-    add_seeds(parser, 3, "runs on recorded trajectories", least=1)
-    add_only(parser, NAMES)
-    chosen = parser.parse_args(arguments)
-    return run(
-        parser, chosen,
-        lambda quick, rng: experiment(chosen.file, chosen.scans, chosen.seeds, chosen.only or NAMES, quick, rng),
-        f"{__doc__} {chosen.seeds} runs on recorded trajectories.",
-    )  # fmt: skip
+
+
+program = partial(
+    main, "trackers.comparison", experiment, __doc__,
+    options=(
+        add_recording, _add_scans, partial(add_seeds, default=3, of="runs on recorded trajectories", least=1),
+        partial(add_only, names=NAMES),
+    ),
+    said=" {seeds} runs on recorded trajectories.",
+)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ def test_experiment(tmp_path):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     words = ["--quick", "--json", files[0], "--figure", files[1]]
     experiment = partial(fusion.experiment, size=SMALL)
-    assert main(fusion.NAME, experiment, fusion.__doc__, words, (fusion.draw, (11, 4.6))) == 0
+    assert main(fusion.NAME, experiment, fusion.__doc__, words, figure=(fusion.draw, (11, 4.6))) == 0
     claims = {c.quantity: c for c in load_json(files[0])}
     assert len(claims) == 3 * 4 + 2 + 2 + 3 + 2
     for way in fusion.WAYS:

@@ -7,32 +7,22 @@ Without it the comparison would be between tuned filters and one whose parameter
 experiments/papers/fuzzy_ekf/published_rules.json.
 """
 
-import argparse
 import datetime
 import json
-from pathlib import Path
 
 import numpy as np
 
 from assoc._files.output import write_text
 from experiments.filters.manoeuvres import Batch, random_flights
-from experiments.filters.tune import score, search
+from experiments.filters.tune import parsed, score, search
 from experiments.papers.fuzzy_ekf.published import FIRST_GUESS, TUNED, from_vector, published_filter, vector
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Tune and write; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.papers.fuzzy_ekf.tune_published",
-        description="Tune the sets and the base noise of the paper's fuzzy filter on random flights.",
-    )
-    parser.add_argument("--evaluations", type=int, default=450, metavar="N", help="of the search (default 450)")
-    parser.add_argument("--flights", type=int, default=50, metavar="N", help="number of random flights (default 50)")
-    parser.add_argument("--seed", type=int, default=30_000, metavar="N", help="of flights and search (default 30000)")
-    parser.add_argument("--output", type=Path, default=TUNED, metavar="FILE", help="the file to write")
-    chosen = parser.parse_args(arguments)
-    if chosen.evaluations < 1 or chosen.flights < 1 or chosen.seed < 0:
-        parser.error("--evaluations and --flights must be at least 1, --seed at least 0")
+    about = "Tune the sets and the base noise of the paper's fuzzy filter on random flights."
+    name = "papers.fuzzy_ekf.tune_published"
+    chosen = parsed(name, about, arguments, evaluations=450, flights=50, seed=30_000, output=TUNED)
     rng = np.random.default_rng(chosen.seed)
     batch, others = (Batch.draw(random_flights(chosen.flights, rng), 1, rng) for _ in range(2))
     begun = float(np.exp(score(lambda: published_filter(FIRST_GUESS), batch)))
