@@ -45,7 +45,9 @@ STOPPED = (*HEURISTICS, "greedy", "annealing")
 """Those of ours that are stopped at a cost that is known to be the best: of themselves they cannot see that it is."""
 ONE_CORE = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
 """Peers that take two cores, and what they are called on one."""
-_PACKING = ("chils", "branch_reduce", "mmwis", "kap")
+_INDEPENDENT_SETS = ("chils", "branch_reduce", "mmwis")
+# of the extra `peers`: what others need comes with the package, or they look for it themselves
+_PACKAGES = {"kap": "kap", "nrl_tracker": "pytcl", **dict.fromkeys(_INDEPENDENT_SETS, "chszlablib")}
 _UNLIMITED = 1_000_000_000
 _TINY = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
 
@@ -97,7 +99,8 @@ _OTHERS: dict[str, Callable[[AssignmentProblem, float], tuple[Any, ...]]] = {
     "sequential": assign_in_turn,
     "nrl_tracker": peers.nrl_tracker,
     "stone_soup": multi_frame_peer.multi_frame,
-    **{name: getattr(packing_peers, name) for name in _PACKING},
+    "kap": packing_peers.kap,
+    **{name: partial(packing_peers.independent_set, name) for name in _INDEPENDENT_SETS},
 }
 
 
@@ -135,16 +138,17 @@ def warm_up(names: Collection[str]) -> None:
 
 def not_installed() -> list[str]:
     """Packages of peers that are not installed (extra ``peers``)."""
-    packages = {"chszlablib": "chszlablib", "kap": "kap", "pytcl": "nrl-tracker"}
-    return [package for module, package in packages.items() if importlib.util.find_spec(module) is None]
+    missing = {one for one in _PACKAGES.values() if importlib.util.find_spec(one) is None}
+    return sorted("nrl-tracker" if one == "pytcl" else one for one in missing)
 
 
 def takes(name: str, problem: AssignmentProblem = _TINY) -> bool:
     """Whether a contestant is installed and can take a problem; without one, whether it is installed."""
+    if importlib.util.find_spec(_PACKAGES.get(name, "scipy")) is None:
+        return False
     if name == "nrl_tracker":
-        return importlib.util.find_spec("pytcl") is not None and peers.dense_elements(problem) <= peers.DENSE_LIMIT
+        return peers.dense_elements(problem) <= peers.DENSE_LIMIT
     if name == "stone_soup":
         return multi_frame_peer.available(problem)
-    if name in _PACKING:
-        return packing_peers.available(name, problem)
-    return name in LISTENED or name in _OTHERS
+    # the heaviest independent set is a solution where measurements may be left alone
+    return name in LISTENED or (name in _OTHERS and (problem.dummy or name not in _PACKAGES))

@@ -11,7 +11,6 @@ tuple costs the sum of its pairs. Its tuples are priced by our costs afterwards,
 alarms.
 """
 
-import importlib.util
 import itertools
 import os
 from typing import Any
@@ -90,7 +89,8 @@ def conflict_graph(problem: AssignmentProblem) -> tuple[NDArray[np.intp], NDArra
     return vertices, np.maximum(weights, 1), graph
 
 
-def _independent_set(problem: AssignmentProblem, time_limit: float, kind: str) -> Chosen:
+def independent_set(kind: str, problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """Search the conflict graph with one of the codes; KaMIS's do not say whether they ended."""
     # their threads are counted when they are loaded, and are theirs to take
     threads = os.environ.pop("OMP_NUM_THREADS", None)
     try:
@@ -109,21 +109,6 @@ def _independent_set(problem: AssignmentProblem, time_limit: float, kind: str) -
         search = _kamis_wmis.branch_reduce if kind == "branch_reduce" else _kamis_mmwis.mmwis_solver
         _, found = search(ends.astype(np.int32), neighbours, weights.astype(np.int32), time_limit, 0)
     return with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
-
-
-def chils(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """CHILS on the conflict graph."""
-    return _independent_set(problem, time_limit, "chils")
-
-
-def branch_reduce(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """KaMIS's weighted branch and reduce; it does not say whether it ended."""
-    return _independent_set(problem, time_limit, "branch_reduce")
-
-
-def mmwis(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """KaMIS's memetic algorithm."""
-    return _independent_set(problem, time_limit, "mmwis")
 
 
 def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
@@ -148,9 +133,3 @@ def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
         if place is not None and saved[place] > 0:
             chosen.append(place)
     return with_false_alarms(problem, np.array(sorted(chosen), dtype=np.intp)), None, False
-
-
-def available(name: str, problem: AssignmentProblem) -> bool:
-    """Whether the package is installed and the problem has the form that it needs."""
-    package = "kap" if name == "kap" else "chszlablib"
-    return problem.dummy and importlib.util.find_spec(package) is not None
