@@ -53,6 +53,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
     text = "keep the rows of the CSV that this run does not measure (with --solvers: those of other solvers)"
     add("--update", action="store_true", help=text)
+    text = "keep all rows of the CSV, and run only families and sizes that have none: go on after an interruption"
+    add("--resume", action="store_true", help=text)
     add("--remark", metavar="TEXT", help="a remark on the rows, printed in the report")
     add("--report-only", action="store_true", help="run nothing; write the report again from the CSV")
     return parser
@@ -70,7 +72,7 @@ def main(argv: list[str] | None = None) -> int:
         head, remark = markdown.head_and_remark(report.read_text(encoding="utf-8") if report.exists() else "")
         _tell(table, report, head, options.remark or remark)
         return 0
-    part = options.update or options.families or options.sizes or options.solvers
+    part = options.update or options.resume or options.families or options.sizes or options.solvers
     missing = [] if part or table != TABLE else contestants.not_installed()
     if missing:
         # without them the tables would be fairer to us than they are
@@ -82,14 +84,14 @@ def main(argv: list[str] | None = None) -> int:
     words = [word for word in sys.argv[1:] if word not in ("--remark", options.remark)] if argv is None else argv
     command = shlex.join(["python", "-m", "experiments.benchmarks", *words])
     rows: list[Row] = []
-    if options.update and table.exists():
-        rows = [row for row in storage.load(table) if not _measured_anew(row, options)]
-    for found in _measure(options):
+    if (options.update or options.resume) and table.exists():
+        rows = [row for row in storage.load(table) if options.resume or not _measured_anew(row, options)]
+    for found in _measure(options, {(row.family, row.size) for row in rows} if options.resume else set()):
         rows = storage.with_common_reference(rows + found)
         rows.sort(key=lambda row: FAMILIES.index(row.family))
         # after every case, so that an interrupted run keeps what it has measured
         storage.save(table, rows)
-        minutes = None if options.update else (time.perf_counter() - start) / 60
+        minutes = None if options.update or options.resume else (time.perf_counter() - start) / 60
         _tell(table, report, markdown.head(minutes, command), options.remark)
     print(f"{len(rows)} rows in {table}, report in {report}")
     return 0
@@ -112,13 +114,13 @@ def _measured_anew(row: Row, options: argparse.Namespace) -> bool:
     return _to_run(row, options) and (not options.solvers or row.solver.split("@")[0] in options.solvers)
 
 
-def _measure(options: argparse.Namespace) -> Iterator[list[Row]]:
-    """Yield the rows of each case as it is done."""
+def _measure(options: argparse.Namespace, done: set[tuple[str, str]]) -> Iterator[list[Row]]:
+    """Yield the rows of each case as it is done; families and sizes that are done already are left out."""
 
     def log(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    chosen = [case for case in cases() if _to_run(case, options)]
+    chosen = [case for case in cases() if _to_run(case, options) and (case.family, case.size) not in done]
     if options.brief:
         chosen = [replace(case, seeds=case.seeds[: case.brief]) for case in chosen]
     limit = options.peer_limit or (_BRIEF_LIMIT if options.brief else math.inf)
@@ -131,7 +133,7 @@ def _measure(options: argparse.Namespace) -> Iterator[list[Row]]:
 
     chosen = [case.changed(change) for case in chosen]
     yield from run_all(chosen, options.seeds, options.processes, log)
-    if "kbest" in (options.families or FAMILIES):
+    if "kbest" in (options.families or FAMILIES) and ("kbest", ranking.PLANAR) not in done:
         yield ranking.run(2 if options.brief else options.seeds, log)
 
 

@@ -25,7 +25,7 @@ from assoc.problem import AssignmentProblem
 from experiments.common.command import above_zero
 from experiments.sdlib import recorded, store
 from experiments.sdlib.command import run_command
-from experiments.sdlib.comparison import write_comparison
+from experiments.sdlib.comparison import read_rows, write_comparison
 from experiments.sdlib.contest import CONTESTANTS, contest, representatives
 from experiments.sdlib.instances import Instance, instances
 from experiments.sdlib.solve import check_row, solve
@@ -54,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     who.add_argument("--solvers", type=_solvers, default=CONTESTANTS, help="names, with commas (default: all)")
     run.add_argument("--all", action="store_true", help="all instances, not two of each family")
     run.add_argument("--output", metavar="FILE", help="write the rows, with what was found when, as JSON")
+    run.add_argument("--resume", action="store_true", help="go on with the rows that --output names")
     check = parts.add_parser("check", help="check every solution and proof")
     check.add_argument("names", nargs="*", type=_name, metavar="NAME")
     chosen = parser.parse_args(arguments)
@@ -72,6 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _check(picked)
     if chosen.command is not None and not ("{instance}" in chosen.command and "{solution}" in chosen.command):
         parser.error("--command: must have {instance} and {solution} in it")
+    if chosen.resume and chosen.output is None:
+        parser.error("--resume: needs --output")
     if not (chosen.all or chosen.names or family):
         picked = representatives(picked)
     return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
@@ -138,23 +141,28 @@ def _check(picked: list[Instance]) -> int:
 
 
 def _run(picked: list[Instance], chosen: argparse.Namespace, arguments: Sequence[str]) -> int:
-    if chosen.command is not None:
-        rows = run_command(picked, chosen.command, chosen.seconds)
-    else:
-        rows = contest(picked, chosen.solvers, chosen.seconds)
-    done = []
     words = " ".join(["python -m experiments.sdlib", *arguments])
     try:
-        for row in rows:
+        rows = read_rows(chosen.output, chosen.seconds) if chosen.resume else []
+        done = {(row["instance"], row["solver"]) for row in rows}
+        if chosen.command is not None:
+            left = [one for one in picked if (one.name, "command") not in done]
+            found = run_command(left, chosen.command, chosen.seconds)
+        else:
+            found = contest(picked, chosen.solvers, chosen.seconds, done)
+        for row in found:
             print(json.dumps({key: value for key, value in row.items() if key != "trace"}), flush=True)
-            done.append(row)
+            rows.append(row)
             # every now and then: a run of everything takes long
             if chosen.output is not None:
-                write_comparison(chosen.output, done, chosen.seconds, words)
+                write_comparison(chosen.output, rows, chosen.seconds, words)
+    except ValueError as error:
+        print(error, file=sys.stderr)
     except OSError as error:
         print(f"{error.filename or chosen.command}: {error.strerror}", file=sys.stderr)
-        return 2
-    return 0
+    else:
+        return 0
+    return 2
 
 
 if __name__ == "__main__":

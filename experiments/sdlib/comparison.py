@@ -40,6 +40,19 @@ def write_comparison(path: str | Path, rows: list[Row], seconds: float, command:
     write_text(path, f'{json.dumps(head)[:-1]}, "rows": [\n{lines}\n]}}\n')
 
 
+def read_rows(path: str | Path, seconds: float) -> list[Row]:
+    """Read the rows of a run to go on with, none where there is no file yet.
+
+    Raises ValueError: In them solvers had another time.
+    """
+    if not Path(path).exists():
+        return []
+    content = json.loads(Path(path).read_text())
+    if content["seconds"] != seconds:
+        raise ValueError(f"{path}: its rows are of {content['seconds']:g} s, expected {seconds:g} s")
+    return list(content["rows"])
+
+
 def excess(row: Row, best: float, seconds: float) -> float | None:
     """How far above the best value what was found in so many seconds is, as a share of it; None: nothing was."""
     costs = [point[1] for point in row.get("trace", []) if point[0] <= seconds]

@@ -15,7 +15,7 @@ import resource
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -64,8 +64,10 @@ def representatives(every: list[Instance]) -> list[Instance]:
     return chosen
 
 
-def contest(picked: list[Instance], names: list[str], seconds: float) -> Iterator[Row]:
-    """Run contestants on instances; a row for each as it ends."""
+def contest(
+    picked: list[Instance], names: Sequence[str], seconds: float, done: Collection[tuple[str, str]] = ()
+) -> Iterator[Row]:
+    """Run contestants on instances; a row for each as it ends, but for instances and contestants that are done."""
     present = [name for name in names if takes(name)]
     for name in sorted(set(names) - set(present)):
         print(f"{name}: is not installed, and left out", file=sys.stderr)
@@ -75,7 +77,7 @@ def contest(picked: list[Instance], names: list[str], seconds: float) -> Iterato
     for one in picked:
         problem = store.load(one.name)
         exact = check.read_problem(str(store.instance_file(one.name)))
-        for name in present:
+        for name in (name for name in present if (one.name, name) not in done):
             row: Row = {"instance": one.name, "solver": name}
             if takes(name, problem):
                 found = _run(name, problem, seconds, float(known[one.name]["value"]))

@@ -278,6 +278,18 @@ def test_program_refuses_and_reports(
     assert "## gated" in (tmp_path / "b.md").read_text()
 
 
+def test_a_run_goes_on_where_it_was_interrupted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "b.csv"
+    rows.save(path, [replace(ROW, family="planted", size="S=3", seed=7)])
+    words = ["--families", "planted", "--sizes", "S=3", "S=4", "--solvers", "greedy", "--seeds", "1"]
+    assert main([*words, "--csv", str(path), "--resume"]) == 0
+    assert [(row.size, row.seed) for row in rows.load(path)] == [("S=3", 7), ("S=4", FIRST_SEED)]
+    assert main([*words, "--csv", str(path), "--update"]) == 0
+    assert [(row.size, row.seed, row.solver) for row in rows.load(path)] == [
+        ("S=3", 7, "exact"), ("S=3", FIRST_SEED, "greedy"), ("S=4", FIRST_SEED, "greedy"),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["README.md", "paper.md"])
 def test_tables_of_a_page_are_written_with_the_report(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

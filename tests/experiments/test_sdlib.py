@@ -72,6 +72,15 @@ def test_solvers_are_compared(tmp_path, capsys):
         assert by_place["axial-4-1", "chils"]["fault"] == "cannot take it"
     text = comparison_tables(tmp_path / "c.json")
     assert "| exact | 2 |" in text and "Said to be optimal, and not: none." in text
+    # what is done is not done again
+    before = (tmp_path / "c.json").read_text()
+    words[2] = "exact,lagrangian"
+    assert program.main([*words, "--resume", *names]) == 0
+    assert [json.loads(line)["solver"] for line in capsys.readouterr().out.splitlines()] == ["lagrangian"] * 2
+    after = json.loads((tmp_path / "c.json").read_text())["rows"]
+    assert after[:-2] == json.loads(before)["rows"]
+    assert program.main([*words[:3], "--seconds", "3", *words[5:], "--resume", *names]) == 2
+    assert "its rows are of 2 s, expected 3 s" in capsys.readouterr().err
 
 
 def test_what_is_counted_of_a_run():
