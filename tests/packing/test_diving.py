@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,9 +11,9 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_matrix
 
 import assoc
+from assoc._system import memory
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import plain_root
-from assoc.packing.components import component as component_file
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
@@ -26,7 +27,7 @@ from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
-from experiments.common.instances.synthetic import axial_known_optimum
+from experiments.common.instances.synthetic import axial_known_optimum, wide_gates
 from tests.solvers.pieces import columns_of, component, cover_of, open_problem
 
 # no cover is known
@@ -78,32 +79,22 @@ def test_dives_are_near_the_bound(priced):
     assert np.median(left) < 0.5 * np.median(greedy)
 
 
-def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
-    """Drawn columns keep the value 1 in all later programs."""
-    diver = plain
-    solve, masks = diver._program.solve, []
-
-    def spy(**words):
-        relaxed = solve(**words)
-        masks.append((words["columns"].copy(), words["slack"].copy(), relaxed))
-        return relaxed
-
-    monkeypatch.setattr(diver._program, "solve", spy)
-    diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(1), np.inf, np.inf)
-    assert masks
-    core = diver._core
-    for columns, slack, relaxed in masks:
-        # rows that may no longer stay uncovered have one column each, at the value 1
-        for r in np.flatnonzero(~slack):
-            (left,) = [j for j in np.flatnonzero(columns) if r in core.cols[j]]
-            if relaxed.status == 0:
-                assert relaxed.primal[left] == pytest.approx(1.0, abs=1e-6)
-    counts = [int((~slack).sum()) for _, slack, _ in masks]
-    assert counts == sorted({*counts}), "each step fixes more rows"
+def test_what_is_drawn_is_fixed(plain):
+    """Fixed columns keep the value 1 in all later programs, and those that share a row with them the value 0."""
+    at, rng = _Descent(plain._core, plain._program, plain._relaxed, np.inf), np.random.default_rng(1)
+    steps = 0
+    while at.open_columns().size:
+        before = at.open_rows
+        assert at.fix(rng.permutation(at.open_columns()), 3.0, np.inf)
+        assert at.open_rows < before, "each step fixes more rows"
+        assert at.relaxed.primal[at.fixed] == pytest.approx(1.0, abs=1e-6)
+        assert at.relaxed.primal[~np.logical_and.reduce([_left(plain._core, j) for j in at.fixed])].max() < 1e-6
+        steps += 1
+    assert steps > 2
 
 
-def test_pheromone_and_values_decide(priced, plain, monkeypatch):
-    """The first draw has the probabilities of the docstring: counted over many dives."""
+def test_pheromone_and_values_decide(priced, plain):
+    """The first draw has the probabilities of the module's docstring: counted over many draws."""
     diver = plain
     core, primal = diver._core, diver._relaxed.primal
     open_columns = np.flatnonzero((primal > 1e-6) & (primal < 1.0 - 1e-6))
@@ -112,17 +103,13 @@ def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     trail = np.random.default_rng(3).uniform(0.05, 1.0, priced.packing.num_columns)
     expected = trail[core.origin[open_columns]] * primal[open_columns] ** 2.0
     expected /= expected.sum()
-    drawn = []
-    monkeypatch.setattr(_Descent, "fix", lambda self, columns, rows, deadline: bool(drawn.append(columns)))
-    monkeypatch.setattr(_Descent, "completed", lambda self, *_: (np.zeros(0, dtype=np.int32), True))
-    rng, dives = np.random.default_rng(4), 4000
-    for _ in range(dives):
-        diver.dive(trail, 2.0, rng, np.inf, np.inf)
+    at, rng, draws = _Descent(core, diver._program, diver._relaxed, np.inf), np.random.default_rng(4), 4000
+    drawn = [at.draw(trail[core.origin], 2.0, rng) for _ in range(draws)]
     # every column once, the likely ones early
     assert all(sorted(columns.tolist()) == open_columns.tolist() for columns in drawn[:50])
     first = np.array([columns[0] for columns in drawn])
     share = np.array([(first == j).mean() for j in open_columns])
-    assert (np.abs(share - expected) <= 5.0 * np.sqrt(expected / dives) + 1e-3).all()
+    assert (np.abs(share - expected) <= 5.0 * np.sqrt(expected / draws) + 1e-3).all()
     # and the second draw is one among those left
     likely = int(open_columns[np.argmax(expected)])
     second = np.array([columns[1] for columns in drawn if columns[0] == likely])
@@ -132,19 +119,24 @@ def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     assert (np.abs(among - chance) <= 5.0 * np.sqrt(chance / second.size) + 2e-3).all()
 
 
-def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
-    """It stops as soon as nothing better can follow, with a valid cover."""
-    steps = []
+def test_dives_fix_what_has_pheromone(priced, plain):
+    """Whatever the program's values are: each open column in turn has all of it."""
+    found = []
+    for j in (opened := plain._core.origin[plain._relaxed.primal % 1.0 > 0.1]):
+        trail = np.zeros(priced.packing.num_columns)
+        trail[j] = 1.0
+        found.append(j in columns_of(plain.dive(trail, 4.0, np.random.default_rng(0), np.inf, np.inf)))
+    assert len(opened) > 5 and all(found)
+
+
+def test_a_dive_ends_at_its_cutoff(priced, plain):
+    """It stops as soon as nothing better can follow, here at once."""
+    covered = []
     for cutoff in (np.inf, priced.bound + 1e-6):
-        diver = Plain(priced, NONE, np.inf)
-        diver.share = diving._LOWEST
-        solve, count = diver._program.solve, []
-        monkeypatch.setattr(
-            diver._program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
-        )
-        diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), cutoff, np.inf)
-        steps.append(len(count))
-    assert 1 <= steps[1] < steps[0]
+        plain.share = diving._LOWEST
+        owner = plain.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), cutoff, np.inf)
+        covered.append(np.count_nonzero(owner >= 0))
+    assert covered == [priced.packing.num_rows, 0]
 
 
 def test_dives_begin_in_a_program_with_cuts(priced, plain):
@@ -190,8 +182,11 @@ def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
     assert component(ghosts(), "full").dives
     assert not component(ghosts(), "local").dives
     assert [Diver.pays(SimpleNamespace(num_rows=rows)) for rows in (30, 900, 901)] == [True, True, False]
-    monkeypatch.setattr(component_file, "memory_allows", lambda size: size < 1e3)
-    assert not component(ghosts(), "full").dives
+    large = wide_gates(280, 2)
+    assert component(large, "full").dives
+    one = component(large, "full")
+    monkeypatch.setattr(memory, "available", lambda here=True: 50e6)
+    assert not one.dives
 
 
 @pytest.mark.parametrize("over", [1, 2])
@@ -213,45 +208,57 @@ def test_a_program_that_takes_too_long_is_given_up(over):
     assert len(shares) == 2
 
 
-def test_the_colony_dives(monkeypatch):
-    """The number of divers in a cycle, of several strictnesses; also zero."""
-    called = []
-    original = Diver.dive
+class Watched(Component):
+    """A component that keeps the number and beta of each dive."""
 
-    def spy(self, trail, strictness, *rest):
-        called.append(strictness)
-        return original(self, trail, strictness, *rest)
+    def dive(self, number, rng, trail=None, beta=1.0):
+        self.dived.append((number, beta))
+        return super().dive(number, rng, trail, beta)
 
-    monkeypatch.setattr(Diver, "dive", spy)
+
+def watched():
+    one = component(ghosts(), "full")
+    found = Watched(**{field.name: getattr(one, field.name) for field in fields(one)})
+    found.dived = []
+    return found
+
+
+def test_the_colony_dives():
+    """The number of divers in a cycle; also zero."""
     for divers in (2, 0):
-        called.clear()
-        one = component(ghosts(), "full")
+        one = watched()
         colony = Colony(one, AcoParameters(divers=divers, beta=0.5, ants=3, clusters=1), lambda *_: None)
         for _ in range(2):
             colony.iterate(one, np.random.default_rng(0))
-        assert called == [2.0, 4.0, 8.0, 16.0][: 2 * divers]
+        assert one.dived == [(number, 0.5) for number in range(2 * divers)]
+
+
+def test_dives_are_of_four_strictnesses():
+    """Each twice that of the dive before."""
+
+    def covers(number, beta):
+        one = component(assoc.build_problem(simulate("bearing-only", seed=2, targets=24, scans=1), 0), "full")
+        return [columns_of(one.dive(number, np.random.default_rng(seed), None, beta)) for seed in range(8)]
+
+    strict = [covers(number, 1 / 16) for number in range(4)]
+    assert len({str(found) for found in strict}) > 1
+    assert covers(4, 1 / 16) == strict[0]
+    assert [covers(0, 2**number / 16) for number in range(1, 4)] == strict[1:]
 
 
 @pytest.mark.parametrize("searcher", [Breeding, TabuSearch])
-def test_others_dive_once_an_iteration(searcher, monkeypatch):
+def test_others_dive_once_an_iteration(searcher):
     """In addition to the covers with which a search begins."""
-    called = []
-    original = Component.dive
-
-    def spy(self, number, *rest):
-        called.append(number)
-        return original(self, number, *rest)
-
-    one = component(ghosts(), "full")
+    one = watched()
     small = {"clusters": 1, "moves": 3} if searcher is TabuSearch else {"clusters": 1, "population": 6, "offspring": 1}
     parameters = (TabuParameters if searcher is TabuSearch else GeneticParameters)(**small)
     search, rng = searcher(one, parameters), np.random.default_rng(0)
     search.iterate(one, rng)
-    monkeypatch.setattr(Component, "dive", spy)
+    one.dived.clear()
     before = search.dives
     search.iterate(one, rng)
     search.iterate(one, rng)
-    assert called == [before + 1, before + 2]
+    assert one.dived == [(before + 1, 1.0), (before + 2, 1.0)]
 
 
 def test_columns_are_fixed_in_their_order(plain):
@@ -347,26 +354,29 @@ def _milp(core, columns, fixed):
     return float(found.fun)
 
 
-def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, plain, monkeypatch):
-    diver = plain
+def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, plain):
+    """They end where nothing is below the cutoff, and do not where their time is over."""
     trail, rng = np.ones(priced.packing.num_columns), np.random.default_rng(0)
-    open_rows = []
-    for done, limit in ((True, diving._HIGHEST), (False, diving._LOWEST)):
-        monkeypatch.setattr(
-            _Descent,
-            "completed",
-            lambda self, *_, done=done: (open_rows.append(self.open_rows), (np.zeros(1, dtype=np.int32), done))[1],
-        )
-        diver.share = 0.5
+    for cutoff, deadline, limit in ((priced.bound, np.inf, diving._HIGHEST), (np.inf, -np.inf, diving._LOWEST)):
+        plain.share = 0.5
         shares = [0.5]
         for _ in range(60):
-            diver.dive(trail, 4.0, rng, np.inf, np.inf)
-            shares.append(diver.share)
-        assert (np.diff(shares) >= 0.0).all() if done else (np.diff(shares) <= 0.0).all()
+            plain.dive(trail, 4.0, rng, cutoff, deadline)
+            shares.append(plain.share)
+        assert shares == sorted(shares, reverse=limit < 0.5)
         assert shares[-1] == limit
-    # and they are the open rows
-    assert max(open_rows) > 0.8 * diver._core.num_rows
-    assert np.mean(open_rows[-20:]) < np.mean(open_rows[40:60]) - 5.0
+
+
+def test_the_more_is_left_to_branch_and_bound_the_better(priced, plain):
+    """Where the program's values hardly decide, draws are poor, and branch and bound makes good what they leave."""
+    trail, found = np.ones(priced.packing.num_columns), []
+    for share in (diving._LOWEST, diving._HIGHEST):
+        weights = []
+        for seed in range(30):
+            plain.share = share
+            weights.append(priced.weight_of(plain.dive(trail, 0.25, np.random.default_rng(seed), np.inf, np.inf)))
+        found.append(np.mean(weights) - priced.bound)
+    assert found[1] < 0.75 * found[0]
 
 
 def _left(core, j):

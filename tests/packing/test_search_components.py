@@ -10,7 +10,7 @@ import pytest
 import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components import closing, search
+from assoc.packing.components import closing
 from assoc.packing.components.component import split_component, split_components
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
@@ -37,12 +37,6 @@ class Idle:
 
 
 @pytest.fixture
-def unproven(monkeypatch):
-    """Without proofs by branch and bound: they are not tested here, and slow without a compiler."""
-    monkeypatch.setattr(search, "close", lambda component, run: None)
-
-
-@pytest.fixture
 def ghosts():
     """A component of 32 measurements that its multipliers do not close, with a greedy cover, and its least weight."""
     problem = assoc.build_problem(simulate("bearing-only", 0, targets=10, scans=1), 0)
@@ -65,13 +59,13 @@ def run_idle(**limits):
     return idle.count, run.stopped_by, float(packing.weights[outcome.columns].sum())
 
 
-def test_patience_and_iterations_end_the_search(unproven):
+def test_patience_and_iterations_end_the_search():
     assert run_idle(refinement="none", patience=7)[:2] == (7, "")
     assert run_idle(refinement="none", iterations=5)[:2] == (5, "iterations")
     assert run_idle(refinement="none", iterations=30, patience=30)[:2] == (30, "")
 
 
-def test_the_best_cover_is_refined_by_refinement_full_alone(unproven):
+def test_the_best_cover_is_refined_by_refinement_full_alone():
     """A searcher that does nothing finds nothing, unless exact sub-steps do."""
     alone = run_idle(refinement="none", patience=2)[2]
     local = run_idle(refinement="local", patience=2)[2]
@@ -200,7 +194,7 @@ def test_workers_refine_covers_of_their_own():
 
 
 @sample("solver", ["aco", "genetic", "tabu"], every=3)
-def test_the_same_seed_and_workers_give_the_same_search(solver, unproven):
+def test_the_same_seed_and_workers_give_the_same_search(solver):
     """To the last bit, whatever the timing of threads."""
     found = []
     problem = gated_problem(np.random.default_rng(3), (14, 14, 13), 0.3, "mixed")
@@ -275,7 +269,7 @@ def test_few_nodes_at_a_time_where_each_takes_long(columns, most):
 
 
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
-def test_a_seed_is_not_used_up(solver, unproven):
+def test_a_seed_is_not_used_up(solver):
     """The same SeedSequence again, or a generator whose state was set: the same search, with several workers, too."""
     problem = gated_problem(np.random.default_rng(3), (14, 14, 13), 0.3, "mixed")
 

@@ -135,25 +135,14 @@ class Diver:
         at = _Descent(self._core, self._program, self._relaxed, cutoff)
         left = self.share * self._core.num_rows
         while at.open_rows > left and at.relaxed.status == OPTIMAL:
-            columns = at.open_columns()
-            chances = trail[self._core.origin[columns]] * at.relaxed.primal[columns] ** strictness
-            if not chances.any():
-                break
-            if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
+            drawn = at.draw(trail[self._core.origin], strictness, rng)
+            if not drawn.size or not at.fix(drawn, _BATCH * (at.open_rows - left), deadline):
                 break
         found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         choose_all(self._packing.arrays.cols, self._core.origin[found], owner)
         return owner
-
-
-def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Columns in random order, drawn one after the other with these relative probabilities."""
-    likely = chances > 0.0
-    # Gumbel trick: sorting log probabilities plus Gumbel noise draws without replacement
-    keys = np.log(chances[likely]) + rng.gumbel(size=np.count_nonzero(likely))
-    return columns[likely][np.argsort(-keys, kind="stable")]
 
 
 class _Descent:
@@ -176,6 +165,15 @@ class _Descent:
         """Columns with a fractional value in the program."""
         primal = self.relaxed.primal
         return np.flatnonzero((primal > _WHOLE) & (primal < 1.0 - _WHOLE) & self._columns)
+
+    def draw(self, trail: Floats, strictness: float, rng: np.random.Generator) -> NDArray[np.int64]:
+        """The open columns in random order, drawn one after the other with their probabilities."""
+        columns = self.open_columns()
+        chances = trail[columns] * self.relaxed.primal[columns] ** strictness
+        likely = chances > 0.0
+        # Gumbel trick: sorting log probabilities plus Gumbel noise draws without replacement
+        keys = np.log(chances[likely]) + rng.gumbel(size=np.count_nonzero(likely))
+        return columns[likely][np.argsort(-keys, kind="stable")]
 
     def fix(self, drawn: NDArray[np.int64], rows: float, deadline: float) -> bool:
         """Fix the columns that fit, in this order, until they cover ``rows`` rows, but at least one column.
