@@ -2,7 +2,6 @@
 
 import importlib.util
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -17,7 +16,7 @@ from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import timed
 from experiments.common.checking import check_answer
 from experiments.common.instances import FIRST_SEED, scenes, synthetic
-from experiments.common.measuring import fresh, one_core
+from experiments.common.measuring import clocked, fresh, one_core
 
 PLANAR, PLANAR_K = "2-D n=100 k=100", 100
 SPATIAL, SPATIAL_K = "3x20 k=20", 20
@@ -60,9 +59,7 @@ def _ranked(solver: str, rank: Rank, size: str, problem: AssignmentProblem, k: i
     def run_once() -> Row:
         given = fresh(problem)
         with one_core():
-            start, before = time.perf_counter(), time.process_time()
-            found = rank(given, k)
-            seconds, cpu = time.perf_counter() - start, time.process_time() - before
+            found, seconds, cpu = clocked(lambda: rank(given, k))
         costs[:] = found(problem)
         best, peer = costs[0], solver == PEER
         return Row(

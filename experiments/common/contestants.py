@@ -22,7 +22,6 @@ the model, but not importing the package, nor compiling. The cost of its answer 
 import contextlib
 import importlib.util
 import math
-import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
@@ -36,7 +35,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common import annealing, multi_frame_peer, packing_peers, peers
 from experiments.common.checking import check_answer
-from experiments.common.measuring import fresh, one_core
+from experiments.common.measuring import clocked, fresh, one_core
 from experiments.common.sequential import assign_in_turn
 
 HEURISTICS = ("aco", "genetic", "tabu")
@@ -113,9 +112,7 @@ def run(name: str, problem: AssignmentProblem, limit: float, told: Told | None =
         annealing.make_known()
     solve = partial(LISTENED[name], told=told) if name in LISTENED else _OTHERS[name]
     with one_core() if name in OURS else contextlib.nullcontext():
-        start, before = time.perf_counter(), time.process_time()
-        indices, bound, proven, *said = solve(problem, limit)
-        seconds, cpu = time.perf_counter() - start, time.process_time() - before
+        (indices, bound, proven, *said), seconds, cpu = clocked(lambda: solve(problem, limit))
     if indices is None:
         return Answer(math.inf, bound, seconds, problem.tuples[:0], cpu=cpu)
     tuples = problem.tuples[indices]

@@ -11,6 +11,7 @@ from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
 from assoc.simulation import simulate
 from experiments.common.instances.scenes import single_scan
+from experiments.common.measuring import timed
 from experiments.scale.alone import Measured, seconds
 
 SOLVERS: dict[str, dict[str, Any]] = {"exact": {}, "lagrangian": {"gap": 1e-3}, "greedy": {}}
@@ -66,6 +67,4 @@ def solved(jobs: int, count: int) -> Measured:
     """Seconds by the wall and scans a second of 300 targets each, solved by so many processes."""
     scene = simulate("crowd", 1, targets=300, scans=count, constant_density=True)
     assoc.associate(simulate("crowd", 0, targets=300, scans=2, constant_density=True), jobs=jobs)
-    begin = time.perf_counter()
-    assoc.associate(scene, jobs=jobs)
-    return {"wall": time.perf_counter() - begin}
+    return {"wall": timed(lambda: assoc.associate(scene, jobs=jobs), time.perf_counter)[1]}

@@ -9,7 +9,6 @@ machine hold what others do.
 """
 
 import gc
-import time
 from functools import partial
 
 import numpy as np
@@ -21,6 +20,7 @@ from assoc.tracking import LiveTracker, MultiSensorTracker
 from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
 from experiments.common.claims import Claim
 from experiments.common.command import main
+from experiments.common.measuring import clocked
 from experiments.trackers.judging import GOAL
 
 TURNS, INTERVAL, AIRCRAFT, DURATION, SETTLED = (4.0, 5.0, 5.5), 0.5, 500, 60.0, 10.0
@@ -42,11 +42,9 @@ def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
     gc.freeze()  # as the program does
     found, tracks = [], 0
     for plot in replayed(scene, 0.0):
-        cpu, wall = time.process_time(), time.perf_counter()
-        pictures = tracker.take(*plot)
+        pictures, wall, cpu = clocked(partial(tracker.take, *plot))
         if pictures:
-            seconds = np.array([time.process_time() - cpu, time.perf_counter() - wall]) / len(pictures)
-            found += [seconds] * len(pictures)
+            found += [np.array([cpu, wall]) / len(pictures)] * len(pictures)
             tracks = len(pictures[-1].tracks)
     return np.array(found), tracks
 
