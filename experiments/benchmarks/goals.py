@@ -88,6 +88,11 @@ class Results:
         ]
         return min(costs, default=math.inf)
 
+    def best_peers(self, family: str, size: str, within: float) -> list[Row]:
+        """Return, for each instance, the row of a peer with the least cost, of those given so many seconds or less."""
+        rows = [row for row in self.of(family, size) if row.peer and row.limit <= within]
+        return list({(row.seed, row.item): row for row in sorted(rows, key=lambda row: -row.cost)}.values())
+
     def _same_instance(self, row: Row) -> list[Row]:
         return [o for o in self.of(row.family, row.size) if (o.seed, o.item) == (row.seed, row.item)]
 

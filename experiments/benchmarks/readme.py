@@ -85,13 +85,8 @@ def _ghosts(results: Results) -> str:
         rows = results.of("ghost", size)
         if not rows:
             continue
-        found = {}
-        for row in rows:
-            if row.peer and row.limit <= LONG:
-                instance = row.seed, row.item
-                if instance not in found or row.cost < found[instance].cost:
-                    found[instance] = row
-        runs = [*([row for row in rows if row.solver == name] for name in HEURISTICS), list(found.values())]
+        runs = [results.of("ghost", size, name) for name in HEURISTICS]
+        runs.append(results.best_peers("ghost", size, LONG))
         known = "proven" if all(row.proven for row in rows) else "best known"
         lines.append([f"{size} targets", *map(_worst, runs), known])
     return table(head, lines, lambda column: 0 < column < len(head) - 1, tight=True)

@@ -107,10 +107,9 @@ def _peer(results: Results, scene: _Scene) -> str:
     if fastest is not None:
         return as_time(fastest[0])
     rows = [row for row in results.of(scene.family, scene.size) if row.peer and row.limit <= LONG]
-    instances = {(row.seed, row.item) for row in rows}
     proved = {(row.seed, row.item) for row in rows if row.status == "optimal"}
-    best = [min(row.excess for row in rows if (row.seed, row.item) == one) for one in instances]
-    how = "proved by none" if not proved else f"proved in {len(proved)} of {len(instances)}"
+    best = [row.excess for row in results.best_peers(scene.family, scene.size, LONG)]
+    how = "proved by none" if not proved else f"proved in {len(proved)} of {len(best)}"
     limit = max(row.limit for row in rows)
     return f"{limit:g} s: {as_percent(median(best))} %, at worst {as_percent(max(best))} %, {how}"
 
