@@ -80,7 +80,7 @@ def _judge(solution: Path, problem: check.Problem) -> tuple[str | None, str | No
     """The cost of what a command left behind, or what is wrong with it."""
     try:
         chosen, _ = check.read_solution(check.read_text(str(solution)))
-        return store.decimal(check.cost_of(problem, chosen)), None
+        return store.exact_cost(problem, chosen), None
     except FileNotFoundError:
         return None, "no solution was written"
     except (OSError, ValueError, check.RefusedError) as error:

@@ -218,7 +218,7 @@ def judged(found: Row, problem: check.Problem, seconds: float) -> Row:
     row["trace"] = _thinned([point for point in found["trace"] if point[0] <= 1.05 * seconds])
     if tuples:
         try:
-            row["cost"] = store.decimal(check.cost_of(problem, [tuple(one) for one in tuples]))
+            row["cost"] = store.exact_cost(problem, tuples)
         except check.RefusedError as error:
             row |= {"fault": f"no solution: {error}", "proved": False, "trace": []}
     return row

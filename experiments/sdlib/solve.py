@@ -40,7 +40,7 @@ def solve(one: Instance, known: dict[str, Any] | None, solver: str, seconds: flo
         "seconds": round(taken, 2),
         **(known or {}),
     }
-    cost = exact_cost(problem, solution)
+    cost = store.exact_cost(check.read_problem(str(store.instance_file(one.name))), solution.tuples.tolist())
     better = row["value"] is None or float(cost) < float(row["value"])
     if better:
         row.update(value=cost, who=f"assoc {solver}", when=today, seconds=round(taken, 2))
@@ -53,16 +53,6 @@ def solve(one: Instance, known: dict[str, Any] | None, solver: str, seconds: flo
         if bound >= float(cost):
             row.update(status="optimal", bound=bound, seconds=round(taken, 2))
     return row
-
-
-def exact_cost(problem: AssignmentProblem, solution: Solution) -> str:
-    """Return the cost of a solution as `assoc.check` adds it up."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "problem.txt"
-        problem.save(path)
-        return store.decimal(
-            check.cost_of(check.read_problem(str(path)), [tuple(one) for one in solution.tuples.tolist()])
-        )
 
 
 def _prove(name: str, problem: AssignmentProblem, solution: Solution, seconds: float) -> float:
@@ -81,7 +71,7 @@ def check_row(name: str, row: dict[str, Any]) -> str | None:
             return "is not the instance that the table is about"
         problem = check.read_problem(str(store.instance_file(name)))
         chosen, _ = check.read_solution(store.solution_file(name).read_text())
-        cost = store.decimal(check.cost_of(problem, chosen))
+        cost = store.exact_cost(problem, chosen)
         if cost != row["value"]:
             return f"costs {cost}, the table says {row['value']}"
         if row["status"] != "optimal":

@@ -3,11 +3,12 @@
 import hashlib
 import json
 import lzma
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from assoc import check
 from assoc._files.output import write_atomically, write_json
-from assoc.check import DECIMALS
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
@@ -47,10 +48,14 @@ def solution_text(solution: Solution, cost: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def decimal(cost: int) -> str:
-    """Write a cost of `assoc.check`, whole multiples of 1e-60, as a decimal."""
-    whole, rest = divmod(abs(cost), 10**DECIMALS)
-    return ("-" if cost < 0 else "") + f"{whole}.{rest:0{DECIMALS}}".rstrip("0").rstrip(".")
+def exact_cost(problem: check.Problem, tuples: Iterable[Iterable[int]]) -> str:
+    """Return what tuples cost, as a decimal.
+
+    Raises check.RefusedError: They are no solution.
+    """
+    cost = check.cost_of(problem, [tuple(one) for one in tuples])
+    whole, rest = divmod(abs(cost), 10**check.DECIMALS)
+    return ("-" if cost < 0 else "") + f"{whole}.{rest:0{check.DECIMALS}}".rstrip("0").rstrip(".")
 
 
 def pack(path: Path, text: str) -> None:
