@@ -24,7 +24,7 @@ import assoc
 from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval
 from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.command import add_publish, publish
+from experiments.common.command import above_zero, add_publish, publish, whole
 from experiments.common.results import RESULTS, result_file
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS, problem
@@ -113,26 +113,19 @@ def _subject(claim: Claim) -> str:
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
-    parser.add_argument("--problems", nargs="+", default=["ghosts 40"], metavar="NAME", help=", ".join(PROBLEMS))
-    parser.add_argument("--seconds", type=float, default=2.0, metavar="S", help="of each run (default 2)")
-    parser.add_argument("--count", type=int, default=10, metavar="N", help="problems of each name (default 10)")
-    parser.add_argument("--solvers", nargs="+", default=list(parts.SOLVERS), metavar="NAME", help="only these")
+    add = parser.add_argument
+    text = ", ".join(PROBLEMS)
+    add("--problems", nargs="+", choices=PROBLEMS, default=["ghosts 40"], metavar="NAME", help=text)
+    add("--seconds", type=above_zero, default=2.0, metavar="S", help="of each run (default 2)")
+    add("--count", type=whole(2), default=10, metavar="N", help="problems of each name (default 10)")
+    add("--solvers", nargs="+", choices=parts.SOLVERS, default=[*parts.SOLVERS], metavar="NAME", help="only these")
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--parts", nargs="+", metavar="WORDS", help="only these, as the table names them")
+    words = [part.words for part in parts.PARTS if part.words not in _BASES]
+    what.add_argument("--parts", nargs="+", choices=words, metavar="WORDS", help="only these, as the table names them")
     what.add_argument("--workers", action="store_true", help="no parts: one worker against two, on two cores")
-    parser.add_argument("--json", metavar="FILE", help="write the results here")
+    add("--json", metavar="FILE", help="write the results here")
     add_publish(parser, NAME)
     chosen = parser.parse_args(arguments)
-    for label, given, known in (
-        ("--problems", chosen.problems, PROBLEMS),
-        ("--solvers", chosen.solvers, parts.SOLVERS),
-        ("--parts", chosen.parts or (), [part.words for part in parts.PARTS if part.words not in _BASES]),
-    ):
-        for one in given:
-            if one not in known:
-                parser.error(f"{label}: unknown {one!r}; known: {', '.join(known)}")
-    if chosen.count < 2 or not 0.0 < chosen.seconds < 1e5:
-        parser.error("expected --count of at least 2 and --seconds above 0")
     taken = (parts.PARTS[0], parts.TWO_WORKERS) if chosen.workers else parts.PARTS
     if chosen.parts:
         named = [part for part in taken if part.words in chosen.parts]

@@ -14,7 +14,6 @@ resampling problems. The best setting is chosen on every second problem, and jud
 The gallery draws the published figures: mean excess over alpha and beta, and over rho and ants, the other two averaged.
 """
 
-import argparse
 import itertools
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -31,7 +30,7 @@ from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.sources import StudySource
 from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.command import add_publish, publish
+from experiments.common.command import make_parser, publish
 from experiments.common.results import result_file
 from experiments.metaheuristics.problems import problem
 from experiments.metaheuristics.running import UNLIMITED, log
@@ -176,17 +175,12 @@ def pictures(claims: list[Claim], every: Sequence[Case] = CASES) -> dict[str, tu
 
 def program(arguments: Sequence[str] | None = None, *, cases: Sequence[Case] = CASES, grid: Grid = GRID) -> int:
     """Run the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
+    parser = make_parser(NAME, __doc__)
     names = [case.name for case in cases]
-    parser.add_argument("--quick", action="store_true", help="two problems a case, for a first look")
-    parser.add_argument("--cases", nargs="+", default=names, metavar="NAME", help="; ".join(names))
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the ants (default 0)")
-    parser.add_argument("--json", metavar="FILE", help="write the results here")
-    add_publish(parser, NAME)
+    parser.add_argument(
+        "--cases", nargs="+", choices=names, default=names, metavar="NAME", help=f"only these: {'; '.join(names)}"
+    )
     chosen = parser.parse_args(arguments)
-    for one in chosen.cases:
-        if one not in names:
-            parser.error(f"--cases: unknown {one!r}; known: {'; '.join(names)}")
     if chosen.publish and chosen.quick:
         parser.error("--publish needs the full run, got --quick")
     claims: list[Claim] = []

@@ -103,7 +103,7 @@ def test_ablation_of_some_parts_measures_their_solvers_alone(capsys, tmp_path):
     found = [claim["quantity"] for claim in json.loads(file.read_text())["claims"]]
     assert found == [f"ghosts 10, 0.2 s: genetic, alone, no crossover, above {parts.ALONE}"]
     for wrong, reason in (
-        (["--parts", "no legs"], "unknown"),
+        (["--parts", "no legs"], "invalid choice"),
         (["--parts", "no moves", "--solvers", "aco"], "none of"),
     ):
         with pytest.raises(SystemExit, match="2"):
@@ -210,10 +210,10 @@ def test_claims_of_a_case():
 @pytest.mark.parametrize(
     ("program", "words", "said"),
     [
-        (ablation.program, ["--problems", "nothing"], "unknown 'nothing'"),
-        (ablation.program, ["--solvers", "exact"], "unknown 'exact'"),
+        (ablation.program, ["--problems", "nothing"], "invalid choice: 'nothing'"),
+        (ablation.program, ["--solvers", "exact"], "invalid choice: 'exact'"),
         (ablation.program, ["--count", "1"], "at least 2"),
-        (sweep.program, ["--cases", "nothing"], "unknown 'nothing'"),
+        (sweep.program, ["--cases", "nothing"], "invalid choice: 'nothing'"),
         (sweep.program, ["--quick", "--publish"], "needs the full run"),
     ],
 )
