@@ -39,7 +39,7 @@ COMPLETE = all(
         _CACHING.IndexDataCacheFile: "_load_index load",
         _IN_TREE: "from_function get_source_stamp get_disambiguator get_suitable_cache_subpath",
         registry.CPUDispatcher: "_compile_for_args _insert enable_caching get_call_template typeof_pyval",
-        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper",
+        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper _nrt",
         _CODEGEN.JITCPUCodegen: "magic_tuple",
         _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
         " enable_object_caching",
@@ -56,7 +56,9 @@ SHIPPED = PACKAGE / "_kernels"
 _FOLDER = "ASSOC_CACHE_DIR"
 # kernels are not called from C, nor inner ones from Python: the code for such calls is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-_INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
+_INNER = {"no_cpython_wrapper": True}
+# what makes no arrays need not count references to them either: in small kernels that takes longer than the rest
+_LEAN = {"_nrt": False}
 
 
 class NotCompiled(Exception):  # noqa: N818  (not an error)
@@ -64,15 +66,20 @@ class NotCompiled(Exception):  # noqa: N818  (not an error)
 
 
 def make(
-    function: Callable[..., Any], may_wait: Callable[[], bool], *, inner: bool = False, literal: bool = False
+    function: Callable[..., Any],
+    may_wait: Callable[[], bool],
+    *,
+    inner: bool = False,
+    literal: bool = False,
+    lean: bool = False,
 ) -> Any:
     """Make a kernel, with a cache where there is a folder for one.
 
     ``may_wait`` returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
     ``inner``: only kernels call it. ``literal``: calls from kernels compile it anew for each literal number and each
-    width of whole numbers.
+    width of whole numbers. ``lean``: it makes and returns no arrays, and counts no references to those it is given.
     """
-    chosen = _INNER_OPTIONS if inner else _OPTIONS
+    chosen = _OPTIONS | (_INNER if inner else {}) | (_LEAN if lean else {})
     pipeline = _InnerCompiler if inner else _COMPILER.Compiler
     kernel: Any = numba.njit(**chosen, pipeline_class=pipeline)(function)
     if not literal:
@@ -167,7 +174,7 @@ class _Place:
     def __init__(self, chosen: Mapping[str, object]) -> None:
         self._options = chosen
         # the same function may be compiled as both
-        self._kind = "inner" if chosen is _INNER_OPTIONS else "kernel"
+        self._kind = "inner" if _INNER.items() <= chosen.items() else "kernel"
 
     def from_function(self, function: Any, file: str) -> Any:
         usual = [] if _FOLDER in os.environ else _CACHING.CacheImpl._locator_classes

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -178,3 +179,20 @@ def test_inner_kernels_are_called_by_kernels_alone():
                 calls += [f"{name}, line {call.lineno}" for call in ast.walk(node) if isinstance(call, ast.Call)
                           and isinstance(call.func, ast.Name) and call.func.id in known]  # fmt: skip
     assert calls == []
+
+
+def test_lean_kernels_make_and_return_no_arrays():
+    # they count no references: an array that is returned would never be freed, or too early
+    kernels = [
+        node
+        for path in Path(assoc.__file__).parent.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if is_kernel(node)
+    ]
+    plain = {"None", "bool", "int", "float", "tuple", "Three"}
+    other = {node.name for node in kernels if not set(re.findall(r"\w+", ast.unparse(node.returns))) <= plain}
+    lean = [node for node in kernels if is_kernel(node, "lean_inner_njit") or is_kernel(node, "literal_njit")]
+    assert len(other) > 50 and len(lean) > 20
+    calls = [ast.unparse(one.func) for node in lean for one in ast.walk(node) if isinstance(one, ast.Call)]
+    assert not other & {*calls, *(node.name for node in lean)}
+    assert not [call for call in calls if call.startswith("np.")]
