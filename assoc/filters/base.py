@@ -120,6 +120,18 @@ class Fit(NamedTuple):
     """Squared Mahalanobis distance from the expected measurement."""
 
 
+class Parts(NamedTuple):
+    """States of B targets as mixtures of m Gaussians, and models of S sensors, as kernels take them."""
+
+    means: Array
+    """(B, m, n)."""
+    covariances: Array
+    """(B, m, n, n)."""
+    weights: Array
+    """(B, m)."""
+    observations: list[Observation]
+
+
 class History(NamedTuple, Generic[S]):
     """Result of `Filter.run`: the corrected states of K steps."""
 
@@ -285,6 +297,13 @@ class Filter(ABC, Generic[S]):
         that cannot say return themselves and the states.
         """
         return self, state
+
+    def in_parts(self, state: S, sensors: Sequence[Measurement]) -> Parts | None:
+        """States and models for kernels that correct as `update` does.
+
+        None where this filter, or one of these sensors, corrects in a way of its own.
+        """
+        return None
 
     def log_likelihood(self, state: S, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood of each of M measurements (M, d) under each of B targets, (B, M)."""

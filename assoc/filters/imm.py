@@ -19,7 +19,18 @@ from assoc._parameters import positive
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, Fit, Update, check_dimension, complain, measured_array, update_later
+from assoc.filters.base import (
+    Expected,
+    Filter,
+    Fit,
+    Parts,
+    Update,
+    as_in,
+    check_dimension,
+    complain,
+    measured_array,
+    update_later,
+)
 from assoc.filters.batches import Batch
 from assoc.filters.kernels.gates import distances, matched
 from assoc.filters.kernels.gaussian import GOOD
@@ -284,6 +295,14 @@ class InteractingMultipleModel(Filter[Mixture]):
         if status != GOOD:
             complain(status)
         return Fit(_joint(fits, state.weights[rows])[1], nis)
+
+    def in_parts(self, state: Mixture, sensors: Sequence[Measurement]) -> Parts | None:
+        """States and models for kernels; see `Filter.in_parts`."""
+        flat = self.filters[0].in_parts(_flat(state), sensors) if self._alike else None
+        if flat is None or not as_in(self, InteractingMultipleModel, "update", "expected", "fit"):
+            return None
+        means, covariances = flat.means.reshape(state.means.shape), flat.covariances.reshape(state.covariances.shape)
+        return Parts(means, covariances, np.require(state.weights, requirements=("C", "W")), flat.observations)
 
     def positions_alone(self, state: Mixture) -> tuple[Filter[Any], Any]:
         """A filter of positions alone, and the positions of these states; see `Filter.positions_alone`."""

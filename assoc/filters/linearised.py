@@ -14,6 +14,7 @@ from assoc.filters.base import (
     Filter,
     Fit,
     History,
+    Parts,
     Update,
     as_in,
     check_dimension,
@@ -193,10 +194,22 @@ class GaussianFilter(Filter[Gaussian]):
         P = np.ascontiguousarray(state.covariance[:, axes][:, :, axes])
         return self._still, gaussian(np.ascontiguousarray(state.mean[:, axes]), P)
 
+    def _linearises(self, o: Observation) -> bool:
+        """Whether states are corrected by such measurements as kernels do, without anything of one's own."""
+        return o.code >= 0 and self.kind == PLAIN and self._as_here
+
+    def in_parts(self, state: Gaussian, sensors: Sequence[Measurement]) -> Parts | None:
+        """States and models for kernels; see `Filter.in_parts`."""
+        seen = [self.observe(sensor) for sensor in sensors]
+        if not all(self._linearises(o) for o in seen):
+            return None
+        mean, P = (np.require(one, requirements=("C", "W")) for one in (state.mean, state.covariance))
+        return Parts(mean[:, None], P[:, None], np.ones((len(state), 1)), seen)
+
     def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
         """How well measurements fit, without correcting anything; see `Filter.fit`."""
         o = self.observe(sensor)
-        if o.code < 0 or self.kind != PLAIN or not self._as_here:
+        if not self._linearises(o):
             return None
         found = _empty((2, len(rows)))
         status = fits(state.mean, state.covariance, rows, measured, o.packed, found)

@@ -38,13 +38,20 @@ def counted(monkeypatch):
     return count
 
 
-@pytest.mark.parametrize(("name", "share"), [("mht", 0.8), ("multi-sensor", 0.5), ("nearest-neighbour", 0.3)])
+@pytest.mark.parametrize(("name", "share"), [("mht", 0.8), ("nearest-neighbour", 0.3)])
 def test_states_are_corrected_for_what_is_kept(name, share, crowd, counted):
     tracker = TRACKERS[name].for_scene(crowd)
     for k in range(2):
         tracker.step(crowd.times[k], crowd.measurements[k])
     assert counted["pairs"] > 500
     assert counted["corrected"] < share * counted["pairs"], counted
+
+
+def test_the_multi_sensor_tracker_corrects_states_for_the_chosen_tuples_alone(crowd, counted):
+    tracker = TRACKERS["multi-sensor"].for_scene(crowd)
+    for k in range(2):
+        tracker.step(crowd.times[k], crowd.measurements[k])
+    assert 100 < counted["corrected"] <= sum(len(z) for z in crowd.measurements[1])
 
 
 @pytest.mark.parametrize("seed", range(8))

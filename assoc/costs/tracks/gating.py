@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
@@ -214,7 +214,7 @@ def _reach(covariance: Array, gate: float) -> Array:
     return reach
 
 
-@inner_njit
+@lean_inner_njit
 def _inside(h: Array, t: int, z: Array, m: int, reach: Array, turning: Array) -> bool:
     """Whether no residual of measurement m from row t is larger than its reach."""
     # by numbers of rows: numba counts references for each view of a row, which takes longer than the comparisons
@@ -237,47 +237,16 @@ def _near_both(
     rows = np.empty(64 + 2 * track.size, np.int64)
     found = np.empty(rows.size, np.int64)
     count = 0
-    axis = _axis(reach, z, turning, -1) if track.size and len(z) else -1
-    order = near
-    if axis >= 0:
-        # those near a track in their order along the axis: the gate of a tuple is far narrower than the track's
-        order = near.copy()
-        for t in range(len(first) - 1):
-            part = near[first[t] : first[t + 1]]
-            order[first[t] : first[t + 1]] = part[np.argsort(z[part, axis], kind="mergesort")]
-    # side by side as they are looked at
-    sorted_z = z[order]
     for row in range(track.size):
-        low, high = first[track[row]], first[track[row] + 1]
-        end = math.inf
-        if axis >= 0:
-            end = h[row, axis] + reach[row, axis]
-            low = _not_below(sorted_z, axis, h[row, axis] - reach[row, axis], low, high)
-        begin = count
-        for k in range(low, high):
-            if axis >= 0 and sorted_z[k, axis] > end:
-                break
-            if _inside(h, row, sorted_z, k, reach, turning):
+        for k in range(first[track[row]], first[track[row] + 1]):
+            if _inside(h, row, z, near[k], reach, turning):
                 if count == rows.size:
                     rows, found = _doubled(rows), _doubled(found)
-                rows[count], found[count] = row, order[k]
+                rows[count], found[count] = row, near[k]
                 count += 1
                 if count > most:
                     return rows[:count].copy(), found[:count].copy()
-        _sort(found, begin, count)
     return rows[:count].copy(), found[:count].copy()
-
-
-@inner_njit
-def _not_below(z: Array, axis: int, value: float, low: int, high: int) -> int:
-    """The first of the rows from low to high, sorted along the axis, that is not below the value."""
-    while low < high:
-        middle = (low + high) // 2
-        if z[middle, axis] < value:
-            low = middle + 1
-        else:
-            high = middle
-    return low
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:

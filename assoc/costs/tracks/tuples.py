@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.tracks import depth_first
 from assoc.costs.tracks.gating import Near, angular_components, near_both, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.errors import LimitExceededError
-from assoc.filters.base import Expected, Filter
+from assoc.filters.base import Expected, Filter, Parts, complain
 from assoc.filters.batches import concatenate, placed
+from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.measurement import Measurement
 
 # asking for the memory left would take longer than correcting so few tracks
@@ -131,7 +133,6 @@ def grow_track_tuples(
     track. A tuple that costs `margin` more than its track all missed is left out: false alarms cost 0, so that no best
     association contains it, though it may be the true one. LimitExceededError for more than `max_tuples`.
     """
-    count = len(states)
     if not any(getattr(sensor, "measures_velocity", True) for sensor in sensors):
         filter, states = filter.positions_alone(states)
     growth = _Growth(
@@ -139,28 +140,10 @@ def grow_track_tuples(
         [gate_of(sensor, gate_probability) for sensor in sensors], [angular_components(sensor) for sensor in sensors],
         margin,
     )  # fmt: skip
-    near = []
-    for z, sensor, angles, gate in zip(measurements, sensors, growth.angles, growth.gates, strict=True):
-        parent, found = near_pairs(filter.expected(states, sensor), z, angles, gate)
-        near.append(Near(np.searchsorted(parent, np.arange(count + 1)), found))
-    work = np.sum([one.first for one in near], axis=0)
-    blocks: list[TrackTuples] = []
-    low = made = 0
-    while low < count or not blocks:
-        high = min(max(low + 1, int(np.searchsorted(work, work[low] + _BLOCK, side="right")) - 1), count)
-        here = [Near(one.first[low : high + 1] - one.first[low], one.found[one.first[low] : one.first[high]])
-                for one in near]  # fmt: skip
-        block = _grown(growth, states[low:high], misses[low:high], here, max_tuples - made)
-        made += len(block.track)
-        if made > max_tuples:
-            # ordered by track: extrapolated to those left
-            raise LimitExceededError(
-                f"about {made * work[-1] / work[high]:.3g} candidate tuples of tracks and measurements, "
-                f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
-            )
-        blocks.append(block._replace(track=low + block.track))
-        low = high
-    return TrackTuples(*(np.concatenate(arrays) for arrays in zip(*blocks, strict=True)))
+    parts = filter.in_parts(states, sensors)
+    if parts is None:
+        return _in_blocks(growth, states, misses, max_tuples)
+    return _depth_first(growth, parts, states, misses, max_tuples)
 
 
 def corrected(
@@ -186,6 +169,75 @@ class _Growth(NamedTuple):
     gates: list[float]
     angles: list[tuple[bool, ...]]
     margin: float
+
+
+def _near(growth: _Growth, states: Any, s: int, z: Array) -> Near:
+    """The measurements z of sensor s near each track."""
+    expected = growth.filter.expected(states, growth.sensors[s])
+    track, found = near_pairs(expected, z, growth.angles[s], growth.gates[s])
+    return Near(np.searchsorted(track, np.arange(len(states) + 1)), found)
+
+
+def _too_many(about: float, max_tuples: int) -> NoReturn:
+    raise LimitExceededError(
+        f"about {about:.3g} candidate tuples of tracks and measurements, "
+        f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
+    )
+
+
+def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_tuples: int) -> TrackTuples:
+    """The tuples of all tracks by the kernel, for filters that it knows."""
+    widest = max(sensor.dim for sensor in growth.sensors)
+    near, places, axes = [], [], []
+    for s, (z, sensor) in enumerate(zip(growth.measurements, growth.sensors, strict=True)):
+        # along the component that tells most of them apart
+        spread = np.ptp(z, axis=0) / np.sqrt(np.diag(sensor.covariance)) if len(z) else np.zeros(sensor.dim)
+        spread[list(growth.angles[s])] = 0.0
+        axes.append(int(spread.argmax()) if spread.max() > 0.0 else -1)
+        order = np.argsort(z[:, axes[s]], kind="stable")
+        one = _near(growth, states, s, z[order])
+        near.append(one._replace(found=order[one.found]))
+        places.append(np.zeros((len(one.found), widest)))
+        places[s][:, : sensor.dim] = z[near[s].found]
+    begin = np.cumsum([0, *(len(one.found) for one in near)])[:-1, None]
+    with np.errstate(divide="ignore"):
+        logs = np.log(parts.weights)
+    most = growth.margin - misses.sum(axis=1)
+    status, track, rows, costs = depth_first.grow(
+        depth_first.Tracks(parts.means, parts.covariances, parts.weights, logs, np.array(misses), most),
+        depth_first.sensors_of(parts.observations, growth.terms.detection, growth.ahead, np.array(growth.gates)),
+        depth_first.Measured(
+            begin + [one.first for one in near], np.concatenate([one.found for one in near]), np.concatenate(places),
+            np.array(axes),
+        ),
+        max_tuples,
+    )  # fmt: skip
+    if status != GOOD:
+        complain(status)
+    if len(track) > max_tuples:
+        # ordered by track: extrapolated to those left
+        work = np.sum([one.first for one in near], axis=0)
+        _too_many(len(track) * work[-1] / work[int(track[-1]) + 1], max_tuples)
+    return TrackTuples(track, rows, costs)
+
+
+def _in_blocks(growth: _Growth, states: Any, misses: Array, max_tuples: int) -> TrackTuples:
+    """The same sensor by sensor, for all filters."""
+    near = [_near(growth, states, s, z) for s, z in enumerate(growth.measurements)]
+    count, work = len(states), np.sum([one.first for one in near], axis=0)
+    blocks: list[TrackTuples] = []
+    low = made = 0
+    while low < count or not blocks:
+        high = min(max(low + 1, int(np.searchsorted(work, work[low] + _BLOCK, side="right")) - 1), count)
+        here = [Near(one.first[low : high + 1] - one.first[low], one.found[one.first[low] : one.first[high]])
+                for one in near]  # fmt: skip
+        block = _grown(growth, states[low:high], misses[low:high], here, max_tuples - made)
+        made += len(block.track)
+        if made > max_tuples:
+            _too_many(made * work[-1] / work[high], max_tuples)
+        blocks.append(block._replace(track=low + block.track))
+        low = high
+    return TrackTuples(*(np.concatenate(arrays) for arrays in zip(*blocks, strict=True)))
 
 
 def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], most: int) -> TrackTuples:
