@@ -35,6 +35,7 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
+from assoc.ranking.estimates.mean_field import mean_field
 
 LIGHTEST = -700.0
 """Logarithm of a weight below which a tuple weighs nothing."""
@@ -49,7 +50,6 @@ _AIM, _MARGIN = 1e-6, 1e-9
 """Logarithms by which (2) is to hold, and by which it has to."""
 _LOST = 1e-12
 """Share of a sum that differences lose at most."""
-_SWEEPS = 60
 
 
 class _Graph(NamedTuple):
@@ -103,7 +103,7 @@ def block_bounds(columns: AllColumns, which: Ints, widest: int, run: Run) -> tup
     graph = _Graph(cols, log_weight, row_ptr, row_cols, np.full(rows, -1))
     touched = np.flatnonzero(np.diff(row_ptr))
     where = np.append(which, num + touched)
-    share, free = _mean_field(cols, np.exp(np.maximum(log_weight, LIGHTEST)), rows)
+    share, free = mean_field(cols, np.exp(np.maximum(log_weight, LIGHTEST)), np.ones(rows))
     estimate[where] = np.append(share, free[touched])
     least, most = np.zeros(len(which) + rows), np.ones(len(which) + rows)
     _bound_alone(graph, _LARGEST[-1], run.deadline(), most)
@@ -117,22 +117,6 @@ def block_bounds(columns: AllColumns, which: Ints, widest: int, run: Run) -> tup
     known = np.append(np.arange(len(which)), len(which) + touched)
     lower[where], upper[where] = np.maximum(least[known] - ROUNDING, 0.0), np.minimum(most[known] + ROUNDING, 1.0)
     return np.clip(estimate, lower, upper), lower, upper
-
-
-def _mean_field(cols: NDArray[np.int32], weights: Floats, num_rows: int) -> tuple[Floats, Floats]:
-    """Estimates of the probability of each column, and that of each row to be free, by damped mean-field equations."""
-    column, sensor = np.nonzero(cols >= 0)
-    row = cols[column, sensor]
-    free: Floats = np.full(num_rows, 0.5)
-    product = weights
-    for _ in range(_SWEEPS):
-        product = weights.copy()
-        for s in range(cols.shape[1]):
-            used = cols[:, s] >= 0
-            product[used] *= free[cols[used, s]]
-        sums = 1.0 + np.bincount(row, product[column] / free[row], num_rows).astype(np.float64)
-        free[:] = np.maximum(np.sqrt(free / sums), 1e-300)
-    return np.minimum(product, 1.0), free
 
 
 def _split(cols: NDArray[np.int32], share: Floats, rows: int, largest: int) -> Ints:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,19 +12,20 @@ from assoc._parameters import checked_time_limit
 from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._text.shown import Shown
-from assoc._types import Floats, Ints
+from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.block_prices import LIGHTEST, ROUNDING
-from assoc.ranking.clusters import clusters_of, distinct, numbered
+from assoc.ranking.clusters import cluster_problems, distinct
 from assoc.ranking.columns import AllColumns, price_all_columns
+from assoc.ranking.estimates.sampler import estimates
+from assoc.ranking.estimates.swept import swept
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
-from assoc.ranking.sampler import estimates
 from assoc.ranking.tuple_sums import WIDEST, sums_and_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
@@ -35,8 +35,10 @@ if TYPE_CHECKING:
 
 
 METHODS = ("auto", "certified", "estimate")
-# intervals wider than this have their probabilities sampled
+# where intervals are wider than this, probabilities are estimated
 _WIDE = 0.02
+# share of the time for sweeps
+_FOR_SWEEPS = 0.5
 # seconds that chains take to begin, for each measurement of each column, at most
 _ENTRY = 5e-7
 # inverse temperatures at which the unseen weight is bounded
@@ -58,8 +60,8 @@ class Marginals(Shown):
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Best estimate between the bounds: from the k best of its cluster, from sums around it where they are surer, or
-        sampled.
+        Best estimate between the bounds: from the k best of its cluster, or from sums around it where they are surer;
+        where bounds are wide, from a truncated sweep over the cluster, or sampled.
     lower, upper : float arrays, shape (T,)
         Bounds on the probability among all solutions.
     unseen : float
@@ -67,7 +69,8 @@ class Marginals(Shown):
     listed : int
         Number of solutions listed, over all clusters.
     error : float
-        The largest standard error of the probabilities that are sampled, by the spread of several chains; 0: none is.
+        How far the estimates may be off where bounds are wide: the largest change between two truncated sweeps, or the
+        largest standard error of what is sampled, by the spread of several chains. 0: bounds are wide nowhere.
     """
 
     tuples: NDArray[np.int32]
@@ -107,9 +110,9 @@ def marginals(
     time_limit : float, optional
         Seconds for all; the fewer solutions are proved, the wider the intervals.
     method : {"auto", "certified", "estimate"}
-        "auto": where intervals stay wide, probabilities are sampled (`assoc.ranking.sampler`); the intervals never are.
-        "certified": nothing is sampled. "estimate": of clusters that need it only the best solution is sought, to
-        sample from, and their intervals are [0, 1].
+        "auto": where intervals stay wide, probabilities are estimated, by truncated sweeps where few sets of
+        measurements matter, else by sampling (`assoc.ranking.estimates`); the intervals never are. "certified":
+        nothing is estimated. "estimate": clusters that need it are only estimated, and their intervals are [0, 1].
 
     Raises
     ------
@@ -157,13 +160,13 @@ def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: i
     # a ranking prepares its columns before it checks the clock, which takes about as long as all this did
     begin = run.runtime() / max(problem.num_tuples, 1)
     probability, lower, upper = np.ones((3, len(tuples)))
-    # standard errors of what is sampled; nan: nothing is
+    # how far estimates may be off; nan: none was needed
     error = np.full(len(tuples), np.nan)
     listed = 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
     narrow = _NARROW if len(problem.sizes) > 2 else _NARROW_PAIRS
     known = without_listing(problem, index, len(tuples), run, widest, method != "estimate")
-    for cluster, which in _clusters(problem):
+    for cluster, which in cluster_problems(problem):
         if known is not None and len(which) and np.ptp(known[1:, index[which]], axis=0).max() <= narrow:
             waiting[which] = False
             probability[index[which]], lower[index[which]], upper[index[which]] = known[:, index[which]]
@@ -175,16 +178,17 @@ def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: i
         waiting[which] = False
         # a cluster that is the whole problem has its greedy solution already
         clock = run if cluster is problem else run.part(0, run.time_limit)
-        shares, share, count, sampled = _of_cluster(cluster, k, clock, method)
+        found = _unbounded(cluster, clock) if method == "estimate" else _of_cluster(cluster, k, clock, method)
+        shares, share, count, estimated = found
         listed += count
         # a tuple that is listed twice is one tuple: each solution has it once, in either row
         touched, total = _totals(index[which], shares, len(tuples))
         probability[touched] = np.minimum(total, 1.0)
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
-        if sampled is not None:
-            probability[touched] = np.clip(_totals(index[which], sampled[0], len(tuples))[1], 0.0, 1.0)
-            error[touched] = _totals(index[which], sampled[1], len(tuples))[1]
+        if estimated is not None:
+            probability[touched] = np.clip(_totals(index[which], estimated[0], len(tuples))[1], 0.0, 1.0)
+            error[touched] = _totals(index[which], estimated[1], len(tuples))[1]
     if known is not None:
         narrower = (known[2] - known[1] < upper - lower) & (np.isnan(error) | (known[2] - known[1] < _WIDE))
         lower, upper = np.maximum(lower, known[1]), np.minimum(upper, known[2])
@@ -262,25 +266,6 @@ def _greedy(problem: AssignmentProblem, run: Run) -> NDArray[np.int64]:
     return np.concatenate([packing.origin[columns].astype(np.int64), prepared.single[alone]])
 
 
-def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
-    """Independent clusters as separate problems, small ones first, and the rows of their tuples.
-
-    A single measurement in no other tuple needs no decision and is left out. Without dummies the measurements of the
-    smallest sensor connect all clusters.
-    """
-    if not problem.dummy:
-        yield problem, np.arange(problem.num_tuples)
-        return
-    clusters = clusters_of(problem)
-    if len(clusters) == 1 and problem.sizes.sum() > 1:
-        yield problem, clusters[0]
-        return
-    for which in sorted(clusters, key=len):
-        columns, sizes = zip(*(numbered(column) for column in problem.tuples[which].T), strict=True)
-        if sum(sizes) > 1:
-            yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
-
-
 def _totals(index: NDArray[np.int64], values: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
     """Return the distinct tuples of a cluster, and the sum of the values of each."""
     if 10 * index.size > num:
@@ -297,11 +282,9 @@ def _of_cluster(
 ) -> tuple[Floats, float, int, tuple[Floats, Floats] | None]:
     """Each tuple's share in the weight of the k best, the share of the unseen rest, and the number listed.
 
-    And where they leave much open: sampled probabilities and their standard errors.
+    And where they leave much open: estimates, and how far these may be off.
     """
     everything = run
-    if method == "estimate":
-        k = 1
     if method != "certified" and run.time_limit is not None:
         run = run.part(0, 0.6 * run.time_limit)
     # rank one more than is listed: its cost bounds the rest
@@ -314,35 +297,59 @@ def _of_cluster(
     weight_of = np.zeros(problem.num_tuples)
     for solution, weight in zip(solutions, weights, strict=True):
         weight_of[solution.indices] += weight
-    others = _others(problem, ranking.columns, cost_of, rest, run) if method != "estimate" else np.inf
+    others = _others(problem, ranking.columns, cost_of, rest, run)
     share = others / (total + others) if others < np.inf else 1.0
     # large costs have fewer exact digits than their differences need; sums lose as much as errors below this
     rounding = 2.0 * float(np.finfo(float).eps * np.abs(cost_of).max())
     if rounding > _ROUNDING:
         share = min(share + 4.0 * rounding, 1.0)
     # the share of a tuple in every listed solution is 1, whatever rounding did to the sums
-    sampled = None
-    if method != "certified" and share > _WIDE and everything.remaining() > _ENTRY * ranking.columns.rows.size:
-        sampled = _sampled(
-            ranking.columns, [solutions[0].indices, solutions[-1].indices], problem.num_tuples, everything
-        )
-    return np.minimum(weight_of / total, 1.0), share, len(solutions), sampled
+    columns = ranking.columns
+    if method == "certified" or share <= _WIDE:
+        return np.minimum(weight_of / total, 1.0), share, len(solutions), None
+    starts = [solutions[0].indices, solutions[-1].indices]
+    estimated = _estimated(columns, starts, problem.num_tuples, everything)
+    return np.minimum(weight_of / total, 1.0), share, len(solutions), estimated
 
 
-def _sampled(columns: AllColumns, starts: list[Ints], num: int, run: Run) -> tuple[Floats, Floats] | None:
+def _unbounded(problem: AssignmentProblem, run: Run) -> tuple[Floats, float, int, tuple[Floats, Floats] | None]:
+    """Like `_of_cluster`, but only estimates: without, those of the greedy solution."""
+    columns = price_all_columns(problem, run.part(0, None if run.time_limit is None else 0.4 * run.time_limit))
+    start = _greedy(problem, run)
+    shares = np.zeros(problem.num_tuples)
+    shares[start] = 1.0
+    return shares, 1.0, 0, _estimated(columns, [start], problem.num_tuples, run)
+
+
+def _estimated(columns: AllColumns, starts: list[Array], num: int, run: Run) -> tuple[Floats, Floats] | None:
+    """Estimates of a cluster's tuples, and how far they may be off: by sweeps, or by chains from solutions."""
+    found = swept(columns, run.deadline(_FOR_SWEEPS))
+    if found is not None:
+        share = _of_tuples(columns, found, num)
+        return share[0], np.abs(share[0] - share[1])
+    return _sampled(columns, starts, num, run) if run.remaining() > _ENTRY * columns.rows.size else None
+
+
+def _sampled(columns: AllColumns, starts: list[Array], num: int, run: Run) -> tuple[Floats, Floats] | None:
     """Sampled probabilities of the tuples of a cluster, and their standard errors, from these solutions (tuples)."""
     column = np.full(num, -1, dtype=np.int64)
     column[columns.origin] = np.arange(len(columns.origin))
     found = estimates(columns, [column[start][column[start] >= 0] for start in starts], run)
     if found is None:
         return None
+    share = _of_tuples(columns, found, num)
+    return share.mean(axis=0), share.std(axis=0, ddof=1) / np.sqrt(len(share))
+
+
+def _of_tuples(columns: AllColumns, found: Floats, num: int) -> Floats:
+    """Probabilities of tuples (C, num), singletons among them, from those of columns (C, N)."""
     share = np.zeros((len(found), num))
     share[:, columns.origin] = found
     if columns.single.size:
         share[:, columns.single] = 1.0
         column, sensor = np.nonzero(columns.rows >= 0)
         np.subtract.at(share.T, columns.single[columns.rows[column, sensor]], found.T[column])
-    return share.mean(axis=0), share.std(axis=0, ddof=1) / np.sqrt(len(found))
+    return share
 
 
 def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, rest: float, run: Run) -> float:

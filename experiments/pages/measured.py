@@ -196,8 +196,8 @@ def ghost_rankings() -> str:
 def probabilities() -> str:
     """Mean width of certified intervals of probabilities, and estimates beside long chains."""
     r = Results("probabilities")
-    what = ("mean width", "seconds", "estimate, seconds", "estimate, mean off long chains",
-            "estimate, furthest off long chains")  # fmt: skip
+    what = ("mean width", "seconds", "estimate, seconds", "estimate, mean off longer runs",
+            "estimate, furthest off longer runs")  # fmt: skip
     return table(["", *what], _grid(r, labels(r, ": mean width"), what))
 
 

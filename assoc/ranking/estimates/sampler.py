@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats, Ints
+from assoc._types import Array, Floats, Ints
 from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
 
@@ -62,7 +62,7 @@ class _Chain(NamedTuple):
     """Moves for which each column was chosen before."""
 
 
-def estimates(columns: AllColumns, starts: list[Ints], run: Run, length: float = 1.0) -> Floats | None:
+def estimates(columns: AllColumns, starts: list[Array], run: Run, length: float = 1.0) -> Floats | None:
     """Frequency of each of the N columns in several chains (C, N), which begin with these solutions in turn.
 
     ``length`` multiplies the number of moves. None without time.
