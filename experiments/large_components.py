@@ -8,7 +8,6 @@ lists: ten candidates each, or all pairs; scipy's time is that of its routine al
 Processor time of one core, kernels compiled; ratios are of the same problems.
 """
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -22,7 +21,7 @@ import assoc
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances.synthetic import wide_gates
-from experiments.common.measuring import one_core, timed
+from experiments.common.measuring import one_core, processor_time
 from experiments.common.peers import by_milp
 
 GATES = {1000: True, 2000: True, 3000: True, 10_000: False}
@@ -41,7 +40,7 @@ BANDS: dict[str, dict[str, tuple[float | None, float | None]]] = {
 
 
 def _exact(problem: assoc.AssignmentProblem) -> tuple[assoc.Solution, float]:
-    answer, spent = timed(lambda: assoc.assign(problem, advise=False), time.process_time)
+    answer, spent = processor_time(lambda: assoc.assign(problem, advise=False))
     if answer.status != "optimal":
         raise AssertionError(f"not proved: gap {answer.gap:.3g}, stopped by {answer.stopped_by}")
     return answer, spent
@@ -53,7 +52,7 @@ def gates(targets: int, seed: int, beside: bool) -> tuple[int, float, float]:
     answer, ours = _exact(problem)
     if not beside:
         return problem.num_tuples, ours, np.nan
-    other, theirs = timed(lambda: by_milp(problem, np.inf), time.process_time)
+    other, theirs = processor_time(lambda: by_milp(problem, np.inf))
     if not other.success or abs(other.fun - answer.cost) > 1e-6 * abs(answer.cost):
         raise AssertionError(f"{targets} targets, seed {seed}: {answer.cost!r}, HiGHS {other.fun!r}: {other.message}")
     return problem.num_tuples, ours, theirs
@@ -68,7 +67,7 @@ def candidates(count: int, seed: int) -> tuple[int, float, float]:
     costs = 0.1 + rng.random(len(pairs))
     answer, ours = _exact(assoc.AssignmentProblem(pairs + 1, costs, (count, count), dummy=False))
     matrix = csr_array((costs, pairs.T), shape=(count, count))
-    (rows, columns), theirs = timed(lambda: min_weight_full_bipartite_matching(matrix), time.process_time)
+    (rows, columns), theirs = processor_time(lambda: min_weight_full_bipartite_matching(matrix))
     _same(answer.cost, float(matrix[rows, columns].sum()))
     return len(pairs), ours, theirs
 
@@ -80,7 +79,7 @@ def dense(
     numbers = np.arange(1.0, count + 1.0)
     matrix = np.random.default_rng(seed).random((count, count)) if kind == "uniform" else np.outer(numbers, numbers)
     answer, ours = _exact(assoc.AssignmentProblem.from_dense(matrix, dummy=False))
-    chosen, theirs = timed(lambda: peer(matrix), time.process_time)
+    chosen, theirs = processor_time(lambda: peer(matrix))
     _same(answer.cost, float(matrix[chosen].sum()))
     return matrix.size, ours, theirs
 

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 
 from assoc.problem import AssignmentProblem
+from experiments.common.command import whole
 
 FIRST, LEAST = 2000, 0.007
 """First seed, and the least gap of the linear program as a share of the optimum."""
@@ -56,11 +57,9 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m experiments.benchmarks.wide_gaps",
         description="Find seeds of ghosts whose linear program is far below the optimum.",
     )
-    parser.add_argument("targets", type=int, metavar="TARGETS", help="number of targets")
-    parser.add_argument("--count", type=int, default=5, metavar="N", help="how many seeds (default 5)")
+    parser.add_argument("targets", type=whole(1), metavar="TARGETS", help="number of targets")
+    parser.add_argument("--count", type=whole(1), default=5, metavar="N", help="how many seeds (default 5)")
     chosen = parser.parse_args(argv)
-    if chosen.targets < 1 or chosen.count < 1:
-        parser.error("expected TARGETS and N of at least 1")
     for seed, gap in wide_gaps(chosen.targets, chosen.count):
         print(f"{seed} {100 * gap:.3f} %", flush=True)
     return 0

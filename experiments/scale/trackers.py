@@ -1,6 +1,5 @@
 """A scan of a tracker among many targets: the worst, which is one of the first, and the median of the later ones."""
 
-import time
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy.spatial import cKDTree
 import assoc
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS
+from experiments.common.measuring import processor_time
 from experiments.scale.alone import Measured
 
 SETTLED = 5
@@ -37,9 +37,7 @@ def follow(kind: str, targets: int, seed: int, about: dict[str, Any]) -> tuple[l
     tracker = TRACKERS[kind].for_scene(scene)
     spent = []
     for k in range(scene.num_scans):
-        begin = time.process_time()
-        tracker.step(scene.times[k], scene.measurements[k])
-        spent.append(time.process_time() - begin)
+        spent.append(processor_time(tracker.step, scene.times[k], scene.measurements[k])[1])
     places = np.array([track.position for track in tracker.tracks if track.confirmed]).reshape(-1, 3)
     truth = scene.scan(scene.num_scans - 1).truth_positions
     assert truth is not None

@@ -11,7 +11,6 @@ plots refused, beside the tracks of plots in order. Seeds are --seed and those t
 them (8), half as many for recorded traffic and late plots.
 """
 
-import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -25,6 +24,7 @@ from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
 from experiments.common.command import add_only, add_recording, add_seeds, main
+from experiments.common.measuring import processor_time
 from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
 from experiments.trackers.running import through
 
@@ -91,9 +91,7 @@ def late_plots(scene: Scene, rng: np.random.Generator) -> tuple[list[float], flo
     seconds = []
     for k, (z, times) in enumerate(given):
         scan = scene.scan(k)
-        begin = time.process_time()
-        tracker.step(scan.time, z, times, scan.sectors)
-        seconds.append(time.process_time() - begin)
+        seconds.append(processor_time(tracker.step, scan.time, z, times, scan.sectors)[1])
         shown.add(one for one in tracker.tracks if one.confirmed)
         if k >= behind - 1:
             settled.add(one for one in tracker.past_tracks(-behind) if one.confirmed)

@@ -7,13 +7,13 @@ sensor.
 
 import importlib.util
 import math
-import time
 from collections.abc import Iterator
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.tracking import LifeCycle
+from experiments.common.measuring import processor_time
 from experiments.trackers.plane import ACCELERATION, NOISE, START_DEVIATION, Plane
 
 PACKAGE = "multisensor_lmb_filters_rs"
@@ -49,7 +49,5 @@ def labelled(plane: Plane) -> Iterator[tuple[float, Array]]:
     )
     for k, measured in enumerate(plane.measurements, start=1):
         detections = [np.ascontiguousarray(z) for z in measured]
-        begin = time.process_time()
-        found = filter.step(detections, k)
-        elapsed = time.process_time() - begin
+        found, elapsed = processor_time(filter.step, detections, k)
         yield elapsed, np.array([one.mean[:2] for one in found.tracks]).reshape(-1, 2)

@@ -1,6 +1,5 @@
 """Running our trackers and keeping what is judged: tracks, decisions, time per scan."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,7 @@ from assoc.filters import ConstantVelocity, Gaussian, KalmanFilter
 from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import Initiation, Tracker, TrackTable
+from experiments.common.measuring import processor_time
 from experiments.trackers.plane import ACCELERATION, SPEED, START_DEVIATION, Plane
 
 
@@ -35,9 +35,7 @@ def through(tracker: Tracker, scene: Scene) -> Run:
     for k in range(scene.num_scans):
         scan = scene.scan(k)
         # CPU time: what else the machine does is not the tracker's
-        begin = time.process_time()
-        tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
-        seconds.append(time.process_time() - begin)
+        seconds.append(processor_time(tracker.step, scan.time, scan.measurements, scan.times, scan.sectors)[1])
         tracks = [track for track in tracker.tracks if track.reported]
         table.add(tracks, tracker.filter.motion.position)
         places = np.array([track.position for track in tracks]).reshape(-1, 3)
@@ -51,7 +49,5 @@ def in_plane(kind: type[Tracker], plane: Plane, **options: Any) -> Iterator[tupl
     tracker = kind([plane.sensor], KalmanFilter(motion), initiation=Initiation(speed=SPEED), **options)
     tracker.begin(0.0, Gaussian(plane.start, np.diag(START_DEVIATION**2)))
     for k, z in enumerate(plane.measurements, start=1):
-        begin = time.process_time()
-        tracker.step(float(k), [z])
-        elapsed = time.process_time() - begin
+        _, elapsed = processor_time(tracker.step, float(k), [z])
         yield elapsed, np.array([track.position[:2] for track in tracker.tracks if track.confirmed]).reshape(-1, 2)
