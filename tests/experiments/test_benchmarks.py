@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all, run_case, timed
-from experiments.common import contestants
 from experiments.common.instances import FIRST_SEED, synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
@@ -265,7 +265,7 @@ def test_program_refuses_and_reports(
         main(["--processes", "0"])
     assert stop.value.code == 2
     assert "--processes: expected at least 1, got 0" in capsys.readouterr().err
-    monkeypatch.setattr(contestants, "not_installed", lambda: ["kap"])
+    monkeypatch.setitem(sys.modules, "kap", None)
     with pytest.raises(SystemExit) as stop:
         main([])
     assert stop.value.code == 2

@@ -17,7 +17,6 @@ import pytest
 
 from assoc import live, track
 from assoc._cli.track import plot_lines
-from assoc._cli.track.options import make_tracker
 from assoc._cli.track.plot_lines import LONGEST, IdentityError, Lines, parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
@@ -86,28 +85,23 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     assert out.read_text() == done.stdout
 
 
-def test_the_default_filter_suits_the_turns(tmp_path, monkeypatch, capsys):
+def test_the_default_filter_suits_the_turns(tmp_path, capsys):
     """As for_scene does with scans of a turn; the scene's own pace where no turns are given."""
     scene = simulate("rotating-radars", 5, aircraft=1, duration=12.0, interval=4.0)
     scene.save(tmp_path / "radars.npz")
-    made = []
 
-    def note(*arguments, **options):
-        made.append(make_tracker(*arguments, **options))
-        return made[-1]
+    def used(name, *more):
+        """The filter that the saved state says."""
+        state = tmp_path / f"{name}.npz"
+        outputs = ["-o", str(tmp_path / f"{name}.csv"), "--state", str(state)]
+        assert live.main([str(tmp_path / "radars.npz"), "--replay", "0", *outputs, *more]) == 0
+        with np.load(state) as saved:
+            return json.loads(str(saved["settings"]))["filter"]
 
-    monkeypatch.setattr("assoc.live.make_tracker", note)
     expected = described(MultiSensorTracker.for_scene(scene).filter)
-    for more in (["--turns", "4,5,5.5"], []):
-        made.clear()
-        words = [str(tmp_path / "radars.npz"), "--replay", "0", "-o", str(tmp_path / f"{len(more)}.csv"), *more]
-        assert live.main(words) == 0
-        assert {described(one.filter) for one in made} == {expected}
-    made.clear()
+    assert used("turns", "--turns", "4,5,5.5") == used("pace") == expected
     assert " steps; a step takes " in capsys.readouterr().err
-    (tmp_path / "0.csv").unlink()
-    assert live.main([*words, "--turns", "9,10,12", "-q"]) == 0
-    assert {described(one.filter) for one in made} == {described(two_speeds(manoeuvre_noise(9.0)))}
+    assert used("slow", "--turns", "9,10,12", "-q") == described(two_speeds(manoeuvre_noise(9.0)))
     assert capsys.readouterr().err == ""
 
 

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 
 from assoc import solve, track
-from assoc._cli.track.slices import Slices
-from assoc.recordings import write_plots
+from assoc.recordings import fixed_groups, radar_of, write_plots
 from assoc.simulation import simulate, simulate_recording
-from assoc.tracking.offline.slices import Stitching, TrackSlice, _same
+from assoc.tracking import TRACKERS
+from assoc.tracking.offline.slices import Stitching, TrackSlice, _same, slices_of
 from tests.sizes import sample
 
 WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
@@ -89,6 +89,7 @@ def test_stitching_is_by_as_many_common_plots_as_possible():
 
 
 def test_what_is_done_is_kept_and_what_is_missing_is_named(here, capsys, monkeypatch):
+    """A slice is made to fail: no small recording makes one of its slices alone too large."""
     tracked, broken = [], {2}
 
     def call(self, part):
@@ -140,14 +141,15 @@ def test_refusals(here, capsys, words, message):
     assert code == 2 and tracks is None and message in said and said.count("\n") == 1
 
 
-def test_ids_of_slices_with_a_gap_are_new(recording, here, capsys, monkeypatch):
-    parts = []
-    plain = Stitching.add
-    monkeypatch.setattr(Stitching, "add", lambda self, part: parts.append(plain(self, part)) or parts[-1])
-    run(["all.csv", "--tracker", "nearest-neighbour", "--slice", "100"], "t.csv", capsys)
-    again = Stitching()
-    first, third = plain(again, parts[0]), plain(again, parts[2])
-    assert not {*first.frame.track_id} & {*third.frame.track_id}
+def test_ids_of_slices_with_a_gap_are_new(recording):
+    tracker = TRACKERS["nearest-neighbour"]([radar_of(recording)])
+    first, second, third, *_ = map(TrackSlice(tracker, True), slices_of(fixed_groups(recording, 9.5), 100.0, 60.0))
+    shared = []
+    for parts in ((first, second), (first, third)):
+        stitching = Stitching()
+        one, other = ({*stitching.add(part).frame.track_id} for part in parts)
+        shared.append(len(one & other))
+    assert shared[0] >= 5 and shared[1] == 0
 
 
 SLICED = ["all.csv", "--tracker", "nearest-neighbour", "--slice", "60"]
@@ -155,14 +157,14 @@ SLICED = ["all.csv", "--tracker", "nearest-neighbour", "--slice", "60"]
 
 def at_first(monkeypatch, do):
     """Do something when the first slice is done."""
-    plain, done = Slices._save, []
+    plain, done = os.replace, []
 
-    def save(self, part):
-        plain(self, part)
-        if not done:
+    def replace(source, target):
+        plain(source, target)
+        if target.endswith(".npz") and not done:
             done.append(do())
 
-    monkeypatch.setattr(Slices, "_save", save)
+    monkeypatch.setattr(os, "replace", replace)
 
 
 def test_slices_are_kept_until_the_tracks_are_written(here, capsys, monkeypatch):
@@ -270,24 +272,18 @@ def test_a_killed_program_is_resumed(here, capsys, recording, scheduler, start_w
     assert run(SLICED, "one.csv", capsys)[0] == 0
     process = subprocess.Popen([sys.executable, "-m", "assoc.track", *words, "-o", "many.csv"])
     deadline = time.monotonic() + 300
-    while not (done := [*here.glob("many.csv.slices/*/00000.npz")]):
+    while not [*here.glob("many.csv.slices/*/00000.npz")]:
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
     process.kill()
     assert process.wait(100) == -signal.SIGKILL and not os.path.exists("many.csv")
-    before = done[0].stat().st_mtime_ns
-    kept = []
-    plain = Slices.load
-
-    def load(self, number):
-        kept.append(os.stat(done[0]).st_mtime_ns)
-        return plain(self, number)
-
+    plain, written = os.replace, []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Slices, "load", load)
+        patch.setattr(os, "replace", lambda source, target: written.append(target) or plain(source, target))
         code, many, _ = run([*SLICED, "--scheduler", str(scheduler)], "many.csv", capsys)
     # what was done is not done again
-    assert code == 0 and {*kept} == {before} and not os.path.exists("many.csv.slices")
+    assert code == 0 and os.path.basename(written[-1]) == "many.csv" and not os.path.exists("many.csv.slices")
+    assert not any(target.endswith("00000.npz") for target in written)
     pd.testing.assert_frame_equal(many, pd.read_csv("one.csv"))
 
 

@@ -1,6 +1,5 @@
 """`python -m assoc.track` as a program."""
 
-import inspect
 import json
 import os
 import re
@@ -273,13 +272,15 @@ def test_bad_input_is_one_line_and_code_2(case, scene_file, tmp_path, monkeypatc
     assert not (tmp_path / "tracks.csv").exists()
 
 
-def test_too_many_tuples_is_code_3(scene_file, tmp_path, monkeypatch, capsys):
-    from assoc.tracking import tracker
-
-    begin = inspect.unwrap(tracker.Tracker.__init__)
-    monkeypatch.setattr(begin, "__kwdefaults__", {**begin.__kwdefaults__, "max_tuples": 5})
-    assert track.main([str(scene_file), "-o", str(tmp_path / "tracks.csv")]) == 3
-    assert "more than max_tuples = 5" in capsys.readouterr().err
+def test_too_many_tuples_is_code_3(scene_file, tmp_path, capsys):
+    """Two hundred measurements of a target by each of three sensors make eight million tuples."""
+    scene, rng = Scene.load(scene_file), np.random.default_rng(0)
+    seen = next(rows for rows in scene.scan(0).true_tuples() if rows.all())
+    each = zip(scene.measurements[0], seen - 1, scene.sensors, strict=True)
+    many = [[rng.multivariate_normal(z[row], sensor.covariance, 200) for z, row, sensor in each]]
+    replace(scene.part(0, 1), measurements=many, truth=None).save(tmp_path / "many.npz")
+    assert track.main([str(tmp_path / "many.npz"), "-o", str(tmp_path / "tracks.csv")]) == 3
+    assert "more than max_tuples = " in capsys.readouterr().err
 
 
 def test_help_is_quick_and_lists_trackers(run):

@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assoc._files import npz
 from assoc._files.npz import save_npz
 from assoc._files.output import write_atomically
 from assoc._system.processes import leave, parallel_map, send, start_python
@@ -62,29 +61,18 @@ def test_a_full_disk_leaves_the_old_result(scene_file, tmp_path, option):
     assert output.read_text() == "old" and os.listdir(tmp_path) == ["out"]
 
 
-def test_a_full_disk_while_an_archive_is_written(tmp_path, monkeypatch):
+def test_a_full_disk_while_an_archive_is_written(tmp_path):
     """Closing the archive fails as well then, and what is said must be what the disk said."""
-
-    class Full:
-        """A file on a disk that is full after some bytes."""
-
-        def __init__(self, file):
-            self.file, self.room = file, 300
-
-        def write(self, data):
-            self.room -= len(data)
-            if self.room < 0:
-                raise OSError(28, "No space left on device")
-            return self.file.write(data)
-
-        def __getattr__(self, name):
-            return getattr(self.file, name)
+    import resource
 
     (tmp_path / "a.npz").write_bytes(b"old")
-    real = npz.write_atomically
-    monkeypatch.setattr(npz, "write_atomically", lambda path, writer: real(path, lambda file: writer(Full(file))))
-    with pytest.raises(InvalidInputError, match=r"cannot be written \(No space left on device\)"):
-        save_npz(tmp_path / "a.npz", "assoc.test", 1, {"x": np.random.default_rng(0).random(10_000)})
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300, before[1]))
+    try:
+        with pytest.raises(InvalidInputError, match=r"cannot be written \(File too large\)"):
+            save_npz(tmp_path / "a.npz", "assoc.test", 1, {"x": np.random.default_rng(0).random(10_000)})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert os.listdir(tmp_path) == ["a.npz"] and (tmp_path / "a.npz").read_bytes() == b"old"
 
 

@@ -7,6 +7,7 @@ import pytest
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sweeps import Study, grid, load, load_traces
 from assoc.sweeps.batches import Batches
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import Store
 
 # many batches, so that there is a middle to interrupt in
@@ -31,7 +32,6 @@ def slow(scene_of_module):
 @pytest.fixture(scope="module")
 def scene_of_module():
     from assoc.simulation import simulate
-    from assoc.sweeps.sources import StudySource
 
     return StudySource(simulate("three-radar", 2, scans=5), "scene")
 
@@ -100,14 +100,20 @@ def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp
 
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
-    slow, expected, scheduler, start_worker, tmp_path, monkeypatch
+    slow, expected, scheduler, start_worker, tmp_path
 ):
-    from assoc.sweeps.worker import Job
-
-    workers = [start_worker(), start_worker()]
     packed, seen = [], {}
-    plain = Job.__reduce__
-    monkeypatch.setattr(Job, "__reduce__", lambda self: packed.append(1) or plain(self))
+
+    class Packed(StudySource):
+        """Counts how often it is sent."""
+
+        def __reduce__(self):
+            packed.append(1)
+            return StudySource, (self.content, self.name)
+
+    (source,) = slow.sources
+    study = Study([Packed(source.content, source.name)], slow.settings, 8)
+    workers = [start_worker(), start_worker()]
 
     def lose(counts):
         if counts.new >= 40 and "one lost" not in seen:
@@ -122,8 +128,8 @@ def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
             start_worker()
             seen["all lost"] = counts.new
 
-    with Store(tmp_path / "s", slow.manifest) as store:
-        counts = slow.run_in(store, scheduler=scheduler, progress=lose, **SMALL)
+    with Store(tmp_path / "s", study.manifest) as store:
+        counts = study.run_in(store, scheduler=scheduler, progress=lose, **SMALL)
     assert 1 <= seen["packed"] <= 2
     # it went on with the one worker that was left, and then with a new one alone
     assert seen["left"] is None and 40 <= seen["one lost"] < seen["all lost"] < slow.size

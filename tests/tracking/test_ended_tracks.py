@@ -12,7 +12,7 @@ from assoc import track
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings import fixed_groups, radar_of, read_plots, write_plots
 from assoc.simulation import simulate_recording
-from assoc.tracking import TRACKERS, TrackTable
+from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
 from assoc.tracking.offline.ended_tracks import EndedTracks
@@ -30,27 +30,11 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def whole_table(monkeypatch):
-    """Rows of all tracks as the program would list them at once."""
-    kept, plain = TrackTable(), plots.follow
-
-    def follow(*arguments, **options):
-        for one in plain(*arguments, **options):
-            kept.add(*one.listed(True))
-            kept.count_identities(one.tracks, plots.known_of(one.window)[:, 1:])
-            yield one
-
-    monkeypatch.setattr(plots, "follow", follow)
-    return kept
-
-
 @pytest.mark.parametrize("more", [[], ["--identity", "ignore"]])
-def test_rows_are_those_of_a_whole_table(here, monkeypatch, more):
-    kept = whole_table(monkeypatch)
-    assert track.main(["plots.csv", "-o", "t.csv", *WORDS, *more]) == 0
-    if not more:
-        kept.name_by_identities()
-    kept.to_csv("whole.csv")
+def test_rows_are_those_of_a_whole_table(here, more):
+    """A report needs all tracks at once."""
+    for words in (["-o", "t.csv"], ["-o", "whole.csv", "--report", "r.html"]):
+        assert track.main(["plots.csv", *words, *WORDS, *more]) == 0
     texts = {"mode3_oct": str, "address_hex": str, "target": str}
     found, expected = (pd.read_csv(name, dtype=texts) for name in ("t.csv", "whole.csv"))
     assert ("mode3_oct" in found) == (not more) and len(found) > 300 and found.track_id.nunique() > 8
@@ -73,6 +57,7 @@ def test_rows_are_those_of_a_whole_table(here, monkeypatch, more):
 
 
 def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
+    """Tracking is made to fail in the middle: no small recording ends the memory there."""
     (here / "t.csv").write_text("before\n")
     plain = plots.follow
 
