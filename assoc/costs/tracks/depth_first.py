@@ -94,7 +94,7 @@ class _Space(NamedTuple):
     h: Array  # expected measurements, (S, m, D)
     v: Array  # residuals, (m, D)
     middle: Array  # expected measurement of the mixture, (D,)
-    whole: Array  # covariance of the mixture's residual, and its factor, (2, D, D)
+    whole: Array  # covariance of the mixture's residual, and its factor with the diagonal inverted, (2, D, D)
     joint: Array  # logarithms of weights times likelihoods, (m,)
     queue: Array  # measurements in the gate, int (S, most of a track)
     queued: Array  # how many they are, int (S,)
@@ -283,7 +283,7 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
 
 @lean_inner_njit
 def _mix(code: int, d: int, s: int, at: int, space: _Space) -> bool:
-    """Mean and covariance of the expected measurements of all components, and its factor."""
+    """Mean and covariance of the expected measurements of all components, and its factor, the diagonal inverted."""
     side, m = _side(s, at), space.weights.shape[2]
     weights, middle, v, S, L = space.weights[at, 0], space.middle, space.v, space.whole[0], space.whole[1]
     for a in range(d):
@@ -303,7 +303,11 @@ def _mix(code: int, d: int, s: int, at: int, space: _Space) -> bool:
                 S[a, e] += weights[j] * (space.S[s, side, j, a, e] + away)
     for a in range(d):
         middle[a] += space.h[s, 0, a]
-    return bool(factor(S, 3, L)) if d == 3 else bool(factor(S, d, L))
+    good = factor(S, 3, L) if d == 3 else factor(S, d, L)
+    # measurements are many: they are multiplied
+    for a in range(d if good else 0):
+        L[a, a] = 1.0 / L[a, a]
+    return bool(good)
 
 
 @lean_inner_njit
@@ -345,7 +349,7 @@ def _in_gate(d: int, code: int, places: Array, k: int, middle: Array, L: Array, 
     for a in range(d):
         for e in range(a):
             v[a] -= L[a, e] * v[e]
-        v[a] /= L[a, a]
+        v[a] *= L[a, a]
         square += v[a] * v[a]
         if not square <= gate:
             return False
