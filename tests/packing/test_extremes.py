@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from assoc._system.compiled import njit
-from assoc.packing.kernels.extremes import place_of_largest, place_of_smallest
+from assoc.packing.kernels.extremes import position_of_largest, position_of_smallest
 
 
 @njit
 def both(bits, count):
     """Only kernels call inner kernels."""
-    return place_of_smallest(bits, count), place_of_largest(bits, count)
+    return position_of_smallest(bits, count), position_of_largest(bits, count)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 63, 200])

@@ -32,9 +32,9 @@ def assert_basis(program, basis):
     np.testing.assert_allclose(basis.norms, (inverse**2).sum(axis=0), rtol=1e-6)
     num = program.weights.size
     for j in range(num):
-        assert basis.place[j] == (np.flatnonzero(basis.variable == j).tolist() or [-1])[0]
+        assert basis.position[j] == (np.flatnonzero(basis.variable == j).tolist() or [-1])[0]
     for r in range(program.sides.size):
-        assert basis.slack_place[r] == (np.flatnonzero(basis.variable == num + r).tolist() or [-1])[0]
+        assert basis.slack_position[r] == (np.flatnonzero(basis.variable == num + r).tolist() or [-1])[0]
 
 
 def test_what_is_taken_back_is_the_basis_that_was_kept():

@@ -97,8 +97,8 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
 def relaxed_values(program, basis):
     """The value of each column in a basis."""
     values = np.zeros(program.weights.size)
-    inside = basis.place >= 0
-    values[inside] = basis.values[basis.place[inside]]
+    inside = basis.position >= 0
+    values[inside] = basis.values[basis.position[inside]]
     return values
 
 

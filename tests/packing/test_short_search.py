@@ -114,7 +114,7 @@ def test_it_begins_where_the_program_of_the_whole_is():
         begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         fixed = float(packing.weights[part.fixed].sum())
         assert bound_of(root.program, begin) + fixed == pytest.approx(relaxed.bound, abs=1e-6)
-        warm += int((begin.place >= 0).sum())
+        warm += int((begin.position >= 0).sum())
     assert warm > 10
 
 

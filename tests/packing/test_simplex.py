@@ -265,8 +265,8 @@ def test_an_inverse_is_computed_anew():
     np.testing.assert_allclose(basis.duals, before, atol=1e-9)
     np.testing.assert_allclose(basis.norms, (basis.inverse**2).sum(axis=0))
     # the same column twice
-    columns = np.flatnonzero(basis.place >= 0)
-    basis.variable[basis.place[columns[0]]] = columns[1]
+    columns = np.flatnonzero(basis.position >= 0)
+    basis.variable[basis.position[columns[0]]] = columns[1]
     refactor(program, allowed, basis)
     assert residual(program, basis) < 1e-10
     assert (np.bincount(basis.variable[basis.variable < packing.num_columns]) <= 1).all()

@@ -84,7 +84,7 @@ def test_a_trial_ends_at_the_optimum_of_what_is_left():
         program = program_with_cuts(packing, rng) if rng.random() < 0.5 else program_of(packing.arrays)
         base, allowed = solved(packing, program)
         before = [
-            array.copy() for array in (base.variable, base.place, base.values, base.duals, base.inverse, base.norms)
+            array.copy() for array in (base.variable, base.position, base.values, base.duals, base.inverse, base.norms)
         ]
         trial = new_trial(program, 60)
         begin_trials(program, allowed, base, trial)
@@ -112,7 +112,7 @@ def test_a_trial_ends_at_the_optimum_of_what_is_left():
             found = trial.basis.duals.copy()
             make_feasible(program, side, found)
             assert certified(program, side, found) >= min(reached, limit) - 10 * room
-        after = (base.variable, base.place, base.values, base.duals, base.inverse, base.norms)
+        after = (base.variable, base.position, base.values, base.duals, base.inverse, base.norms)
         for one, other in zip(before, after, strict=True):
             np.testing.assert_array_equal(one, other)
     assert ends[OPTIMAL] > 50 and ends[CUT] > 10 and ends[INFEASIBLE] > 0

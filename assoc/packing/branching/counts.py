@@ -264,7 +264,7 @@ def _with_rows(program: Program, counts: _Counts) -> Program:
 
 
 def _with_basis(root: Root, number: int) -> NDArray[np.int32]:
-    """The root's basis, with z and s of each count in the places of its rows."""
+    """The root's basis, with z and s of each count in the positions of its rows."""
     num, size = root.program.weights.size, root.slack.size
     kind, row = np.divmod(root.variable - num, size)
     renumbered = num + number + kind * (size + 2 * number) + row

@@ -68,12 +68,12 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
 @inner_njit
 def _by_values(work: Work, allowed: Allowed) -> bool:
     """Lower the keys by the LP's values, so that large values come first; whether all are whole numbers."""
-    in_basis, values, active, key = work.basis.place, work.basis.values, allowed.active, work.key
+    in_basis, values, active, key = work.basis.position, work.basis.values, allowed.active, work.key
     whole = True
     for a in range(active.size):
-        place = in_basis[active[a]]
-        if place >= 0:
-            value = values[place]
+        position = in_basis[active[a]]
+        if position >= 0:
+            value = values[position]
             whole = whole and not WHOLE < value < 1.0 - WHOLE
             key[a] -= value * work.limit
     return whole

@@ -55,13 +55,13 @@ def keep_basis(kept: KeptBases, basis: Basis) -> None:
     """Keep a copy of a basis."""
     count = kept.age.size
     if count > 0:
-        place = (kept.latest[0] + 1) % count
-        kept.latest[0] = place
-        copy_to(kept.variable[place], basis.variable)
+        position = (kept.latest[0] + 1) % count
+        kept.latest[0] = position
+        copy_to(kept.variable[position], basis.variable)
         for r in range(basis.values.size):
-            copy_to(kept.inverse[place, r], basis.inverse[r])
-        copy_to(kept.norms[place], basis.norms)
-        kept.age[place] = basis.age[0]
+            copy_to(kept.inverse[position, r], basis.inverse[r])
+        copy_to(kept.norms[position], basis.norms)
+        kept.age[position] = basis.age[0]
 
 
 @inner_njit
@@ -71,33 +71,33 @@ def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> b
     ``again``: it will be needed once more.
     """
     count, num, size = kept.age.size, program.weights.size, program.sides.size
-    place = -1
+    position = -1
     for back in range(count):
         candidate = (kept.latest[0] + count - back) % count
         i = 0
         while i < size and kept.variable[candidate, i] == basis.variable[i]:
             i += 1
         if i == size:
-            place = candidate
+            position = candidate
             break
-    if place >= 0:
+    if position >= 0:
         # bases kept after it belong to nodes that are done
-        kept.latest[0] = place if again else (place + count - 1) % count
+        kept.latest[0] = position if again else (position + count - 1) % count
         # right-hand sides may have changed (counts.py)
         basis.values[:] = 0.0
         for r in range(size):
             for i in range(size):
-                entry = kept.inverse[place, r, i]
+                entry = kept.inverse[position, r, i]
                 basis.inverse[r, i] = entry
                 basis.values[i] += program.sides[r] * entry
-        copy_to(basis.norms, kept.norms[place])
-        basis.age[0] = kept.age[place]
-        basis.place[:] = -1
-        basis.slack_place[:] = -1
+        copy_to(basis.norms, kept.norms[position])
+        basis.age[0] = kept.age[position]
+        basis.position[:] = -1
+        basis.slack_position[:] = -1
         for i in range(size):
             code = basis.variable[i]
             if code < num:
-                basis.place[code] = i
+                basis.position[code] = i
             elif code < num + size:
-                basis.slack_place[code - num] = i
-    return place >= 0
+                basis.slack_position[code - num] = i
+    return position >= 0

@@ -116,11 +116,11 @@ def take_node(stack: Stack, top: int, node: Allowed) -> int:
 @inner_njit
 def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float) -> None:
     """Push a node above those below ``top``; its columns follow theirs."""
-    place = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0
+    position = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0
     num = node.active.size
-    stack.first[top] = place
+    stack.first[top] = position
     stack.size[top] = num
-    copy_to(stack.arena[place : place + num], node.active)
+    copy_to(stack.arena[position : position + num], node.active)
     copy_to(stack.slack[top], node.slack)
     stack.bound[top] = lower
     copy_to(stack.variable[top], basis.variable)

@@ -130,19 +130,19 @@ def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
                     if not WHOLE < value < 1.0 - WHOLE:
                         continue
                     doubt = value * (1.0 - value)
-                    place = count
+                    position = count
                     if count < values.size:
                         count += 1
                     elif doubt <= values[count - 1] * (1.0 - values[count - 1]):
                         continue
                     else:
-                        place = count - 1
-                    while place > 0 and values[place - 1] * (1.0 - values[place - 1]) < doubt:
-                        values[place] = values[place - 1]
-                        pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
-                        place -= 1
-                    values[place] = value
-                    pairs[place, 0], pairs[place, 1] = one, two
+                        position = count - 1
+                    while position > 0 and values[position - 1] * (1.0 - values[position - 1]) < doubt:
+                        values[position] = values[position - 1]
+                        pairs[position, 0], pairs[position, 1] = pairs[position - 1, 0], pairs[position - 1, 1]
+                        position -= 1
+                    values[position] = value
+                    pairs[position, 0], pairs[position, 1] = one, two
     return count
 
 
@@ -260,19 +260,19 @@ def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, co
                 ):
                     continue
                 others = float(counts[one] + counts[two])
-                place = found
+                position = found
                 if found < values.size:
                     found += 1
                 elif others <= values[found - 1]:
                     continue
                 else:
-                    place = found - 1
-                while place > 0 and values[place - 1] < others:
-                    values[place] = values[place - 1]
-                    pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
-                    place -= 1
-                values[place] = others
-                pairs[place, 0], pairs[place, 1] = one, two
+                    position = found - 1
+                while position > 0 and values[position - 1] < others:
+                    values[position] = values[position - 1]
+                    pairs[position, 0], pairs[position, 1] = pairs[position - 1, 0], pairs[position - 1, 1]
+                    position -= 1
+                values[position] = others
+                pairs[position, 0], pairs[position, 1] = one, two
     return found
 
 

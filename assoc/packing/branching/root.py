@@ -81,7 +81,7 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
     for _ in range(_ROUNDS):
         if status != OPTIMAL or is_over(deadline):
             break
-        tight = basis.slack_place[rows:] < 0
+        tight = basis.slack_position[rows:] < 0
         new = odd_sets(packing.arrays.cols, basis, rows)[: max(int(_CUTS * rows) - int(tight.sum()), 0)]
         if not len(new) or in_vain >= _IN_VAIN:
             break

@@ -13,7 +13,7 @@ from assoc._system.compiled import inner_njit
 
 
 @inner_njit
-def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
+def position_of_smallest(bits: NDArray[np.int64], count: int) -> int:
     """Index of the smallest of the first ``count`` numbers, given as their bits; ``count`` if that is 0."""
     least = np.int64(2**63 - 1)
     for a in range(count):
@@ -25,7 +25,7 @@ def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
 
 
 @inner_njit
-def place_of_largest(bits: NDArray[np.int64], count: int) -> int:
+def position_of_largest(bits: NDArray[np.int64], count: int) -> int:
     """Index of the largest of the first ``count`` numbers, given as their bits; -1 if all are 0."""
     most = np.int64(0)
     for a in range(count):

@@ -36,9 +36,9 @@ class Basis(NamedTuple):
     """Variable at each position: column j as j, the slack of row r as n + r, its anchor as n + m + r, (m,)."""
     free: NDArray[np.bool_]
     """Whether the variable at each position may be above 0 (dual.py: `note_free`), (m,)."""
-    place: NDArray[np.int32]
+    position: NDArray[np.int32]
     """Position of each column, (n,); -1 if not in the basis."""
-    slack_place: NDArray[np.int32]
+    slack_position: NDArray[np.int32]
     """The same of each slack, (m,)."""
     inverse: NDArray[np.float64]
     """The inverse, transposed: row r has the coordinates of the r-th unit vector, by position, (m, m)."""
@@ -77,7 +77,7 @@ def basis_without(program: Program, columns: int) -> Basis:
 
 def copy_basis(source: Basis, target: Basis) -> None:
     """Make ``target`` the same basis as ``source``."""
-    for name in ("variable", "place", "slack_place", "inverse", "norms", "values", "duals", "anchors", "age"):
+    for name in ("variable", "position", "slack_position", "inverse", "norms", "values", "duals", "anchors", "age"):
         getattr(target, name)[:] = getattr(source, name)
 
 
@@ -85,8 +85,8 @@ def copy_basis(source: Basis, target: Basis) -> None:
 def copy_without_inverse(source: Basis, target: Basis) -> None:
     """Copy the variables of ``source``, their values, the edge weights and the multipliers to ``target``."""
     copy_to(target.variable, source.variable)
-    copy_to(target.place, source.place)
-    copy_to(target.slack_place, source.slack_place)
+    copy_to(target.position, source.position)
+    copy_to(target.slack_position, source.slack_position)
     copy_to(target.norms, source.norms)
     copy_to(target.values, source.values)
     copy_to(target.duals, source.duals)
@@ -96,15 +96,15 @@ def copy_without_inverse(source: Basis, target: Basis) -> None:
 def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: Basis) -> None:
     """Make ``basis`` the one of slacks and anchors with these multipliers."""
     num, size = program.weights.size, program.sides.size
-    basis.place[:] = -1
-    basis.slack_place[:] = -1
+    basis.position[:] = -1
+    basis.slack_position[:] = -1
     basis.inverse[:] = 0.0
     for r in range(size):
         basis.inverse[r, r] = 1.0
         basis.anchors[r] = duals[r]
         if allowed.slack[r] and duals[r] == 0.0:
             basis.variable[r] = num + r
-            basis.slack_place[r] = r
+            basis.slack_position[r] = r
         else:
             basis.variable[r] = num + size + r
     basis.age[:] = 0
@@ -140,14 +140,14 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
                 sums[i] += f * entry
                 inverse[r, i] = entry - change * column[i]
             inverse[r, p] = change
-    own = norms[p]
+    leaving_norm = norms[p]
     step = values[p] / pivot
     for i in range(size):
         if column[i] != 0.0:
             ratio = column[i] / pivot
             # rounding must not make it less than the part that is added
-            least = 1e-4 + 1e-3 * ratio * ratio * own
-            norm = norms[i] - 2.0 * ratio * sums[i] + ratio * ratio * own
+            least = 1e-4 + 1e-3 * ratio * ratio * leaving_norm
+            norm = norms[i] - 2.0 * ratio * sums[i] + ratio * ratio * leaving_norm
             norms[i] = norm if norm > least else least
             if not norms[i] < _LONG:
                 # rounding spoils updates of norms this large; and a variable with a NaN norm would never leave
@@ -155,7 +155,7 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
                 for r in range(size):
                     norms[i] += inverse[r, i] * inverse[r, i]
             values[i] -= step * column[i]
-    norms[p] = max(own / (pivot * pivot), 1e-4)
+    norms[p] = max(leaving_norm / (pivot * pivot), 1e-4)
     values[p] = step
     basis.age[0] += 1
 
@@ -166,15 +166,15 @@ def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
     num, size = program.weights.size, program.sides.size
     old = basis.variable[p]
     if old < num:
-        basis.place[old] = -1
+        basis.position[old] = -1
     elif old < num + size:
-        basis.slack_place[old - num] = -1
+        basis.slack_position[old - num] = -1
     basis.variable[p] = variable
     basis.free[p] = True
     if variable < num:
-        basis.place[variable] = p
+        basis.position[variable] = p
     elif variable < num + size:
-        basis.slack_place[variable - num] = p
+        basis.slack_position[variable - num] = p
 
 
 @njit
@@ -187,8 +187,8 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
     inverse, row, column = basis.inverse, basis.row, basis.column
     members = basis.variable.copy()
     old = basis.duals.copy()
-    basis.place[:] = -1
-    basis.slack_place[:] = -1
+    basis.position[:] = -1
+    basis.slack_position[:] = -1
     inverse[:] = 0.0
     taken = np.zeros(size, np.bool_)
     # rows without a unit vector in the basis get a column
@@ -201,7 +201,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
             taken[r] = True
             basis.variable[r] = code
             if code < num + size:
-                basis.slack_place[r] = r
+                basis.slack_position[r] = r
     # columns of few open rows first: they leave the inverse sparse
     count = 0
     order = np.empty(size, np.int32)
@@ -228,7 +228,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
             continue
         taken[p] = True
         basis.variable[p] = j
-        basis.place[j] = p
+        basis.position[j] = p
         for r in range(size):
             row[r] = inverse[r, p]
         for r in range(size):

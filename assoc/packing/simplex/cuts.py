@@ -138,7 +138,7 @@ def _by_row(cols: Ints, members: Ints, num_rows: int) -> Any:
 @inner_njit
 def _keep(sets: NDArray[np.bool_], scores: Floats, kept: int, new: NDArray[np.bool_], score: float) -> int:
     """Insert a set in order of f, unless it shares too many rows with a better one; return the number kept."""
-    place = kept
+    position = kept
     for i in range(kept):
         common, size, other = 0, 0, 0
         for r in range(new.size):
@@ -153,24 +153,24 @@ def _keep(sets: NDArray[np.bool_], scores: Floats, kept: int, new: NDArray[np.bo
                 copy_to(sets[k], sets[k + 1])
                 scores[k] = scores[k + 1]
             return _keep_at(sets, scores, kept - 1, new, score)
-    return _keep_at(sets, scores, place, new, score)
+    return _keep_at(sets, scores, position, new, score)
 
 
 @inner_njit
 def _keep_at(sets: NDArray[np.bool_], scores: Floats, kept: int, new: NDArray[np.bool_], score: float) -> int:
-    place = kept
+    position = kept
     if kept == scores.size:
         if score >= scores[kept - 1]:
             return kept
-        place = kept - 1
+        position = kept - 1
     else:
         kept += 1
-    while place > 0 and scores[place - 1] > score:
-        copy_to(sets[place], sets[place - 1])
-        scores[place] = scores[place - 1]
-        place -= 1
-    copy_to(sets[place], new)
-    scores[place] = score
+    while position > 0 and scores[position - 1] > score:
+        copy_to(sets[position], sets[position - 1])
+        scores[position] = scores[position - 1]
+        position -= 1
+    copy_to(sets[position], new)
+    scores[position] = score
     return kept
 
 
@@ -191,13 +191,13 @@ def _entries(cols: Ints, num_rows: int, sets: NDArray[np.bool_]) -> Any:
     for count in range(2):
         if count:
             rows = np.empty(start[num], np.int32)
-        place = 0
+        position = 0
         for j in range(num):
             for s in range(num_sensors):
                 if cols[j, s] >= 0:
                     if count:
-                        rows[place] = cols[j, s]
-                    place += 1
+                        rows[position] = cols[j, s]
+                    position += 1
             for c in range(len(sets)):
                 uses = 0
                 for s in range(num_sensors):
@@ -205,9 +205,9 @@ def _entries(cols: Ints, num_rows: int, sets: NDArray[np.bool_]) -> Any:
                         uses += 1
                 for _ in range(uses // 2):
                     if count:
-                        rows[place] = num_rows + c
-                    place += 1
-            start[j + 1] = place
+                        rows[position] = num_rows + c
+                    position += 1
+            start[j + 1] = position
     sides = np.ones(num_rows + len(sets))
     for c in range(len(sets)):
         size = 0

@@ -20,7 +20,7 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.extremes import place_of_largest, place_of_smallest
+from assoc.packing.kernels.extremes import position_of_largest, position_of_smallest
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
     Basis,
@@ -105,13 +105,13 @@ def leaving(basis: Basis) -> int:
         # variables outside their limits must be found even if rounding has spoilt the norms
         score = score if score > 0.0 else np.inf
         scores[i] = 0.0 if inside else score
-    return int(place_of_largest(basis.pricing.bits, values.size))
+    return int(position_of_largest(basis.pricing.bits, values.size))
 
 
 @inner_njit
 def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
     """Fill ``entries`` with the tableau row and ``reduced`` with the slacks' reduced costs; return their number."""
-    row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
+    row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_position, allowed.slack, basis.pricing
     entries, reduced, count = pricing.entries, pricing.reduced, pricing.listed[0]
     sum_rows(row, sign, pricing, entries)
     for r in range(row.size):
@@ -151,14 +151,14 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     listed = pricing.listed[0]
     count = _fill_entries(allowed, basis, sign)
     _fill_ratios(pricing, count, tolerance)
-    first = place_of_smallest(pricing.bits, count)
+    first = position_of_smallest(pricing.bits, count)
     chosen, step = -1, 0.0
     if first < count and pricing.ratios[first] < np.inf:
         _fill_pivots(pricing, count, pricing.ratios[first])
-        place = place_of_largest(pricing.bits, count)
-        if place >= 0:
-            step = max(pricing.reduced[place], 0.0) / pricing.entries[place]
-            chosen = pricing.column[place] if place < listed else program.weights.size + place - listed
+        position = position_of_largest(pricing.bits, count)
+        if position >= 0:
+            step = max(pricing.reduced[position], 0.0) / pricing.entries[position]
+            chosen = pricing.column[position] if position < listed else program.weights.size + position - listed
     return chosen, step
 
 
@@ -240,7 +240,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
 @inner_njit
 def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
     """List the allowed columns and price them; if the multipliers are not feasible, start from others."""
-    least = price(program, basis.duals, basis.place, basis.pricing)
+    least = price(program, basis.duals, basis.position, basis.pricing)
     for r in range(basis.duals.size):
         if allowed.slack[r]:
             least = min(least, -basis.duals[r])
@@ -248,5 +248,5 @@ def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float
         duals = basis.duals.copy()
         make_feasible(program, allowed, duals)
         begin_from_duals(program, allowed, duals, basis)
-        price(program, basis.duals, basis.place, basis.pricing)
+        price(program, basis.duals, basis.position, basis.pricing)
     note_free(program, allowed, basis)

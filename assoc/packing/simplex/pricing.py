@@ -67,19 +67,19 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
         j = active[a]
         columns[a] = j
         positions[j] = a
-        place = start[j]
+        position = start[j]
         end = start[j + 1]
         for s in range(width):
-            if place < end:
-                codes[s, a] = rows[place]
-                place += 1
+            if position < end:
+                codes[s, a] = rows[position]
+                position += 1
             else:
                 codes[s, a] = none
-        while place < end:
+        while position < end:
             extra_position[extra] = a
-            extra_row[extra] = rows[place]
+            extra_row[extra] = rows[position]
             extra += 1
-            place += 1
+            position += 1
     pricing.listed[0] = active.size
     pricing.listed[1] = extra
 
@@ -102,14 +102,14 @@ def sum_rows(terms: Floats, factor: float, pricing: Pricing, sums: Floats) -> No
 
 
 @inner_njit
-def price(program: Program, duals: Floats, place: NDArray[np.int32], pricing: Pricing) -> float:
+def price(program: Program, duals: Floats, position: NDArray[np.int32], pricing: Pricing) -> float:
     """Compute the reduced costs of the listed columns; return the least outside the basis."""
     reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]
     sum_rows(duals, 1.0, pricing, reduced)
     least = 0.0
     for a in range(count):
         j = column[a]
-        if place[j] >= 0:
+        if position[j] >= 0:
             reduced[a] = np.inf
         else:
             reduced[a] = weights[j] - reduced[a]

@@ -73,7 +73,7 @@ def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) 
     """Record the basis from which trials start, and what it allows."""
     pricing = trial.basis.pricing
     list_columns(program, allowed, pricing)
-    price(program, base.duals, base.place, pricing)
+    price(program, base.duals, base.position, pricing)
     for a in range(allowed.active.size):
         trial.reduced[a] = pricing.reduced[a]
     for i in range(trial.rows.shape[0]):
@@ -93,20 +93,20 @@ def _tableau_row(trial: Trial, done: int, p: int) -> None:
         total = 0.0
         for i in range(count):
             total += factors[shares[i]] * etas[k, shares[i]]
-        place = pivots[k]
-        factors[place] = total
+        position = pivots[k]
+        factors[position] = total
         known = False
         for i in range(count):
-            known = known or shares[i] == place
+            known = known or shares[i] == position
         if not known:
-            shares[count] = place
+            shares[count] = position
             count += 1
     row[:] = 0.0
     for i in range(count):
-        place, share = shares[i], factors[shares[i]]
+        position, share = shares[i], factors[shares[i]]
         for r in range(row.size):
-            row[r] += share * rows[place, r]
-        factors[place] = 0.0
+            row[r] += share * rows[position, r]
+        factors[position] = 0.0
 
 
 @inner_njit
@@ -118,10 +118,10 @@ def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, vari
     else:
         copy_to(column, base.inverse[variable - num])
     for k in range(done):
-        place = pivots[k]
-        share = column[place]
+        position = pivots[k]
+        share = column[position]
         if share != 0.0:
-            column[place] = 0.0
+            column[position] = 0.0
             for i in range(column.size):
                 column[i] += share * etas[k, i]
 
@@ -132,17 +132,17 @@ def _exchange(trial: Trial, done: int, p: int) -> None:
     basis, etas = trial.basis, trial.etas
     column, values, norms = basis.column, basis.values, basis.norms
     pivot = column[p]
-    own = norms[p]
+    leaving_norm = norms[p]
     step = values[p] / pivot
     for i in range(column.size):
         ratio = column[i] / pivot
         etas[done, i] = -ratio
         values[i] -= step * column[i]
-        norms[i] = max(norms[i], ratio * ratio * own)
+        norms[i] = max(norms[i], ratio * ratio * leaving_norm)
     etas[done, p] = 1.0 / pivot
     trial.pivots[done] = p
     values[p] = step
-    norms[p] = max(own / (pivot * pivot), _LEAST)
+    norms[p] = max(leaving_norm / (pivot * pivot), _LEAST)
 
 
 @inner_njit
