@@ -1,11 +1,16 @@
-"""Plain readings of the trackers' scores: enumeration with a numpy Kalman filter, nothing shared with them."""
+"""Plain readings of the trackers' scores: enumeration with a numpy Kalman filter, nothing shared with them.
+
+Trackers that are compared with them are made by `tracker_of`.
+"""
 
 import itertools
 import math
 
 import numpy as np
 
+from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.sensors import PositionSensor
+from assoc.tracking import Initiation
 
 Q_SIGMA, SPEED, BIRTH = 2.0, 30.0, 0.3
 REGION = np.array([[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]])
@@ -19,6 +24,15 @@ def sensor(P=0.8, rate=2.0, sigma=10.0, view=REGION):
         false_alarm_rate=rate,
         field_of_view=view,
     )
+
+
+INITIATION = Initiation(speed=SPEED, birth_rate=BIRTH, widest=1.0)
+
+
+def tracker_of(kind, sensors, **options):
+    """A tracker of the motion of `predict` whose gates leave out nothing."""
+    motion = ConstantVelocity(Q_SIGMA, kind="continuous")
+    return kind(sensors, KalmanFilter(motion), **{"region": REGION, "gate_probability": 1 - 1e-12, **options})
 
 
 def predict(mean, cov, dt, q=Q_SIGMA):

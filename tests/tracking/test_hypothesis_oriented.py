@@ -21,15 +21,8 @@ def enumerated(seed):
 
 def tracker(**options):
     options = {"max_hypotheses": 5000, "depth": 8, "hypothesis_drop": 1e6, **options}
-    return HypothesisOrientedMHT(
-        [plain.sensor()],
-        KalmanFilter(ConstantVelocity(plain.Q_SIGMA, kind="continuous")),
-        region=plain.REGION,
-        life_cycle=LifeCycle(missed_probability=1e-12),
-        initiation=Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
-        gate_probability=1 - 1e-12,
-        **options,
-    )
+    options |= {"life_cycle": LifeCycle(missed_probability=1e-12), "initiation": plain.INITIATION}
+    return plain.tracker_of(HypothesisOrientedMHT, [plain.sensor()], **options)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

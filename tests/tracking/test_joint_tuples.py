@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from assoc import InvalidInputError, filters
+from assoc import InvalidInputError
 from assoc.filters import Gaussian
 from assoc.simulation import simulate
 from assoc.tracking import Initiation, JointProbabilisticTracker
@@ -19,11 +19,7 @@ SCORE = 1.5
 
 
 def tracker_of(**options):
-    motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
-    return JointProbabilisticTracker(
-        SENSORS, filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12,
-        all_sensors=True, **options,
-    )  # fmt: skip
+    return plain.tracker_of(JointProbabilisticTracker, SENSORS, all_sensors=True, **options)
 
 
 def close_targets(seed, count=3):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError
-from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
-from assoc.tracking import Initiation, LifeCycle, TrackOrientedMHT
+from assoc.tracking import LifeCycle, TrackOrientedMHT
 from tests.tracking import plain
 
 ALL = 1 - 1e-12
@@ -21,16 +20,9 @@ def best_of(seed):
 
 
 def tracker(depth=3, **options):
-    options = {
-        "life_cycle": LifeCycle(missed_probability=1e-9),
-        "initiation": Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
-        "gate_probability": ALL,
-        "max_branches": 10_000,
-        "branch_drop": 1e6,
-        **options,
-    }
-    motion = ConstantVelocity(plain.Q_SIGMA, kind="continuous")
-    return TrackOrientedMHT([plain.sensor()], KalmanFilter(motion), region=plain.REGION, depth=depth, **options)
+    options = {"initiation": plain.INITIATION, "max_branches": 10_000, "branch_drop": 1e6, **options}
+    options = {"life_cycle": LifeCycle(missed_probability=1e-9), **options}
+    return plain.tracker_of(TrackOrientedMHT, [plain.sensor()], depth=depth, **options)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
