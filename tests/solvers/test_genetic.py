@@ -7,7 +7,7 @@ import pytest
 
 import assoc
 from assoc.solvers.genetic.parameters import GeneticParameters
-from assoc.solvers.genetic.population import Breeding, _cross
+from assoc.solvers.genetic.population import Breeding
 from tests.solvers.pieces import (
     columns_of,
     component,
@@ -59,25 +59,6 @@ def reference_filling(one, child, scale, rng):
             child = [*child, j]
             taken |= rows
     return sorted(child)
-
-
-@pytest.mark.parametrize("name", PROBLEMS)
-def test_crossover(name):
-    one = component(PROBLEMS[name])
-    ones = np.ones(one.packing.num_columns), np.ones(one.packing.num_rows)
-    different = 0
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        scale = temperature(one, np.inf) * (0.1, 1.0, 30.0)[seed % 3]
-        parents = reference_walk(one, *ones, 1.0, 1.0, 10.0 * scale, 2, rng)
-        covers = [cover_of(one.packing, columns) for columns in parents]
-        child = _cross(one.arrays, one.reduced, *covers, scale, np.random.default_rng(seed))
-        expected = reference_child(one, *parents, scale, np.random.default_rng(seed))
-        assert columns_of(child) == expected
-        np.testing.assert_array_equal(child, cover_of(one.packing, expected))
-        assert {*parents[0]} & {*parents[1]} <= {*expected} <= {*parents[0]} | {*parents[1]}
-        different += expected not in parents
-    assert different or name == "ties", "no child was other than its parents"
 
 
 class Reference:

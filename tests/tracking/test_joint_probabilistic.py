@@ -98,10 +98,7 @@ def test_tracks_side_by_side_stay_apart(own_times):
     start = Gaussian(np.hstack([place, [velocity] * 2]), np.array([np.diag([100.0] * 3 + [4.0] * 3)] * 2))
     apart = {"best": [], "all": []}
     for seed, (permutations, gaps) in itertools.product(range(3), apart.items()):
-        rng, tracker = (
-            np.random.default_rng(seed),
-            tracker_of(plain.sensor(), permutations=permutations),
-        )
+        rng, tracker = np.random.default_rng(seed), tracker_of(plain.sensor(), permutations=permutations)
         tracker.begin(0.0, start)
         for k in range(1, 41):
             seen = place[rng.random(2) < 0.9] + k * velocity
