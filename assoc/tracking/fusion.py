@@ -69,13 +69,13 @@ class SystemTracks(NamedTuple):
     def of(tracks: Iterable[Track], motion: Motion) -> SystemTracks:
         """Those of a tracker, whose filter has this motion model."""
         tracks = list(tracks)
-        own = np.concatenate([np.array(motion.position), velocity_components(motion)]).astype(np.int64)
+        components = np.concatenate([np.array(motion.position), velocity_components(motion)]).astype(np.int64)
         axes = len(motion.position)
-        place = np.concatenate([np.arange(axes), 3 + np.arange(len(own) - axes)])
+        kept = np.concatenate([np.arange(axes), 3 + np.arange(len(components) - axes)])
         mean, covariance = open_states(len(tracks))
         for row, track in enumerate(tracks):
-            mean[row, place] = track.mean[own]
-            covariance[row, place[:, None], place] = track.covariance[own[:, None], own]
+            mean[row, kept] = track.mean[components]
+            covariance[row, kept[:, None], kept] = track.covariance[components[:, None], components]
         ids, existence = [track.track_id for track in tracks], [track.existence for track in tracks]
         return SystemTracks(np.array(ids, dtype=np.int64), mean, covariance, np.array(existence, dtype=np.float64))
 

@@ -156,20 +156,20 @@ class Qualities:
         known = current(settings, before)
         # those that were renamed under their ids in the step
         named = known.track_id.copy()
-        for own, name in (names or {}).items():
-            named[known.track_id == own] = name
+        for track_id, name in (names or {}).items():
+            named[known.track_id == track_id] = name
         order = np.argsort(named, kind="stable")
         in_order = np.append(named[order], -1)
         found: list[tuple[Array, Array, Array]] = []
         stamps = scan.own_times()
         for s, (z, ids, sensor) in enumerate(zip(scan.measurements, step.assigned, settings.sensors, strict=True)):
             # of two under one id the last; -1 stands before the first
-            place = np.searchsorted(in_order[:-1], ids, side="right") - 1
-            number = np.flatnonzero(in_order[place] == ids)
+            index = np.searchsorted(in_order[:-1], ids, side="right") - 1
+            number = np.flatnonzero(in_order[index] == ids)
             # from a platform that moved since the scan began: the prediction would be seen from elsewhere
             if not len(number) or before.time is None or (scan.paths and scan.paths[s] is not None):
                 continue
-            rows = order[place[number]]
+            rows = order[index[number]]
             states = predict_each(settings.filter, known.states[rows], stamps[s][number] - before.time)
             expected = settings.filter.expected(states, sensor)
             off = sensor.residual(z[number], expected.mean)

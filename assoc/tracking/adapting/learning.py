@@ -96,9 +96,9 @@ def _rows(progress: Progress, ids: Array) -> Array:
     assert progress.step is not None
     rows = np.zeros((len(ids), len(progress.settings.sensors)), dtype=np.int64)
     for s, taken in enumerate(progress.step.assigned):
-        place = np.minimum(np.searchsorted(ids, taken), len(ids) - 1)
-        known = np.flatnonzero(ids[place] == taken)
-        rows[place[known], s] = known + 1
+        index = np.minimum(np.searchsorted(ids, taken), len(ids) - 1)
+        known = np.flatnonzero(ids[index] == taken)
+        rows[index[known], s] = known + 1
     return rows
 
 
@@ -145,10 +145,10 @@ def _residuals(
         if times is not None and len(track):
             # not before the tracks' last measurement
             at = predict_each(settings.filter, tracks.states[fresh[track]], times[s][number] - progress.state.time)
-        place = np.zeros((len(track), 3))
+        position = np.zeros((len(track), 3))
         if len(track):
-            place[:, : len(axes)] = at.mean[:, axes]
-        seen.append(Seen(track, z[number], place))
+            position[:, : len(axes)] = at.mean[:, axes]
+        seen.append(Seen(track, z[number], position))
     declared = progress.work.settings.sensors
     return variances(declared, seen, _predicted(states, axes), estimates.used[:, 0])
 

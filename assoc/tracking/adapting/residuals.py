@@ -63,11 +63,11 @@ def variances(
     # linearised at the prediction, then at the position that all measurements give
     for _ in range(2):
         rows, information, vectors = [], np.zeros((S, T, n, n)), np.zeros((S, T, n))
-        for s, (part, white, (track, z, place)) in enumerate(zip(parts, whites, seen, strict=True)):
-            place = place + shift[track]
-            H = white @ part.jacobian(place)[:, :, :n]
+        for s, (part, white, (track, z, position)) in enumerate(zip(parts, whites, seen, strict=True)):
+            position = position + shift[track]
+            H = white @ part.jacobian(position)[:, :, :n]
             # relative to the prediction
-            y = part.residual(np.ascontiguousarray(z[:, : part.dim]), part.measure(place)) @ white.T
+            y = part.residual(np.ascontiguousarray(z[:, : part.dim]), part.measure(position)) @ white.T
             y = y + _times(H, shift[track][:, :n])
             information[s, track] = H.transpose(0, 2, 1) @ H / noise[s]
             vectors[s, track] = _times(H.transpose(0, 2, 1), y) / noise[s]

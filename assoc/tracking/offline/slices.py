@@ -100,7 +100,7 @@ class TrackSlice:
 
     def _tracked(self, part: Slice) -> SliceTracks:
         self._tracker.state = self._first
-        tables = {own: TrackTable(self._origin) for own in (True, False)}
+        tables = {inside: TrackTable(self._origin) for inside in (True, False)}
         done: list[Followed] = []
         for number, followed in enumerate(follow(self._tracker, part.windows)):
             done.append(followed)
