@@ -197,6 +197,7 @@ def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
     """Turns and sensors come from it; plots with heights and without are one radar; the page tells how tracks are."""
     file, out, shown = described(tmp_path), tmp_path / "tracks.csv", []
 
+    # what the page is given: a browser would be too late for a replay at once
     def show(page, picture, heard, counts):
         shown.append(
             (picture, heard, [page._row(one, picture.agreements[one.track_id], heard) for one in picture.tracks])

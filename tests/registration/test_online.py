@@ -125,6 +125,7 @@ def test_biases_of_other_sensors_are_refused():
 
 
 def test_numbers_out_of_range_are_told(monkeypatch):
+    """The matrix is said to be singular: no measurements are known that make it so to the last digit."""
     scene = biased_scene(scans=1)
     tracker = MultiSensorTracker.for_scene(scene, registration="online")
 

@@ -23,7 +23,7 @@ def test_a_scene_that_is_one_component_is_proved():
 
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_large_component_is_proved_without_its_linear_program(seed, monkeypatch):
-    """Its inverses would take 600 MB."""
+    """Its inverses would take 600 MB. Memory is said to be short: the system is not asked for what small parts take."""
     monkeypatch.setattr(memory, "fits", lambda needed: needed < 20e6)
     answer = assoc.assign(wide_gates(1200, seed), nodes=200)
     assert answer.status == "optimal"
