@@ -22,7 +22,7 @@ from assoc.ranking.block_prices import LIGHTEST, ROUNDING
 from assoc.ranking.clusters import cluster_problems, distinct
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.estimates.sampler import estimates
-from assoc.ranking.estimates.swept import swept
+from assoc.ranking.estimates.swept import of_tuples, swept
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.pairs.windows import window_bounds
 from assoc.ranking.partition_function import log_partition
@@ -325,7 +325,7 @@ def _estimated(columns: AllColumns, starts: list[Array], num: int, run: Run) -> 
     """Estimates of a cluster's tuples, and how far they may be off: by sweeps, or by chains from solutions."""
     found = swept(columns, run.deadline(_FOR_SWEEPS))
     if found is not None:
-        share = _of_tuples(columns, found, num)
+        share = of_tuples(columns, found, num)
         return share[0], np.abs(share[0] - share[1])
     return _sampled(columns, starts, num, run) if run.remaining() > _ENTRY * columns.rows.size else None
 
@@ -337,19 +337,8 @@ def _sampled(columns: AllColumns, starts: list[Array], num: int, run: Run) -> tu
     found = estimates(columns, [column[start][column[start] >= 0] for start in starts], run)
     if found is None:
         return None
-    share = _of_tuples(columns, found, num)
+    share = of_tuples(columns, found, num)
     return share.mean(axis=0), share.std(axis=0, ddof=1) / np.sqrt(len(share))
-
-
-def _of_tuples(columns: AllColumns, found: Floats, num: int) -> Floats:
-    """Probabilities of tuples (C, num), singletons among them, from those of columns (C, N)."""
-    share = np.zeros((len(found), num))
-    share[:, columns.origin] = found
-    if columns.single.size:
-        share[:, columns.single] = 1.0
-        column, sensor = np.nonzero(columns.rows >= 0)
-        np.subtract.at(share.T, columns.single[columns.rows[column, sensor]], found.T[column])
-    return share
 
 
 def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, rest: float, run: Run) -> float:

@@ -148,6 +148,18 @@ def test_targets_are_found_and_followed():
     assert len(places) <= len(truth) + 1
 
 
+def test_clusters_too_wide_for_exact_sums_are_followed_as_well():
+    """Sums over clusters of more than three open measurements are swept with the heaviest states."""
+    scene, found = simulate("crowd", 7, targets=24, scans=6), []
+    for events in (2**20, 8):
+        tracker = JointProbabilisticTracker.for_scene(scene, all_sensors=True, max_events=events)
+        found.append(through(tracker, scene).confirmed)
+    for (ids, places), (other_ids, other_places) in zip(*found, strict=True):
+        assert ids.tolist() == other_ids.tolist()
+        assert np.abs(places - other_places).max(initial=0.0) < 5.0
+    assert len(found[0][-1][0]) > 15
+
+
 def test_all_sensors_is_checked():
     with pytest.raises(InvalidInputError, match="all_sensors must be True or False"):
         JointProbabilisticTracker(SENSORS, all_sensors="yes")

@@ -2,8 +2,9 @@
 
 A joint event is a set of tuples, each of a track and a measurement or none of every sensor, without common members; all
 other measurements are false alarms. Its weight is the product of those of its tuples (`existence_gain`). The events are
-summed as `assoc.marginals` does: exactly where clusters are narrow, else with bounds that hold. Each track is merged of
-its states by each tuple. Measurements that probably belong to no track start new ones, as in the multi-sensor tracker.
+summed as `assoc.marginals` does: exactly where clusters are narrow, else with bounds that hold, and estimates. Each
+track is merged of its states by each tuple. Measurements that probably belong to no track start new ones, as in the
+multi-sensor tracker.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from assoc.costs.tracks.tuples import corrected, grow_track_tuples
 from assoc.filters.merging import merged
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
+from assoc.ranking.estimates.swept import swept_where
 from assoc.ranking.marginals import without_listing
 from assoc.ranking.pairs.tuple_permutations import without_tuple_permutations
 from assoc.tracking.associate.all_sensors import begin, begin_in_order
@@ -35,6 +37,8 @@ _SURE = 30.0
 """Scores are clipped here, as those of the tracker that takes sensor by sensor."""
 _COUNTS = 1e-5
 """Share below which a tuple does not count in a track's state."""
+_WIDE, _STATES = 0.1, 0.125
+"""Where intervals are wider than this, probabilities are swept, with this share of the states."""
 _FREE = 0.5
 """A measurement with a lower probability to be a track's may start one."""
 _New = tuple[TrackBatch, Array]
@@ -139,6 +143,9 @@ def _summed(track: Array, rows: Array, value: Array, sizes: Array, max_events: i
     widest = int(max_events).bit_length() - 1
     found = without_listing(problem, np.arange(problem.num_tuples), problem.num_tuples, Run(0), widest, True)
     assert found is not None  # there is no time limit
+    wide = found[2] - found[1] > _WIDE
+    if wide.any():
+        found[0] = np.clip(swept_where(problem, wide, found[0], _STATES), found[1], found[2])
     return found[:, : len(track)]
 
 
