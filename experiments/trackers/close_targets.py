@@ -14,14 +14,15 @@ from functools import partial
 from experiments.common.claims import Claim
 from experiments.common.command import add_only, add_seeds, main
 from experiments.trackers.close_scenes import SCANS, SETTINGS, simulate
-from experiments.trackers.judging import NAMES, claims_of, goal, judge, means
+from experiments.trackers.judging import AT_ONCE, NAMES, claims_of, goal, judge, means
 
 SEEDS, FIRST = 20, 200
+TRIED = (*NAMES, AT_ONCE)
 CLEARLY_BETTER = ("formations, unequal radars, P_d 0.6", "crossings", "crossings, P_d 0.6")
 """Where the MHT should win: low P_d, and crossings."""
 
 
-def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES) -> list[Claim]:
+def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = TRIED) -> list[Claim]:
     """Trackers of these names on all scenes."""
     claims: list[Claim] = []
     for label, setting in list(SETTINGS.items())[: 2 if quick else None]:
@@ -38,8 +39,8 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
 
 program = partial(
     main, "trackers.close_targets",
-    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
-    options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=NAMES)),
+    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or TRIED), __doc__,
+    options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=TRIED)),
     said=" {seeds} scenes of each kind.", seed=FIRST,
 )  # fmt: skip
 

@@ -17,6 +17,7 @@ from experiments.trackers.running import through
 CUTOFF = 500.0
 """Of GOSPA (order 2), OSPA(2) and HOTA, metres."""
 NAMES = ("oracle", *TRACKERS, "GNN")
+AT_ONCE = "joint-probabilistic, all sensors"
 GOAL = "goal chosen by us"
 
 
@@ -40,6 +41,8 @@ def make(name: str, scene: Scene) -> Tracker:
         return OracleTracker(scene)
     if name == "GNN":
         return TRACKERS["nearest-neighbour"].for_scene(scene, rule="assignment")
+    if name == AT_ONCE:
+        return TRACKERS["joint-probabilistic"].for_scene(scene, all_sensors=True)
     return TRACKERS[name].for_scene(scene)
 
 
