@@ -160,10 +160,12 @@ def _swept(rows: _Rows, most: int, deadline: float, probability: Floats) -> floa
     )  # fmt: skip
     states.weight[0, 0] = 1.0
     table = _Table(np.full(_size(room), -1), np.empty((room, words), np.uint64), np.empty(room))
+    dropped = 0.0
     for t in range(count):
         if is_over(deadline) or not _keep(states, t + 1, table, _followed(rows, states, t, table)):
             return np.nan
-    return states.dropped.sum() / count if _completed(rows, states, table, deadline, probability) else np.nan
+        dropped += states.dropped[t + 1]
+    return dropped / count if _completed(rows, states, table, deadline, probability) else np.nan
 
 
 @inner_njit
@@ -254,10 +256,11 @@ def _add(entries: Ints, covered: Words, weights: Floats, key: Words, weight: flo
 @njit
 def _keep(states: _States, t: int, table: _Table, count: int) -> bool:
     """Keep the heaviest of these states; False if none has a weight."""
-    most, top, least, kept, share = states.weight.shape[1], 0.0, 0.0, 0, 0.0
+    most, top, least, kept, total, share = states.weight.shape[1], 0.0, 0.0, 0, 0.0, 0.0
     weight = table.weight[:count]
     for i in range(count):
         top = max(top, weight[i])
+        total += weight[i]
     if not 0.0 < top < np.inf:
         return False
     if count > most:
@@ -269,7 +272,7 @@ def _keep(states: _States, t: int, table: _Table, count: int) -> bool:
             share += weight[i]
             kept += 1
     states.number[t] = kept
-    states.dropped[t] = 1.0 - share / weight.sum()
+    states.dropped[t] = 1.0 - share / total
     states.least[t] = max(_NEGLIGIBLE * least / top, _LIGHTEST)
     return True
 
