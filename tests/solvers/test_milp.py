@@ -56,8 +56,7 @@ def test_time_limit_returns_best_and_valid_bound(backend):
     # the costs are >= 0 and an optimum of 20 tuples is far below 100 (the average of a random one is 990)
     assert 0.0 <= solution.lower_bound <= 40.0
     assert solution.cost < 200.0
-    # on a fast machine it may come to its end: CP-SAT's to the digits of its whole numbers
-    if solution.status != "optimal" and solution.stopped_by != "converged":
+    if solution.status != "optimal":
         assert solution.stopped_by == "time_limit"
 
 

@@ -94,10 +94,10 @@ def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> An
         stop = StopSignal() if parameters.backend == "cp_sat" else None
         seconds = run.remaining()
         answer = in_time(lambda: _solve(packing, parameters, 0.98 * run.remaining(), run, stop), seconds, "milp", stop)
-    if answer is None:
+    # a backend with no more to say has used up the share of the time that it was given
+    if answer is None or (run.time_limit is not None and not (answer.proven or answer.infeasible)):
         run.stopped_by = run.stopped_by or "time_limit"
-        return Answer(None, -math.inf, False, False, 0)
-    return answer
+    return Answer(None, -math.inf, False, False, 0) if answer is None else answer
 
 
 def _quick(packing: Packing, run: Run) -> NDArray[np.integer] | None:
