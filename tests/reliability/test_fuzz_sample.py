@@ -34,8 +34,6 @@ def test_hundreds_of_spoiled_files(count, made, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-# other tests end processes of this one, the tracker of its resources too
-@pytest.mark.filterwarnings("ignore:resource_tracker")
 def test_bombs_are_refused_before_they_go_off(made, tmp_path):
     room = next(one for one in ROOMS if one.name == "problem.npz")
     for path in bombs(tmp_path, made["problem.npz"][0].read_bytes(), 300_000_000):
