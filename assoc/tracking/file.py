@@ -100,7 +100,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
         **{f"lost.{name}": value for name, value in state.lost.arrays().items()},
         **{f"doubles.{name}": value for name, value in state.doubles._asdict().items()},
-        **settings.method.arrays(state.own),
+        **settings.method.arrays(state.method_state),
     }
     if state.registration is not None:
         found |= state.registration.arrays()
@@ -143,7 +143,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
         clutter=None if model.clutter is None else _clutter(model.clutter, saved.part("clutter.")),
     )  # fmt: skip
-    state = state._replace(own=settings.method.restored(settings, saved, state))
+    state = state._replace(method_state=settings.method.restored(settings, saved, state))
     if settings.nursery is None or model.nursery is None:
         return state
     inner = _state(settings.nursery, model.nursery.state, saved.part("nursery."))
@@ -246,7 +246,7 @@ def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
         "tracker": settings.name,
         "filter": described(settings.filter),
         "sensors": described(settings.sensors),
-        "region": str(settings.place.region.tolist()),
+        "region": str(settings.scene.region.tolist()),
         "solver": f"{settings.solver} {sorted(settings.solver_parameters.items())}",
         "seed": str(settings.seed),
         "life_cycle": repr(settings.life_cycle),

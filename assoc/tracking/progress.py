@@ -33,7 +33,7 @@ class Association(NamedTuple):
     """Tracks after the scan: the old ones, updated, then new ones."""
     assigned: Sequence[Array]
     """Track of each measurement of each sensor, 0 for none, int64 (n_s,)."""
-    own: Any = None
+    method_state: Any = None
     """The method's own part of the state after the scan."""
 
 

@@ -36,7 +36,7 @@ class TrackerSettings:
     name: str
     method: Any
     """How scans are associated, with its own settings; see `assoc.tracking.associate.method`."""
-    place: Scene
+    scene: Scene
     """Sensors and region."""
     filter: Filter[Any]
     solver: str
@@ -89,13 +89,13 @@ class TrackerSettings:
 
     def at(self, time: float) -> TrackerSettings:
         """The settings with the sensors as they stand at a time, seconds; themselves if no platform carries any."""
-        return self.placed(self.place.at(time))
+        return self.with_scene(self.scene.at(time))
 
-    def placed(self, place: Scene) -> TrackerSettings:
+    def with_scene(self, scene: Scene) -> TrackerSettings:
         """The settings with the sensors of another scene; themselves if it is the same."""
-        if place is self.place:
+        if scene is self.scene:
             return self
-        return replace(self, place=place, nursery=None if self.nursery is None else self.nursery.placed(place))
+        return replace(self, scene=scene, nursery=None if self.nursery is None else self.nursery.with_scene(scene))
 
     @cached_property
     def angles_alone(self) -> bool:
@@ -117,13 +117,13 @@ class TrackerSettings:
         motion = self.filter.motion
         if len(motion.position) < 3 or not open_heights(self.sensors):
             return None
-        half = float(np.diff(self.place.region[2])[0]) / 2.0
+        half = float(np.diff(self.scene.region[2])[0]) / 2.0
         return LinearMeasurement(np.eye(motion.dim)[[motion.position[2]]], np.array([[max(half, 1.0) ** 2]]))
 
     @cached_property
     def sensors(self) -> tuple[Sensor, ...]:
         """The sensors."""
-        return tuple(self.place.sensors)
+        return tuple(self.scene.sensors)
 
     @cached_property
     def terms(self) -> ScoreTerms:
@@ -139,4 +139,4 @@ class TrackerSettings:
     def births(self) -> NewTracks:
         """How tracks begin."""
         limits = {"gate_probability": self.gate_probability, "max_tuples": self.max_tuples}
-        return NewTracks(self.place, self.filter, self.initiation, self.terms, limits)
+        return NewTracks(self.scene, self.filter, self.initiation, self.terms, limits)

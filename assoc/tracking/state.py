@@ -28,7 +28,7 @@ class TrackerState(NamedTuple):
     """Tracks; in a multiple hypothesis tracker, the branches."""
     turns: Array
     """Mean number of turns of each sensor in a scan, (S,)."""
-    own: Any
+    method_state: Any
     """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
     lost: TrackBatch
     """Confirmed tracks that ended not long ago; see `assoc.tracking.stages.taking_up`."""

@@ -209,7 +209,7 @@ def within_heights(progress: Progress) -> Progress:
     wide = tracks.states.covariance[:, axis, axis] > height.covariance[0, 0]
     if not wide.any():
         return progress
-    middle = np.full((np.count_nonzero(wide), 1), settings.place.region[2].mean())
+    middle = np.full((np.count_nonzero(wide), 1), settings.scene.region[2].mean())
     known = settings.filter.update(tracks.states[wide], middle, height).state
     order = np.argsort(np.argsort(~wide, kind="stable"))
     return progress.with_state(tracks=tracks.moved(concatenate([known, tracks.states[~wide]])[order]))

@@ -73,7 +73,7 @@ class Tracker:
     adapt : bool
         Whether to estimate noise, detection probabilities, false alarms and manoeuvres while tracking, and to use the
         estimates where they are surely not as declared; see `health`.
-    **own
+    **options
         Settings of this kind of tracker.
 
     Attributes
@@ -117,21 +117,21 @@ class Tracker:
         registration: str | OnlineRegistration | None = None,
         identity: IdentityParameters | None = None,
         adapt: bool = False,
-        **own: Any,
+        **options: Any,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
-        place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
+        scene = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
         online: Any = registration
         if registration == "online":
-            online = OnlineRegistration(tuple(place.sensors), place.region)
+            online = OnlineRegistration(tuple(scene.sensors), scene.region)
         settings = TrackerSettings(
-            name=self.name, method=self.method(**own), place=place, filter=filter or two_speeds(), solver=solver,
+            name=self.name, method=self.method(**options), scene=scene, filter=filter or two_speeds(), solver=solver,
             solver_parameters=dict(solver_parameters or {}), seed=whole_seed(seed),
             time_limit=checked_time_limit(time_limit), life_cycle=LifeCycle() if life_cycle is None else life_cycle,
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
             max_tuples=max_tuples, registration=online, identity=identity, adapt=bool(adapt),
         )  # fmt: skip
-        doubt = settings.initiation.doubt(place.region)
+        doubt = settings.initiation.doubt(scene.region)
         if doubt:
             warn(doubt)
         self.settings = with_nursery(settings)
@@ -239,8 +239,8 @@ class Tracker:
         when, states = checked_time(time, None), self.filter.start(tracks)
         ids = np.arange(1, len(tracks) + 1)
         batch = TrackBatch.new(states, ids, np.full(len(tracks), float(score)), when).with_confirmed(True)
-        own = self.settings.method.begun(self.settings, batch)
-        self.state = self.state._replace(time=when, tracks=batch, own=own, next_id=len(tracks) + 1)
+        begun = self.settings.method.begun(self.settings, batch)
+        self.state = self.state._replace(time=when, tracks=batch, method_state=begun, next_id=len(tracks) + 1)
         return ids
 
     def step(

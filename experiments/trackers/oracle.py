@@ -59,16 +59,16 @@ class Oracle(Method):
     def _true_rows(self, progress: Progress) -> tuple[Array, Array]:
         """Measurements of each track, and of the targets without one."""
         sources = self.sources[progress.scan.index]
-        known = [progress.state.own[i] for i in progress.state.tracks.track_id.tolist()]
+        known = [progress.state.method_state[i] for i in progress.state.tracks.track_id.tolist()]
         fresh = sorted({t for source in sources for t in source.tolist() if t >= 0} - set(known))
         return _rows(sources, known), _rows(sources, fresh)
 
     def _noted(self, progress: Progress, found: Association) -> Association:
         """Take note of which target each track has."""
-        target_of = dict(progress.state.own)
+        target_of = dict(progress.state.method_state)
         for source, ids in zip(self.sources[progress.scan.index], found.assigned, strict=True):
             target_of |= {i: t for i, t in zip(ids.tolist(), source.tolist(), strict=True) if i}
-        return found._replace(own=target_of)
+        return found._replace(method_state=target_of)
 
 
 class OracleTracker(Tracker):

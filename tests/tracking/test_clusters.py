@@ -117,7 +117,7 @@ def in_window(name, score, scan, depth):
 
 def named(own, row):
     """A branch of the tracker in the same words."""
-    history = own.state.own.window.history[row]
+    history = own.state.method_state.window.history[row]
     used = [(own.num_steps - 1 - age, int(m) - 1) for age, m in reversed([*enumerate(history)]) if m]
     return tuple(used), round(float(own.state.tracks.score[row]), 6)
 
@@ -129,24 +129,27 @@ def test_clusters_say_what_hypotheses_about_everything_say(seed, depth):
     for scan, (time, z) in enumerate(meeting(seed)):
         own.step(time, [z])
         whole.step(time, z)
-        assert math.prod(one.holds.shape[0] for one in own.state.own.clusters) == len(whole.hypotheses)
+        assert math.prod(one.holds.shape[0] for one in own.state.method_state.clusters) == len(whole.hypotheses)
         weights = np.array([weight for weight, _ in whole.hypotheses])
         p = np.exp(weights - np.logaddexp.reduce(weights))
         np.testing.assert_allclose(own.probabilities, p, atol=1e-12)
         best = sorted(in_window(name, track[0], scan, depth) for name, track in whole.hypotheses[0][1].items())
-        assert sorted(named(own, row) for row in own.state.own.best) == best
+        assert sorted(named(own, row) for row in own.state.method_state.best) == best
         expected, found = Counter(), Counter()
         for one, (_, tracks) in zip(p, whole.hypotheses, strict=True):
             for name, track in tracks.items():
                 expected[in_window(name, track[0], scan, depth)] += one
-        for one in own.state.own.clusters:
+        for one in own.state.method_state.clusters:
             for row, probability in zip(one.branches, one.probabilities @ one.holds, strict=True):
                 found[named(own, row)] += probability
         assert found.keys() == expected.keys()
         for key, probability in expected.items():
             assert found[key] == pytest.approx(probability, abs=1e-10)
         homes = [
-            i for i, one in enumerate(own.state.own.clusters) for row in one.best if own.state.tracks.confirmed[row]
+            i
+            for i, one in enumerate(own.state.method_state.clusters)
+            for row in one.best
+            if own.state.tracks.confirmed[row]
         ]
         shared.append(len(homes) - len(set(homes)))
     # two of the three confirmed tracks were in one cluster, and fell apart again

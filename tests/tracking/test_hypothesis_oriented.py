@@ -75,7 +75,7 @@ def test_equation_2_1():
 
 
 def said_of_the_last_scan(own, rows):
-    ids, before = own.state.tracks.track_id[rows], own.state.own.window.history[rows, 1]
+    ids, before = own.state.tracks.track_id[rows], own.state.method_state.window.history[rows, 1]
     return {(track, m) for track, m in zip(ids.tolist(), before.tolist(), strict=True) if m}
 
 
@@ -85,7 +85,7 @@ def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
     final = []
     for time, z in zip(times, scans, strict=True):
         final += own.step(time, [z]).final
-        for one in own.state.own.clusters:
+        for one in own.state.method_state.clusters:
             # every hypothesis agrees with the best on the scan before
             said = [said_of_the_last_scan(own, one.branches[held]) for held in one.holds]
             assert all(other == said[0] for other in said)

@@ -1,7 +1,5 @@
 """Plots one by one: the tracks of a scene, and what comes of clocks that jump, silence, repetition, strangers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter
@@ -466,16 +464,16 @@ def test_own_positions_that_cannot_be_are_left_out():
         for row in own_positions(ship, 9.0):
             tracker.take_own_position("ship", *row)
         tracker.take_own_position("ship", *bad)
-        (path,) = tracker.state.own.paths.values()
+        (path,) = tracker.state.own_positions.paths.values()
         assert len(told) == 1 and line in told[0] and path.poses[-1].time == 9.0
         assert tracker.counts["own positions"] == 1
     # what the next position confirms was none; and a clock that goes back starts anew
     tracker.take_own_position("ship", 10.0, [9e3, 0, 0], 0.5)
     tracker.take_own_position("ship", 11.0, [9e3, 10, 0], 0.5)
-    (path,) = tracker.state.own.paths.values()
+    (path,) = tracker.state.own_positions.paths.values()
     assert [pose.time for pose in path.poses] == [10.0, 11.0]
     tracker.take_own_position("ship", -100.0, [0.0, 0, 0], 0.5)
-    assert [pose.time for pose in tracker.state.own.paths[0].poses] == [-100.0]
+    assert [pose.time for pose in tracker.state.own_positions.paths[0].poses] == [-100.0]
     tracker, told = live(replace(scene, sensors=[replace(scene.sensors[0], platform=None)]), turns=None)
     tracker.take_own_position("ship", 1.0, [0.0, 0, 0], 0.5)
     tracker.take_own_position("boat", 1.0, [0.0, 0, 0], 0.5)

@@ -1,7 +1,5 @@
 """A tracker that a user writes: one method, and everything else is there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -72,10 +70,10 @@ def test_a_method_of_a_users_own_is_a_tracker(tmp_path):
         assert step.assigned[0].tolist() == [1] and step.final[0].scan == k - 1
     (track,) = tracker.tracks
     assert track.hits == 4 and track.position[0] == np.clip(track.position[0], 390.0, 410.0)
-    assert tracker.state.own.away[0] < 6.0
+    assert tracker.state.method_state.away[0] < 6.0
     tracker.save(tmp_path / "own.npz")
     again.restore(tmp_path / "own.npz")
-    assert again.state.own.away.tolist() == tracker.state.own.away.tolist()
+    assert again.state.method_state.away.tolist() == tracker.state.method_state.away.tolist()
     for one in (tracker, again):
         step = one.step(5.0, [np.array([[600.0, 0.0, 0.0]])])
         assert step.assigned[0].tolist() == [0] and one.tracks[0].hits == 4

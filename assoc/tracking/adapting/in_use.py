@@ -42,7 +42,7 @@ def _with(settings: TrackerSettings, used: bytes, bands: bytes | None, manoeuvre
         by_range = np.maximum(by_range / values[:, DETECTION, None], _LEAST)
     sensors = [_seen(*both) for both in zip(settings.sensors, values.tolist(), strict=True)]
     nursery = settings.nursery
-    changed: dict[str, Any] = {"place": _place(sensors, settings.place), "filter": noisier(settings.filter, manoeuvres)}
+    changed: dict[str, Any] = {"scene": _scene(sensors, settings.scene), "filter": noisier(settings.filter, manoeuvres)}
     changed["by_range"] = by_range
     if nursery is not None:
         nursery = replace(nursery, **changed)
@@ -56,9 +56,9 @@ def _seen(sensor: Sensor, used: Sequence[float]) -> Sensor:
     return replace(sensor, noise=noise, detection_probability=probability, false_alarm_rate=rate)
 
 
-def _place(sensors: Sequence[Sensor], place: Scene) -> Scene:
+def _scene(sensors: Sequence[Sensor], scene: Scene) -> Scene:
     empty = [[np.zeros((0, sensor.dim)) for sensor in sensors]]
-    return Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=place.region)
+    return Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=scene.region)
 
 
 def noisier(filter: Filter[Any], factor: float) -> Filter[Any]:

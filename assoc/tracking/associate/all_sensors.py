@@ -131,7 +131,7 @@ def _fresh(progress: Progress, tuples: Array) -> tuple[TrackBatch, Array]:
     order = order[np.lexsort(positions[order].T)]
     rows, positions, covariances = tuples[order], positions[order], covariances[order]
     states = settings.initiation.start(settings.filter, positions, covariances)
-    costs = tuple_costs(settings.place, scan, rows, speed=settings.initiation.speed)
+    costs = tuple_costs(settings.scene, scan, rows, speed=settings.initiation.speed)
     costs -= settings.births.overlooked(rows, positions, covariances)
     score = settings.births.scores(rows, costs, positions, covariances) - scan.crowding(rows)
     return TrackBatch.new(states, np.zeros(len(order), dtype=np.int64), score, scan.time), order

@@ -131,15 +131,15 @@ class JointProbabilistic(Method):
         merged(tracks.states[:0], np.zeros(0, dtype=np.int64), np.zeros(0), 0)
         return ()
 
-    def arrays(self, own: Any) -> Mapping[str, Array]:
+    def arrays(self, method_state: Any) -> Mapping[str, Array]:
         """Nothing: later scans do not depend on them."""
         return {}
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track, (T, S)."""
         order = np.argsort(state.tracks.track_id)
-        ids, shares = state.tracks.track_id[order], np.zeros((len(order), len(state.own)))
-        for s, pairs in enumerate(state.own):
+        ids, shares = state.tracks.track_id[order], np.zeros((len(order), len(state.method_state)))
+        for s, pairs in enumerate(state.method_state):
             known = np.isin(pairs.track_id, ids)
             at = np.searchsorted(ids, pairs.track_id[known])
             np.add.at(shares[:, s], order[at], pairs.probability[known])
@@ -242,7 +242,7 @@ class JointProbabilistic(Method):
 
 def _named(found: Association) -> Association:
     """An association with the probabilities of each sensor as users see them."""
-    return found._replace(own=tuple(PairProbabilities(*pairs) for pairs in found.own))
+    return found._replace(method_state=tuple(PairProbabilities(*pairs) for pairs in found.method_state))
 
 
 def _take_in(
@@ -302,5 +302,5 @@ class JointProbabilisticTracker(Tracker):
     @property
     def probabilities(self) -> tuple[PairProbabilities, ...]:
         """Probabilities of the last step's pairs, for each sensor."""
-        found: tuple[PairProbabilities, ...] = self.state.own
+        found: tuple[PairProbabilities, ...] = self.state.method_state
         return found

@@ -54,7 +54,7 @@ class Method(ABC):
         gone = to_delete(progress, tracks)
         ended = np.sort(tracks.track_id[gone & tracks.confirmed])
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
-        return progress.with_state(tracks=tracks[~gone], own=found.own)._replace(step=step)
+        return progress.with_state(tracks=tracks[~gone], method_state=found.method_state)._replace(step=step)
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track in a step, (T, S)."""
@@ -77,9 +77,9 @@ class Method(ABC):
         """Present decisions about the scans that are not final yet, oldest first."""
         return ()
 
-    def arrays(self, own: Any) -> Mapping[str, Array]:
+    def arrays(self, method_state: Any) -> Mapping[str, Array]:
         """The method's own part of a state as arrays for a file."""
-        return {} if own is None else own._asdict()
+        return {} if method_state is None else method_state._asdict()
 
     def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Any:
         """The method's own part of a state read from a file, checked; `state` is the rest."""

@@ -77,7 +77,7 @@ class TrackTrees(DeferringMethod):
 
     def current(self, state: TrackerState) -> TrackBatch:
         """The branches of the best hypothesis, by their ids."""
-        rows = np.flatnonzero(state.own.chosen)
+        rows = np.flatnonzero(state.method_state.chosen)
         return state.tracks[rows[np.argsort(state.tracks.track_id[rows], kind="stable")]]
 
     def at_once(self, progress: Progress) -> Association:
@@ -90,7 +90,7 @@ class TrackTrees(DeferringMethod):
 
     def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
         growth, count = growth_of(progress, timed), len(progress.settings.sensors)
-        tables, chosen = _tables(progress.state, count), progress.state.own.chosen
+        tables, chosen = _tables(progress.state, count), progress.state.method_state.chosen
         for s in growth.order:
             offers = growth.offers(s)
             kept, tables, chosen = self._extended(progress, tables, offers, s)
@@ -110,7 +110,7 @@ class TrackTrees(DeferringMethod):
             other = _solved(progress, tracks.track_id, tracks.score, tables.history)
             if tracks.score[other].sum() >= tracks.score[chosen].sum():
                 chosen = other
-        window = progress.state.own.window.opened(progress.scan, tables.history)
+        window = progress.state.method_state.window.opened(progress.scan, tables.history)
         return Association(tracks, (), Trees(window, tables.born, chosen))
 
     def _extended(self, progress: Progress, tables: Tables, offers: Offers, s: int) -> tuple[Array, Tables, Array]:
@@ -132,34 +132,34 @@ class TrackTrees(DeferringMethod):
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
         """Confirm trees, decide the oldest scan of the window, delete branches that contradict it, and tracks."""
-        tracks, own, scan = found.tracks, found.own, progress.state.scan
-        new = own.chosen & ~tracks.confirmed
+        tracks, trees, scan = found.tracks, found.method_state, progress.state.scan
+        new = trees.chosen & ~tracks.confirmed
         new &= progress.settings.life_cycle.confirms(tracks.score, tracks.detections)
         if new.any():
             tracks = tracks.with_confirmed(tracks.confirmed | same_tree(tracks.track_id.copy(), new))
-        now = own.window.decision(0, scan, tracks, np.flatnonzero(own.chosen))
+        now = trees.window.decision(0, scan, tracks, np.flatnonzero(trees.chosen))
         final: tuple[Decision, ...] = ()
         gone = to_delete(progress, tracks)
         # else the tree would go on by some branch that takes another target's measurement in time
-        stay = ~(gone | same_tree(tracks.track_id.copy(), gone & own.chosen & tracks.confirmed))
-        if len(own.window.times) == self.depth:
-            kept, speakers = self._decided(tracks, own, scan)
-            final = (own.window.decision(self.depth - 1, scan, tracks, speakers),)
-            own = own._replace(window=own.window.closed())
+        stay = ~(gone | same_tree(tracks.track_id.copy(), gone & trees.chosen & tracks.confirmed))
+        if len(trees.window.times) == self.depth:
+            kept, speakers = self._decided(tracks, trees, scan)
+            final = (trees.window.decision(self.depth - 1, scan, tracks, speakers),)
+            trees = trees._replace(window=trees.window.closed())
             stay &= kept
         ids, lost = tracks.track_id.copy(), np.zeros(0, dtype=np.int64)
         if not stay.all():
             lost = np.unique(ids[tracks.confirmed & ~same_tree(ids, stay)])
-            tracks, own = tracks[stay], own.of(stay)
+            tracks, trees = tracks[stay], trees.of(stay)
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=lost)
-        return progress.with_state(tracks=tracks, own=own)._replace(step=step)
+        return progress.with_state(tracks=tracks, method_state=trees)._replace(step=step)
 
-    def _decided(self, tracks: TrackBatch, own: Trees, scan: int) -> tuple[Array, Array]:
+    def _decided(self, tracks: TrackBatch, trees: Trees, scan: int) -> tuple[Array, Array]:
         """Branches that agree with the decision about the oldest scan, and those that make it."""
-        sizes = own.window.sizes[-1]
-        oldest = np.ascontiguousarray(own.window.history[:, -sizes.size :])
-        old = own.born <= scan - self.depth + 1
-        return decide(tracks.track_id.copy(), tracks.score.copy(), own.chosen, old, oldest, sizes)
+        sizes = trees.window.sizes[-1]
+        oldest = np.ascontiguousarray(trees.window.history[:, -sizes.size :])
+        old = trees.born <= scan - self.depth + 1
+        return decide(tracks.track_id.copy(), tracks.score.copy(), trees.chosen, old, oldest, sizes)
 
     @staticmethod
     def hand_over(state: TrackerState, age: int) -> tuple[TrackerState, TrackBatch]:
@@ -168,27 +168,29 @@ class TrackTrees(DeferringMethod):
         Branches that contradict them are removed, too. Returns the state without these tracks; and the tracks, at the
         time of the last scan.
         """
-        tracks, own = state.tracks, state.own
-        grown = own.chosen & tracks.confirmed & (own.born <= state.scan - age)
+        tracks, trees = state.tracks, state.method_state
+        grown = trees.chosen & tracks.confirmed & (trees.born <= state.scan - age)
         stay = ~np.isin(tracks.track_id, tracks.track_id[grown])
-        for row in own.window.history[grown]:
-            stay &= ~((own.window.history == row) & (row > 0)).any(axis=1)
-        return state._replace(tracks=tracks[stay], own=own.of(stay)), tracks[grown]
+        for row in trees.window.history[grown]:
+            stay &= ~((trees.window.history == row) & (row > 0)).any(axis=1)
+        return state._replace(tracks=tracks[stay], method_state=trees.of(stay)), tracks[grown]
 
     def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
         """The state with these names (K,) in place of ids (K,); trees that had these names end."""
         rows = np.flatnonzero(~np.isin(state.tracks.track_id, names))
         tracks = state.tracks[rows].renamed(ids, names)
         order = np.argsort(tracks.track_id, kind="stable")
-        return state._replace(tracks=tracks[order], own=state.own.of(rows[order]))
+        return state._replace(tracks=tracks[order], method_state=state.method_state.of(rows[order]))
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
         """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
-        return state.own.window.decisions(state.scan - 1, state.tracks, np.flatnonzero(state.own.chosen))
+        return state.method_state.window.decisions(
+            state.scan - 1, state.tracks, np.flatnonzero(state.method_state.chosen)
+        )
 
-    def arrays(self, own: Trees) -> Mapping[str, Array]:
+    def arrays(self, trees: Trees) -> Mapping[str, Array]:
         """The trees for a file."""
-        return {**own.window.arrays(), "born": own.born, "chosen": own.chosen}
+        return {**trees.window.arrays(), "born": trees.born, "chosen": trees.chosen}
 
     def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Trees:
         """The trees that a file holds, checked."""
@@ -202,10 +204,10 @@ class TrackTrees(DeferringMethod):
 
 def _tables(state: TrackerState, sensors: int) -> Tables:
     """The branches, with empty columns for this scan in their histories."""
-    before = state.own.window.history
+    before = state.method_state.window.history
     history = np.zeros_like(before)
     history[:, sensors:] = before[:, : before.shape[1] - sensors]
-    return Tables(state.tracks.numbers, state.tracks.counts, history, state.own.born)
+    return Tables(state.tracks.numbers, state.tracks.counts, history, state.method_state.born)
 
 
 def _solved(progress: Progress, tree: Array, score: Array, history: Array) -> Array:

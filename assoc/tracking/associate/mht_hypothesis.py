@@ -73,13 +73,13 @@ class ClusteredHypotheses(DeferringMethod):
 
     def current(self, state: TrackerState) -> TrackBatch:
         """The branches of the best hypothesis, by their ids."""
-        rows = state.own.best
+        rows = state.method_state.best
         return state.tracks[rows[np.argsort(state.tracks.track_id[rows], kind="stable")]]
 
-    def probabilities(self, own: Hypotheses) -> Array:
+    def probabilities(self, hypotheses: Hypotheses) -> Array:
         """Probabilities of the best hypotheses about everything, the best first."""
         logarithms = np.zeros(1)
-        for group in own.clusters:
+        for group in hypotheses.clusters:
             both = (logarithms[:, None] + np.log(group.probabilities)).ravel()
             logarithms = -np.sort(-both)[: self.max_hypotheses]
         return np.exp(logarithms)
@@ -97,10 +97,10 @@ class ClusteredHypotheses(DeferringMethod):
         return self._grown(progress, timed)
 
     def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
-        tracks, own = progress.state.tracks, progress.state.own
+        tracks, hypotheses = progress.state.tracks, progress.state.method_state
         orders = _orders(progress.scan)
         growth = growth_of(progress._replace(scan=_by_value(progress.scan, orders)), timed)
-        clusters = list(own.clusters)
+        clusters = list(hypotheses.clusters)
         ids, gained = tracks.track_id, np.zeros(len(tracks))
         limits = self.max_hypotheses, self.hypothesis_drop
 
@@ -117,7 +117,7 @@ class ClusteredHypotheses(DeferringMethod):
             born, count = offers.births.rows[:, s] - 1, len(progress.scan.measurements[s])
             taken(s, offers, generated(clusters, offers, born, count, *limits))
         if isinstance(growth, AtOnce):
-            rows = Hypotheses(own.window, tuple(clusters)).best
+            rows = Hypotheses(hypotheses.window, tuple(clusters)).best
             sure = np.append(tracks.confirmed, False)[growth.origin[rows]]
             crossed = growth.crossings(growth.rows[rows[sure]], by_place=False)
             if crossed is not None:
@@ -125,55 +125,57 @@ class ClusteredHypotheses(DeferringMethod):
         grown = growth.finished()
         batch = _batch(tracks, growth, grown, ids, gained)
         batch = batch.counted(np.asarray(growth.rows.any(axis=1)), grown.looked)
-        older = np.concatenate([own.window.history, np.zeros((1, own.window.history.shape[1]), dtype=np.int32)])
+        older = np.concatenate(
+            [hypotheses.window.history, np.zeros((1, hypotheses.window.history.shape[1]), dtype=np.int32)]
+        )
         older = older[growth.origin]
         given = [np.append(0, order + 1) for order in orders]
         rows = np.stack([number[growth.rows[:, s]] for s, number in enumerate(given)], axis=1).astype(np.int32)
         history = np.concatenate([rows, older], axis=1)[:, : older.shape[1]]
-        return Association(batch, (), Hypotheses(own.window.opened(progress.scan, history), tuple(clusters)))
+        return Association(batch, (), Hypotheses(hypotheses.window.opened(progress.scan, history), tuple(clusters)))
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
         """Confirm tracks, decide the oldest scan of the window, delete tracks, split clusters."""
         before, scan = progress.state.tracks, progress.state.scan
-        tracks, own = found.tracks, found.own
+        tracks, hypotheses = found.tracks, found.method_state
         known = before.track_id[before.confirmed]
-        good = own.best[tracks.confirm(progress.settings.life_cycle).confirmed[own.best]]
+        good = hypotheses.best[tracks.confirm(progress.settings.life_cycle).confirmed[hypotheses.best]]
         tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, tracks.track_id[good]))
-        now = own.window.decision(0, scan, tracks, own.best)
+        now = hypotheses.window.decision(0, scan, tracks, hypotheses.best)
         known = np.union1d(known, tracks.track_id[tracks.confirmed])
         final: tuple[Decision, ...] = ()
-        if len(own.window.times) == self.depth:
-            tracks, own = _kept(tracks, own, _agreeing(tracks, own))
-            final = (own.window.decision(self.depth - 1, scan, tracks, own.best),)
-            own = own._replace(window=own.window.closed())
+        if len(hypotheses.window.times) == self.depth:
+            tracks, hypotheses = _kept(tracks, hypotheses, _agreeing(tracks, hypotheses))
+            final = (hypotheses.window.decision(self.depth - 1, scan, tracks, hypotheses.best),)
+            hypotheses = hypotheses._replace(window=hypotheses.window.closed())
         # a track is deleted if all its branches are to be deleted, or that of the best hypothesis
         ids, late = tracks.track_id, to_delete(progress, tracks)
-        best = own.best[(late & tracks.confirmed)[own.best]]
+        best = hypotheses.best[(late & tracks.confirmed)[hypotheses.best]]
         gone = ~np.isin(ids, ids[~late]) | np.isin(ids, ids[best])
-        tracks, own = _without(tracks, own, gone)
-        tracks, own = _kept(tracks, own, _split(tracks, own))
+        tracks, hypotheses = _without(tracks, hypotheses, gone)
+        tracks, hypotheses = _kept(tracks, hypotheses, _split(tracks, hypotheses))
         ended = np.setdiff1d(known, tracks.track_id)
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
-        return progress.with_state(tracks=tracks, own=own)._replace(step=step)
+        return progress.with_state(tracks=tracks, method_state=hypotheses)._replace(step=step)
 
     def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
         """The state with these names (K,) in place of ids (K,); tracks that had these names end."""
-        tracks, own = _without(state.tracks, state.own, np.isin(state.tracks.track_id, names))
-        return state._replace(tracks=tracks.renamed(ids, names), own=own)
+        tracks, hypotheses = _without(state.tracks, state.method_state, np.isin(state.tracks.track_id, names))
+        return state._replace(tracks=tracks.renamed(ids, names), method_state=hypotheses)
 
     def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
         """Decisions of the best hypothesis about the scans that are not final yet, oldest first."""
-        return state.own.window.decisions(state.scan - 1, state.tracks, state.own.best)
+        return state.method_state.window.decisions(state.scan - 1, state.tracks, state.method_state.best)
 
-    def arrays(self, own: Hypotheses) -> Mapping[str, Array]:
+    def arrays(self, hypotheses: Hypotheses) -> Mapping[str, Array]:
         """The hypotheses for a file."""
-        shapes = np.array([group.holds.shape for group in own.clusters], dtype=np.int64).reshape(-1, 2)
+        shapes = np.array([group.holds.shape for group in hypotheses.clusters], dtype=np.int64).reshape(-1, 2)
         return {
-            **own.window.arrays(),
+            **hypotheses.window.arrays(),
             "cluster_hypotheses": shapes[:, 0],
             "cluster_branches": shapes[:, 1],
-            "holds": np.concatenate([np.zeros(0, np.bool_), *(group.holds.ravel() for group in own.clusters)]),
-            "weight": np.concatenate([np.zeros(0), *(group.weight for group in own.clusters)]),
+            "holds": np.concatenate([np.zeros(0, np.bool_), *(group.holds.ravel() for group in hypotheses.clusters)]),
+            "weight": np.concatenate([np.zeros(0), *(group.weight for group in hypotheses.clusters)]),
         }
 
     def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Hypotheses:
@@ -239,33 +241,34 @@ def _renumbered(clusters: Iterable[Cluster]) -> tuple[list[Cluster], Array]:
     return found, kept
 
 
-def _kept(tracks: TrackBatch, own: Hypotheses, clusters: Iterable[Cluster]) -> tuple[TrackBatch, Hypotheses]:
+def _kept(tracks: TrackBatch, hypotheses: Hypotheses, clusters: Iterable[Cluster]) -> tuple[TrackBatch, Hypotheses]:
     """Keep only these clusters."""
     found, kept = _renumbered(clusters)
-    return tracks[kept], Hypotheses(own.window.of(kept), tuple(found))
+    return tracks[kept], Hypotheses(hypotheses.window.of(kept), tuple(found))
 
 
-def _without(tracks: TrackBatch, own: Hypotheses, gone: Array) -> tuple[TrackBatch, Hypotheses]:
+def _without(tracks: TrackBatch, hypotheses: Hypotheses, gone: Array) -> tuple[TrackBatch, Hypotheses]:
     """Take out branches, bool (B,): all those of their tracks."""
     if not gone.any():
-        return tracks, own
-    left = [group for group in own.clusters if not gone[group.branches].all()]
-    return _kept(tracks, own, [without(group, gone[group.branches]) for group in left])
+        return tracks, hypotheses
+    left = [group for group in hypotheses.clusters if not gone[group.branches].all()]
+    return _kept(tracks, hypotheses, [without(group, gone[group.branches]) for group in left])
 
 
-def _agreeing(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
+def _agreeing(tracks: TrackBatch, hypotheses: Hypotheses) -> list[Cluster]:
     """Clusters without the hypotheses that disagree with the best one about the oldest scan of the window."""
-    history = own.window.history[:, -own.window.sizes.shape[1] :].astype(np.int64)
+    history = hypotheses.window.history[:, -hypotheses.window.sizes.shape[1] :].astype(np.int64)
     owner = np.where(history > 0, tracks.track_id[:, None] * (history.max(initial=0) + 1) + history, 0)
     decided = np.asarray(owner.any(axis=1))
     return [
-        agreeing(group, owner[group.branches]) if decided[group.branches].any() else group for group in own.clusters
+        agreeing(group, owner[group.branches]) if decided[group.branches].any() else group
+        for group in hypotheses.clusters
     ]
 
 
-def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
+def _split(tracks: TrackBatch, hypotheses: Hypotheses) -> list[Cluster]:
     """Split clusters: branches of one track, or with a common measurement, stay together."""
-    count, history = len(tracks), own.window.history
+    count, history = len(tracks), hypotheses.window.history
     ids, track = np.unique(tracks.track_id, return_inverse=True)
     branch, column = np.nonzero(history)
     wanted = column * (history.max(initial=0) + np.int64(1)) + history[branch, column]
@@ -273,7 +276,7 @@ def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
     first, second = np.append(np.arange(count), branch), np.append(count + track, count + len(ids) + want)
     label = linked(first, second, count + len(ids) + len(wants))
     found: list[Cluster] = []
-    for group in own.clusters:
+    for group in hypotheses.clusters:
         labels = label[group.branches]
         together = len(labels) == 1 or bool((labels == labels[0]).all())
         found += [group] if together else parts(group, labels, tracks.score[group.branches])
@@ -304,5 +307,5 @@ class HypothesisOrientedMHT(Tracker):
     @property
     def probabilities(self) -> Array:
         """Probabilities of the best hypotheses about everything, the best first; at most `max_hypotheses` of them."""
-        found: Array = self.settings.method.probabilities(self.state.own)
+        found: Array = self.settings.method.probabilities(self.state.method_state)
         return found

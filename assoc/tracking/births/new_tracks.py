@@ -42,16 +42,16 @@ class Crossings(NamedTuple):
 
 
 class NewTracks:
-    """New tracks for a tracker's sensors and region (`place`) and filter.
+    """New tracks for a tracker's sensors and region (`scene`) and filter.
 
     `terms` score detections and misses; `limits` are gate_probability and max_tuples of `assoc.build_problem`.
     """
 
     def __init__(
-        self, place: Scene, filter: Filter[Any], initiation: Initiation, terms: ScoreTerms, limits: Mapping[str, Any]
+        self, scene: Scene, filter: Filter[Any], initiation: Initiation, terms: ScoreTerms, limits: Mapping[str, Any]
     ) -> None:
-        self._place, self._filter, self._initiation, self._terms, self._limits = (
-            place,
+        self._scene, self._filter, self._initiation, self._terms, self._limits = (
+            scene,
             filter,
             initiation,
             terms,
@@ -59,15 +59,15 @@ class NewTracks:
         )
         # a target that first appears at a sensor was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
-        self._blind = blind_somewhere(place.sensors, place.region)
+        self._blind = blind_somewhere(scene.sensors, scene.region)
         # those that miss less of some targets than of others; `problem` makes candidates as if only blind ones did
         self._uneven = self._blind if terms.by_range is None else self._blind | (terms.by_range < 1.0).any(axis=1)
-        self._views = Views(place.sensors, (0, 1, 2), terms.by_range)
-        self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
+        self._views = Views(scene.sensors, (0, 1, 2), terms.by_range)
+        self._widest = initiation.widest * float(np.linalg.norm(np.diff(scene.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
         """Positions, covariances, and which are precise enough to start a track."""
-        positions, covariances = positions_and_covariances(self._place, scan, tuples)
+        positions, covariances = positions_and_covariances(self._scene, scan, tuples)
         return positions, covariances, self._fit(positions, covariances)
 
     def _fit(self, positions: Array, covariances: Array) -> Array:
@@ -84,7 +84,7 @@ class NewTracks:
 
     def _log_birth(self, covariances: Array) -> Array:
         """Birth term of new targets' scores, by the covariances of their positions."""
-        return log_birth(covariances, self._place.region, self._initiation.birth_rate)
+        return log_birth(covariances, self._scene.region, self._initiation.birth_rate)
 
     def problem(self, scan: Scan) -> AssignmentProblem:
         """Candidate tuples of a scan, regardless of tracks.
@@ -92,7 +92,7 @@ class NewTracks:
         Costs are those of `build_problem`, but that a sensor misses only what it can see, and that false alarms are
         as dense at each measurement as they are there.
         """
-        problem = build_problem(self._place, scan, speed=self._initiation.speed, blind=self._blind, **self._limits)
+        problem = build_problem(self._scene, scan, speed=self._initiation.speed, blind=self._blind, **self._limits)
         views = self._uneven.any() and scan.at_once
         if not views and scan.clutter is None:
             return problem
@@ -121,7 +121,7 @@ class NewTracks:
 
     def singles(self, s: int, scan: Scan, numbers: Array) -> tuple[Any, Array, Array, Array]:
         """New tracks of single measurements (numbers from 0) of sensor s: states, which are used, positions, scores."""
-        positions, covariances = single_positions(self._place, s, scan.measurements[s][numbers])
+        positions, covariances = single_positions(self._scene, s, scan.measurements[s][numbers])
         fit = self._fit(positions, covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
@@ -136,7 +136,7 @@ class NewTracks:
         """Position of the target of each measurement of a scan, by that measurement alone."""
         positions, covariances, fit, births = [], [], [], []
         for s in range(len(scan.measurements)):
-            where, spread = positions_of_scan(self._place, scan, s)
+            where, spread = positions_of_scan(self._scene, scan, s)
             positions.append(where)
             covariances.append(np.asarray(spread))
             fit.append(self._fit(where, covariances[s]))

@@ -253,7 +253,7 @@ class LiveTracker:
             self.leave_out("own positions", f"own position for {str(sensor)[:40]!r} left out: the sensor is {what}", s)
             return
         try:
-            self.state.own.take(carrier, time, position, heading)
+            self.state.own_positions.take(carrier, time, position, heading)
         except AssocError as error:
             where = self.settings.name_of(s)
             self.leave_out("own positions", f"own position of {where} at {moment(time)} left out: it {error}", s)
@@ -311,7 +311,7 @@ class LiveTracker:
         self._told.clear()
         late = self._begun(first_id=self.state.tracker.next_id)
         antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
-        self.state = LiveState(late, antennas, self.state.own)
+        self.state = LiveState(late, antennas, self.state.own_positions)
 
     def _drop_ahead(self) -> None:
         for plot in self.state.ahead:
@@ -354,14 +354,14 @@ class LiveTracker:
 
     def _step(self) -> Picture:
         """Take in the interval that ends, with sensors where their platforms are."""
-        with self.state.under_way(self.settings) as place:
-            return self._step_at(place)
+        with self.state.under_way(self.settings) as scene:
+            return self._step_at(scene)
 
-    def _step_at(self, place: Scene) -> Picture:
+    def _step_at(self, scene: Scene) -> Picture:
         settings, state, end = self.settings, self.state, self.state.end
-        for s, last in state.own.silent(settings.scene, end):
+        for s, last in state.own_positions.silent(settings.scene, end):
             settings.tell(f"{settings.name_of(s)} has had no own position since {moment(last)}: it goes on as then")
-        sensors, interval = place.sensors, settings.interval
+        sensors, interval = scene.sensors, settings.interval
         state.end += interval
         sectors = np.zeros((len(sensors), 2))
         z, times, identities = [], [], []
@@ -408,7 +408,7 @@ class LiveTracker:
         ids = {track.track_id for track in tracks}
         ended, self.confirmed = sorted(self.confirmed - ids), ids
         scan = Scan(0, end, tuple(z), times=tuple(times)).aligned(sensors)
-        found = [positions_of_scan(place.at(end), scan, s)[0] for s in range(len(sensors))]
+        found = [positions_of_scan(scene.at(end), scan, s)[0] for s in range(len(sensors))]
         owner = np.repeat(np.arange(len(sensors)), [len(measured) for measured in z])
         begin = clock.perf_counter()
         agreements = self._agreements(step, tracks)

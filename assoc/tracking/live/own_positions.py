@@ -134,7 +134,7 @@ class OwnPositions:
             self.paths[number] = path._replace(doubted=pose)
             raise
 
-    def place(self, scene: Scene, begin: float, end: float) -> Scene:
+    def moved(self, scene: Scene, begin: float, end: float) -> Scene:
         """The scene of the sensors with their platforms' own positions from `begin` to `end`; itself without any.
 
         A platform that has sent none and whose positions in the scene have ended goes on as at their end.

@@ -74,7 +74,7 @@ class LiveState:
 
     tracker: LatePlots
     antennas: list[Antenna]
-    own: OwnPositions
+    own_positions: OwnPositions
     """Positions that the sensors' platforms have sent."""
     end: float = math.nan
     """End of the open interval, seconds."""
@@ -93,11 +93,11 @@ class LiveState:
     def under_way(self, settings: LiveSettings) -> Iterator[Scene]:
         """The sensors with their platforms until the open interval ends; those of the tracker, too, for so long."""
         tracker, scene = self.tracker.tracker, settings.scene
-        place = self.own.place(scene, self.end - settings.horizon - 2.0 * settings.interval, self.end)
+        moved = self.own_positions.moved(scene, self.end - settings.horizon - 2.0 * settings.interval, self.end)
         plain = tracker.settings
-        if place is not scene:
-            tracker.settings = plain.placed(place)
+        if moved is not scene:
+            tracker.settings = plain.with_scene(moved)
         try:
-            yield place
+            yield moved
         finally:
             tracker.settings = plain

@@ -67,7 +67,7 @@ def save(
         "live.confirmed": np.array(sorted(confirmed), dtype=np.int64),
         "live.antennas": np.array([(a.last, a.plots, a.phase.real, a.phase.imag, a.silent) for a in state.antennas]),
         "live.scans": np.array([one.time for one in past]),
-        "live.own": state.own.rows(),
+        "live.own": state.own_positions.rows(),
         "live.sectors": np.array([one.sectors for one in past]).reshape(-1, len(inner.sensors), 2),
         "live.plots": np.array(plots).reshape(-1, _BEFORE_VALUES + width),
     }

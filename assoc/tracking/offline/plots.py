@@ -129,7 +129,7 @@ def track_plots(
         decisions = [decision for one in done for decision in one.step.final]
         ends, settings = np.array([one.step.time for one in done]), tracker.settings
         plots, times = [one.measurements for one in done], [one.times for one in done]
-        scene = Scene(tracker.sensors, ends, plots, settings.place.region, measurement_times=times)
+        scene = Scene(tracker.sensors, ends, plots, settings.scene.region, measurement_times=times)
         named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
         table.take_names(named)
     ends = np.array([one.step.time for one in done])

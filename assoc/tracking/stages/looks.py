@@ -51,7 +51,7 @@ def count_out_of_view(progress: Progress) -> Progress:
 
 def _inside(settings: TrackerSettings, states: Any, most: int) -> Array:
     """Which tracks are inside the region along the first axes, at most so many, bool (T,)."""
-    region, axes = settings.place.region, min(most, len(settings.filter.motion.position))
+    region, axes = settings.scene.region, min(most, len(settings.filter.motion.position))
     where = places_of(settings.filter, states)[0][:, :axes]
     return np.asarray(((where >= region[:axes, 0]) & (where <= region[:axes, 1])).all(axis=1))
 

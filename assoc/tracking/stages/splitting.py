@@ -45,7 +45,7 @@ def _ratios(progress: Progress, new: TrackBatch, old: TrackBatch) -> tuple[Array
 
     Pairs (new, old) that may be above the limit, and their ratios, each (K,).
     """
-    motion, region = progress.settings.filter.motion, progress.settings.place.region
+    motion, region = progress.settings.filter.motion, progress.settings.scene.region
     place, velocity = list(motion.position), velocity_components(motion)
     n, back = len(place), new.started - progress.scan.time
     both = np.concatenate([place, velocity])

@@ -81,7 +81,7 @@ def _predicted(progress: Progress) -> TrackBatch:
 def _matched(progress: Progress, new: TrackBatch, old: TrackBatch, left: int) -> tuple[Array, Array]:
     """Rows of new tracks and of the old ones that they continue; the last `left` of these may be of the same time."""
     settings = progress.settings
-    motion, region = settings.filter.motion, settings.place.region
+    motion, region = settings.filter.motion, settings.scene.region
     place, velocity = np.array(motion.position), velocity_components(motion)
     both = np.concatenate([place, velocity])
     after = new.started[:, None] > old.last_detection[None, :]
