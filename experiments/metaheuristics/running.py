@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 from unittest import mock
@@ -10,7 +10,7 @@ from unittest import mock
 import assoc
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.solution import TracePoint
+from assoc.solution import Solution, TracePoint
 from experiments.common.checking import check_answer
 from experiments.common.measuring import fresh
 
@@ -33,10 +33,18 @@ class _Pace:
 _pace = _Pace()
 
 
-def run(problem: AssignmentProblem, solver: str, seconds: float, seed: int, **parameters: Any) -> float:
+def run(
+    problem: AssignmentProblem,
+    solver: str,
+    seconds: float,
+    seed: int,
+    assign: Callable[..., Solution] = assoc.assign,
+    **parameters: Any,
+) -> float:
     """Run a solver for so much processor time on each of its workers, and return what its solution costs.
 
-    What it finds after that does not count: an iteration that is at work then ends a little later.
+    What it finds after that does not count: an iteration that is at work then ends a little later. `assign` may look
+    at its solution.
     """
     workers = int(parameters.get("workers", 1))
     budget = seconds * workers
@@ -51,7 +59,7 @@ def run(problem: AssignmentProblem, solver: str, seconds: float, seed: int, **pa
             if not known or time.process_time() - processor <= 1.02 * budget:
                 known.append(point.cost)
 
-        solution = assoc.assign(one, solver, seed=seed, time_limit=seconds, callback=callback, **options)
+        solution = assign(one, solver, seed=seed, time_limit=seconds, callback=callback, **options)
         spent = time.process_time() - processor
         _pace.saw(time.perf_counter() - wall, spent / workers)
     if not known or spent <= 1.02 * budget:

@@ -34,17 +34,14 @@ def test_what_comes_after_the_budget_does_not_count(monkeypatch):
     clock = iter(np.arange(0.0, 1e6, 10.0))
     # ten seconds pass between any two looks at the clock: only the first solution is in time
     monkeypatch.setattr(running.time, "process_time", lambda: next(clock))
-    traces = []
-    assign = assoc.assign
+    solutions = []
 
     def remembering(*arguments, **options):
-        solution = assign(*arguments, **options)
-        traces.append(solution.trace)
-        return solution
+        solutions.append(assoc.assign(*arguments, **options))
+        return solutions[-1]
 
-    monkeypatch.setattr(running.assoc, "assign", remembering)
-    cost = running.run(one, "genetic", 1.0, 0)
-    assert cost == min(traces[0][0].cost, assoc.assign(one, "greedy").cost)
+    cost = running.run(one, "genetic", 1.0, 0, remembering)
+    assert cost == min(solutions[0].trace[0].cost, assoc.assign(one, "greedy").cost)
 
 
 @pytest.mark.parametrize("part", [*parts.PARTS, parts.TWO_WORKERS], ids=lambda part: part.words)
