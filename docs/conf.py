@@ -1,7 +1,5 @@
 """Sphinx configuration: `make docs`."""
 
-from __future__ import annotations
-
 import os
 import sys
 from importlib.util import find_spec

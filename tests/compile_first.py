@@ -5,8 +5,6 @@
 Two workers of pytest begin with the same kernels, and each would compile all of them.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 

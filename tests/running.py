@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import io
+import os
 import subprocess
 import sys
 
@@ -20,9 +21,22 @@ def here(name: str, *words: object, cwd: object = ".") -> subprocess.CompletedPr
     return subprocess.CompletedProcess([name, *words], code, out.getvalue(), told(err.getvalue()))
 
 
-def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[str]:
-    """Run ``python -W error -m words``."""
-    command = [sys.executable, "-W", "error", "-m", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=cwd)
+def process(*words: object, cwd: object = None, **variables: object) -> subprocess.CompletedProcess[str]:
+    """Run ``python words`` with these variables of the environment."""
+    environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
+    command = [sys.executable, *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, cwd=cwd, env=environment)
     done.stderr = told(done.stderr)
     return done
+
+
+def program(*words: object, cwd: object = None) -> subprocess.CompletedProcess[str]:
+    """Run ``python -W error -m words``."""
+    return process("-W", "error", "-m", *words, cwd=cwd)
+
+
+def printed(*words: object, cwd: object = None, **variables: object) -> str:
+    """What ``python words`` prints; it must end well, and say nothing on stderr."""
+    done = process(*words, cwd=cwd, **variables)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout

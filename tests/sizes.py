@@ -1,7 +1,5 @@
 """How much of a test `make test` does: a sample. `make test-all` does all of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

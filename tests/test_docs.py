@@ -1,7 +1,5 @@
 """The pages agree with the code: rooms and paths exist, API targets import, README's figures come from the CSV."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shlex

@@ -1,29 +1,20 @@
 """`import assoc` is quick, its names are there, and the program `assoc.solve` stays out of it."""
 
-from __future__ import annotations
-
 import ast
 import importlib
-import subprocess
-import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 import assoc
+from tests.running import printed
 
 SLOW = ("numba", "scipy", "pandas", "ortools", "rich", "numpy")
 
 
-def run(code: str) -> str:
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout
-
-
 def test_import_loads_nothing_slow():
-    loaded = run("import assoc, sys; print(*sys.modules)").split()
+    loaded = printed("-W", "error", "-c", "import assoc, sys; print(*sys.modules)").split()
     assert not {name.split(".")[0] for name in loaded} & {*SLOW}
 
 
@@ -31,7 +22,7 @@ def test_import_loads_nothing_slow():
 def test_programs_and_registry_load_no_compiler(module):
     code = f"import {module}, sys\nimport assoc.solvers as s\n"
     code += "for name in s.names(): s.parameters(name)\nprint(*sys.modules)"
-    loaded = {name.split(".")[0] for name in run(code).split()}
+    loaded = {name.split(".")[0] for name in printed("-W", "error", "-c", code).split()}
     assert not loaded & {"numba", "scipy", "pandas", "ortools", "rich"}
 
 
@@ -51,13 +42,12 @@ def test_package_does_not_import_the_program():
         "for name in assoc.__all__: getattr(assoc, name)\n"
         "assert 'assoc.solve' not in sys.modules and not hasattr(assoc, 'solve')"
     )
-    run(code)
+    printed("-W", "error", "-c", code)
 
 
 def test_the_list_of_programs():
-    done = subprocess.run([sys.executable, "-W", "error", "-m", "assoc"], capture_output=True, text=True, check=True)
-    assert "assoc.simulate" in done.stdout and "assoc.solve" in done.stdout
-    assert done.stderr == ""
+    listed = printed("-W", "error", "-m", "assoc")
+    assert "assoc.simulate" in listed and "assoc.solve" in listed
 
 
 def test_no_files_import_each_other_in_a_circle():

@@ -1,7 +1,5 @@
 """The benchmark's machinery: rows, goals and report on numbers made for the purpose."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys

@@ -1,7 +1,5 @@
 """Tracks on the earth: columns, names, GeoJSON and KML, against the positions they were made from."""
 
-from __future__ import annotations
-
 import json
 import math
 from importlib import import_module

@@ -1,9 +1,6 @@
 """Many steps in one call, thousands of steps, and all of it without the compiler."""
 
 import json
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -29,6 +26,7 @@ from assoc.filters.kernels import gaussian, points
 from experiments.filters.endurance import endure
 from experiments.filters.endurance import filters as of_each_kind
 from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
+from tests.running import printed
 from tests.sizes import sample
 
 MIXED = [
@@ -242,12 +240,7 @@ def test_covariances_stay_positive_definite_for_many_steps(name):
 @pytest.mark.slow
 def test_without_the_compiler_it_is_the_same():
     code = "import json; from tests.filters.test_long_steps import results; print(json.dumps(results()))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=os.getcwd(),
-        capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    plain, compiled = json.loads(done.stdout), results()
+    plain, compiled = json.loads(printed("-c", code, NUMBA_DISABLE_JIT=1)), results()
     for name, parts in compiled.items():
         for a, b in zip(plain[name], parts, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max(), err_msg=name)

@@ -1,7 +1,5 @@
 """Scenes to Stone Soup and back."""
 
-import subprocess
-import sys
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -19,6 +17,7 @@ from stonesoup.types.detection import Detection, TrueDetection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from assoc.integrations.stonesoup import SceneDetectionReader, SceneGroundTruthReader, adapt, scene_from_detections
+from tests.running import printed
 
 
 def three_radars(scans=8):
@@ -155,5 +154,4 @@ def test_without_stone_soup_the_error_names_the_command():
         "try:\n    import assoc.integrations.stonesoup\n"
         "except ImportError as error: print(error)"
     )
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
-    assert "pip install 'assoc[stonesoup]'" in done.stdout
+    assert "pip install 'assoc[stonesoup]'" in printed("-W", "error", "-c", code)

@@ -50,6 +50,7 @@ from assoc.integrations.stonesoup import (
 )
 from assoc.integrations.stonesoup.ordering import sorted_detections
 from tests.integrations.test_stonesoup_scenes import adapted, planar_model
+from tests.running import printed, process
 
 ROOT = Path(__file__).parents[2]
 ZERO = datetime(2026, 1, 1)
@@ -246,7 +247,7 @@ def test_stone_soup_finds_the_plugin(tmp_path):
     (about / "entry_points.txt").write_text(f"[stonesoup.plugins]\nassoc = {points['assoc']}\n")
     script = "from stonesoup.plugins.assoc import AssignmentInitiator, AssocTracker"
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
-    subprocess.run([sys.executable, "-W", "error", "-c", script], check=True, env={**os.environ, "PYTHONPATH": path})
+    printed("-W", "error", "-c", script, PYTHONPATH=path)
 
 
 PAGE = (ROOT / "docs" / "stonesoup.md").read_text(encoding="utf-8")
@@ -264,10 +265,8 @@ def test_every_example_is_on_the_page():
 )
 def test_the_page_runs_as_printed(name, expected):
     """In a process of its own, as a user does; a GOSPA within a metre, since sets have another order each time."""
-    done = subprocess.run(
-        [sys.executable, ROOT / "docs" / "stonesoup" / f"{name}.py"],
-        capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    done = process(ROOT / "docs" / "stonesoup" / f"{name}.py", PYTHONPATH=ROOT)
+    assert done.returncode == 0, done.stderr
     shown, told = (re.split(r"(\d+) m\n", text) for text in (done.stdout, expected))
     assert shown[::2] == told[::2]
     np.testing.assert_allclose([int(one) for one in shown[1::2]], [int(one) for one in told[1::2]], atol=1)

@@ -1,14 +1,11 @@
 """Kernels that another process compiles ahead: all that the search of a hard problem needs."""
 
-from __future__ import annotations
-
 import os
-import subprocess
 import sys
 
 import pytest
 
-from tests.told import told
+from tests.running import printed
 
 _SEARCH = """
 import numpy as np
@@ -36,8 +33,7 @@ print(len(seen.buffer))
 
 @pytest.mark.slow
 def test_it_is_what_a_hard_problem_needs():
-    done = subprocess.run([sys.executable, "-c", _SEARCH], capture_output=True, text=True, timeout=900)
-    assert (done.returncode, told(done.stderr), done.stdout) == (0, "", "0\n")
+    assert printed("-c", _SEARCH) == "0\n"
 
 
 _AHEAD = """
@@ -68,11 +64,9 @@ assert not is_over(float("inf")) and sum(is_over.stats.cache_hits.values()) == 1
 def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     source = "from assoc._system.clock import is_over\n\n\ndef prepare_clock():\n    is_over(1e300)\n"
     (tmp_path / "prepares.py").write_text(source)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cold"), "ASSOC_INTERPRET": "1"}
-    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), *sys.path])
+    path = os.pathsep.join([str(tmp_path), *sys.path])
     code = "from prepares import prepare_clock\n" + _AHEAD
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, told(done.stderr)) == (0, "")
+    assert printed("-c", code, PYTHONPATH=path, NUMBA_CACHE_DIR=tmp_path / "cold", ASSOC_INTERPRET=1) == ""
 
 
 _TRIALS = """
@@ -89,7 +83,4 @@ print(search_depth_first.stats.cache_misses != {}, len(pairs.decide.signatures))
 
 @pytest.mark.slow
 def test_the_first_process_compiles_those_trials_that_the_search_links(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    words = [sys.executable, "-c", _TRIALS]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, told(done.stderr), done.stdout) == (0, "", "True 1\n")
+    assert printed("-c", _TRIALS, NUMBA_CACHE_DIR=tmp_path) == "True 1\n"

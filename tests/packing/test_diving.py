@@ -1,7 +1,5 @@
 """Dives: covers from the linear program, drawn by pheromone and LP value, and far better than greedy ones."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Packings against a plain reading of the problem: columns, weights, components, and converting back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The remainder of a program with columns fixed, against HiGHS on the whole program."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog

@@ -1,7 +1,5 @@
 """Common to all metaheuristics: limits, the best covers, and refinement."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Short searches below a solved linear program, against scipy's MILP."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import Bounds, LinearConstraint, milp

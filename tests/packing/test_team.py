@@ -1,7 +1,5 @@
 """Workers with everything switched on: dives, exact sub-steps, and branch and bound."""
 
-from __future__ import annotations
-
 import assoc
 from assoc.simulation import simulate
 from tests.sizes import sample

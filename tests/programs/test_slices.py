@@ -16,6 +16,7 @@ from assoc.recordings import fixed_groups, radar_of, write_plots
 from assoc.simulation import simulate, simulate_recording
 from assoc.tracking import TRACKERS
 from assoc.tracking.offline.slices import Stitching, TrackSlice, _same, slices_of
+from tests.running import process
 from tests.sizes import sample
 
 WORDS = ["--no-adapt", "-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
@@ -213,8 +214,7 @@ sys.exit(track.start())
 def test_after_an_interrupt_it_is_said_what_is_kept(here, capsys, monkeypatch, output):
     (here / "temporary").mkdir()
     monkeypatch.setenv("TMPDIR", str(here / "temporary"))
-    command = [sys.executable, "-c", INTERRUPTED, *SLICED, *WORDS, "-o", output]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    done = process("-c", INTERRUPTED, *SLICED, *WORDS, "-o", output)
     kept = "; 2 slices are kept; the same command goes on from there" if output == "t.csv" else ""
     assert (done.returncode, done.stderr) == (130, f"assoc.track: interrupted{kept}\n")
     assert os.listdir("temporary") == []

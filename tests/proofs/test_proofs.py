@@ -1,11 +1,8 @@
 """Proofs: they prove the optimum; the checker accepts them and refuses spoiled ones."""
 
-from __future__ import annotations
-
 import copy
 import json
 import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,6 +18,7 @@ from assoc.proofs import write_proof
 from assoc.proofs.write import exact_problem
 from assoc.simulation import simulate
 from tests.reliability.exact import exact_optimum
+from tests.running import process
 
 ALONE = Path(check.__file__)
 
@@ -51,8 +49,7 @@ def branched() -> assoc.AssignmentProblem:
 
 def run_alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """The checker as others use it: only the file, isolated from the package."""
-    command = [sys.executable, "-I", "-S", str(ALONE), *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=600)
+    return process("-I", "-S", ALONE, *words, cwd=folder)
 
 
 @pytest.mark.parametrize("dummy", [True, False])

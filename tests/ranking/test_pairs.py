@@ -1,7 +1,5 @@
 """Probabilities of pairs against the enumeration of all joint events, closed forms, and the ranking of solutions."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

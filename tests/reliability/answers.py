@@ -5,8 +5,6 @@
 prints them as JSON, every float to its last bit: for comparisons with other processes (test_modes.py, cold_cache.py).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import warnings

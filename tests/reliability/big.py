@@ -1,7 +1,5 @@
 """Problems of up to a million tuples, made in a second or two: for limits of time and memory."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from assoc.problem import AssignmentProblem

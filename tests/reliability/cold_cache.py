@@ -8,8 +8,6 @@ by four, and with the cache that this tree has; it is tracked cold and warm. At 
 cache can be written, solves it with a cache in a temporary folder.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -5,8 +5,6 @@
 prints the faults found (none, one hopes), each with the seed and number that make it again.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import math

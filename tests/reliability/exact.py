@@ -1,7 +1,5 @@
 """Optima and probabilities of small problems in exact arithmetic, to hold every solver's answers against."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from fractions import Fraction

@@ -8,8 +8,6 @@ is late, runs out of memory, executes a pickle, or takes the process with it. Wh
 used, too: a problem is solved, a scene's first scan associated. A smaller part runs as programs.
 """
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import os

@@ -6,8 +6,6 @@ What a limit promises is 10 % and 50 ms. Lateness is counted from when the time 
 waited for a processor since then (Linux tells: /proc/self/task/*/schedstat), so that a busy machine does no harm.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import threading

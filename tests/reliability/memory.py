@@ -7,8 +7,6 @@ compiler's. Printed are the megabytes above those of the process before it had t
 of them is the problem itself.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import ctypes

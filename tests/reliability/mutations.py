@@ -1,7 +1,5 @@
 """Ways to spoil a file: bytes, text, and npz archives whose members lie."""
 
-from __future__ import annotations
-
 import io
 import os
 import pickle

@@ -4,8 +4,6 @@ A case is drawn as a *structure* (which tuples there are) and a *temper* (what t
 random by `draw`, or one after the other by whoever wants them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

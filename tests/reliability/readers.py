@@ -1,7 +1,5 @@
 """Every reader of files: a valid file for it, and what it does with one. For fuzzing.py, which spoils them."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import subprocess

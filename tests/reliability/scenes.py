@@ -1,7 +1,5 @@
 """Scenes at the edges: sensors on one spot, targets on sensors, a millimetre and a million kilometres."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -6,8 +6,6 @@ Each trial starts with an empty cache of kernels. A program must end with its ow
 KeyboardInterrupt, and no process that they started may be left some seconds later.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

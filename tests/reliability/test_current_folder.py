@@ -1,15 +1,12 @@
 """Data folders are not trusted: no program, and no process that is started, imports what lies in the current folder."""
 
-from __future__ import annotations
-
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 from assoc.simulation import simulate
+from tests.running import printed, process
 from tests.sizes import sample
 
 DEPENDENCIES = {"cloudpickle", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy", "shtab"}
@@ -39,17 +36,10 @@ def data(tmp_path):
     simulate("three-radar", 2, scans=4).save(folder / "scene.npz")
     # `python -m` itself imports some modules of the standard library before the package
     (tmp_path / "probe.py").write_text("import sys\nprint(*sys.modules)")
-    probe = subprocess.run([sys.executable, "-m", "probe"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    for name in {*sys.stdlib_module_names, *DEPENDENCIES} - {*probe.stdout.split()}:
+    probe = printed("-m", "probe", cwd=tmp_path)
+    for name in {*sys.stdlib_module_names, *DEPENDENCIES} - {*probe.split()}:
         (folder / f"{name}.py").write_text(PLANTED)
     return folder
-
-
-def run(words, data, **environment):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(data.parent / "cache"), "ASSOC_INTERPRET": "1", **environment}
-    return subprocess.run(
-        [sys.executable, *words], cwd=data, env=environment, capture_output=True, text=True, timeout=600
-    )
 
 
 @sample("way", WAYS, every=6)
@@ -58,5 +48,5 @@ def test_nothing_there_runs(data, way):
     if isinstance(words, str):
         (data.parent / "script.py").write_text(words)
         words = [data.parent / "script.py"]
-    done = run(words, data)
+    done = process(*words, cwd=data, NUMBA_CACHE_DIR=data.parent / "cache", ASSOC_INTERPRET=1)
     assert "executed" not in done.stderr and done.returncode == 0, done.stderr

@@ -1,7 +1,5 @@
 """What goes wrong around a program: the disk is full, the folder read-only, a process killed."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import operator
@@ -23,9 +21,8 @@ from assoc._files.npz import save_npz
 from assoc._files.output import write_atomically
 from assoc._system.processes import leave, parallel_map, send, start_python
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
-from tests.sizes import sample
+from tests.running import process
 from tests.told import told
 
 PYTHON = [sys.executable, "-W", "error", "-m"]
@@ -38,33 +35,8 @@ def scene_file(tmp_path_factory):
     return path
 
 
-def run(*words, **options):
-    done = subprocess.run([*PYTHON, *map(str, words)], capture_output=True, text=True, timeout=600, **options)
-    done.stderr = told(done.stderr)
-    return done
-
-
-def small_files(size=2000):
-    """Let no file grow beyond this: what a full disk says, without filling one."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-
-@sample("option", ["--json", "--csv"], every=2)
-def test_a_full_disk_leaves_the_old_result(scene_file, tmp_path, option):
-    output = tmp_path / "out"
-    output.write_text("old")
-    command = ["assoc.solve", scene_file, "--solver", "greedy", option, output]
-    done = run(*command, preexec_fn=lambda: small_files(100))
-    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
-    assert "cannot be written (File too large)" in done.stderr and "unchanged" in done.stderr
-    assert output.read_text() == "old" and os.listdir(tmp_path) == ["out"]
-
-
 def test_a_full_disk_while_an_archive_is_written(tmp_path):
     """Closing the archive fails as well then, and what is said must be what the disk said."""
-    import resource
-
     (tmp_path / "a.npz").write_bytes(b"old")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (300, before[1]))
@@ -96,41 +68,6 @@ def test_a_folder_that_cannot_be_written(tmp_path):
             write_atomically(folder / "a", lambda file: file.write(b"x"))
     finally:
         folder.chmod(0o700)
-
-
-def test_a_file_system_that_cannot_be_written():
-    """/proc takes no new files from anyone, the superuser included."""
-    if not Path("/proc/self").is_dir():
-        pytest.skip("no /proc here")
-    with pytest.raises(InvalidInputError, match="cannot be written"):
-        write_atomically("/proc/assoc-test", lambda file: file.write(b"x"))
-
-
-def test_killed_in_the_middle_of_saving_the_old_file_stays(tmp_path):
-    path = tmp_path / "p.npz"
-    problem = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
-    problem.save(path)
-    before = path.read_bytes()
-    script = f"""
-import time
-from assoc._files.output import write_atomically
-def writer(file):
-    file.write(b"half of the new")
-    file.flush()
-    print("half", flush=True)
-    time.sleep(60)
-write_atomically({str(path)!r}, writer)
-"""
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "half\n"
-    process.kill()
-    process.wait()
-    process.stdout.close()
-    assert path.read_bytes() == before
-    assert AssignmentProblem.load(path).num_tuples == problem.num_tuples
-    # the same command again is not held up by what the killed one left
-    problem.save(path)
-    assert path.read_bytes()[:2] == b"PK"
 
 
 def children(pid):
@@ -200,7 +137,7 @@ def test_functions_of_a_script_and_what_they_print(tmp_path):
         "sys.path.append(pathlib.Path())\n"
         "print([*parallel_map(lambda item: sys.stdout.write('said\\n') and 2 * item, range(5), 2)])\n"
     )
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=600)
+    done = process(script)
     assert (done.returncode, done.stdout, done.stderr) == (0, "[0, 2, 4, 6, 8]\n", "said\n" * 5)
 
 

@@ -1,10 +1,6 @@
 """A fixed sample of spoiled files for every reader; `make fuzz` runs tens of thousands."""
 
-from __future__ import annotations
-
 import io
-import subprocess
-import sys
 import zipfile
 
 import numpy as np
@@ -15,6 +11,7 @@ from assoc.problem import AssignmentProblem
 from tests.reliability.fuzzing import _bomb, judge, prepare, run_case, warm_up
 from tests.reliability.mutations import bombs
 from tests.reliability.readers import ROOMS, Room
+from tests.running import printed
 from tests.sizes import few_or_all
 
 
@@ -75,4 +72,4 @@ def test_a_format_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_pat
         "import sys, tracemalloc; import numpy; from assoc._files.npz import format_of; tracemalloc.start();"
         "assert format_of(sys.argv[1]) is None; assert tracemalloc.get_traced_memory()[1] < 1e6"
     )
-    subprocess.run([sys.executable, "-W", "error", "-c", code, str(path)], check=True, timeout=600)
+    printed("-W", "error", "-c", code, path)

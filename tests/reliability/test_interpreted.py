@@ -4,8 +4,6 @@ import ast
 import json
 import os
 import re
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,8 +13,8 @@ import pytest
 import assoc
 from assoc._system.helpers import _Beside
 from assoc.simulation import simulate
+from tests.running import printed
 from tests.sizes import sample
-from tests.told import told
 
 _CALLS = """
 import numpy as np
@@ -37,16 +35,12 @@ def call(rows):
 """
 
 
-def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.CompletedProcess[str]:
-    """Run code in a process of its own, with its own cache of kernels or the usual one."""
-    environment = {**os.environ, "ASSOC_INTERPRET": switch, **({"NUMBA_CACHE_DIR": str(cache)} if cache else {})}
+def run(code: str, cache: Path | None, switch: str = "1") -> str:
+    """Run code in a process of its own, with its own cache of kernels or the usual one; what it prints."""
     # the process that compiles may still be at a kernel when this one ends
     warnings = ("-W", "error", "-W", "ignore::ResourceWarning")
-    done = subprocess.run(
-        [sys.executable, *warnings, "-c", code], capture_output=True, text=True, env=environment, timeout=600
-    )
-    assert (done.returncode, told(done.stderr)) == (0, "")
-    return done
+    own = {"NUMBA_CACHE_DIR": cache} if cache else {}
+    return printed(*warnings, "-c", code, ASSOC_INTERPRET=switch, **own)
 
 
 @sample(
@@ -79,9 +73,8 @@ def test_the_same_answers_with_and_without_compiled_kernels(solver, tmp_path):
     answers = []
     for switch, cache in (("1", {"NUMBA_CACHE_DIR": str(tmp_path / "cold")}), ("0", {})):
         result = tmp_path / f"{switch}.json"
-        words = ["-m", "assoc.solve", str(scene), "--solver", solver, "--json", str(result)]
-        environment = {**os.environ, "ASSOC_INTERPRET": switch, **cache}
-        subprocess.run([sys.executable, *words], check=True, capture_output=True, env=environment, timeout=600)
+        words = ["-m", "assoc.solve", scene, "--solver", solver, "--json", result]
+        printed(*words, ASSOC_INTERPRET=switch, **cache)
         content = json.loads(result.read_text())
         answers.append([{k: v for k, v in scan.items() if "time" not in k} for scan in content["scans"]])
     assert answers[0] == answers[1]
@@ -105,7 +98,7 @@ for sizes in ((4, 4, 4), (7, 8), (3, 3, 3, 3)):
 @pytest.mark.slow
 def test_the_same_ranking_with_and_without_compiled_kernels(tmp_path):
     # many solutions of equal cost: which comes first hangs on the order of equal numbers
-    assert run(_RANKING, tmp_path / "cold").stdout == run(_RANKING, None, switch="0").stdout
+    assert run(_RANKING, tmp_path / "cold") == run(_RANKING, None, switch="0")
 
 
 # numpy sums in another order than compiled code, and its logarithm differs in the last bit

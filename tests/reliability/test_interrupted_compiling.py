@@ -1,7 +1,5 @@
 """Ctrl-C at random moments while kernels are compiled; `python -m tests.reliability.signals` does some hundred."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 import signal
@@ -13,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.reliability.signals import WAYS, folder_of_scenes, trial
-from tests.told import told
+from tests.running import printed
 
 
 @pytest.mark.slow
@@ -55,8 +53,7 @@ assert uninterrupted(lambda: 3) == 3
 
 
 def test_a_signal_is_heard_at_once_and_work_ends_between_two_steps():
-    done = subprocess.run([sys.executable, "-c", COMPILING], capture_output=True, text=True, timeout=600)
-    assert (done.returncode, done.stdout, told(done.stderr)) == (0, "[]\n[False, False]\n", "")
+    assert printed("-c", COMPILING) == "[]\n[False, False]\n"
 
 
 def command_lines():

@@ -1,15 +1,10 @@
 """Ctrl-C in the middle of a solve: it ends soon, in the library by KeyboardInterrupt, and what was there stays."""
 
-from __future__ import annotations
-
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
-from tests.told import told
+from tests.running import printed, process
 
 LIBRARY = """
 import _thread, json, os, signal, sys, threading
@@ -69,8 +64,7 @@ os._exit(0)
 @pytest.mark.slow
 def test_while_a_result_is_converted():
     # a signal that comes during a kernel is heard when its result is converted: a record's class is then missing
-    done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=600)
-    assert (done.returncode, done.stdout.strip()) == (0, "10"), done.stderr
+    assert printed("-c", CONVERTING).strip() == "10"
 
 
 RECORDS = """
@@ -101,12 +95,8 @@ print(json.dumps([len(called), sorted(bad)]), flush=True)
 def test_no_kernel_that_python_calls_returns_a_record():
     # what the test above sees where the signal comes in time; the first process compiles, also kernels that kernels
     # call, the second one loads those alone that Python calls
-    compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}
     for _ in range(2):
-        command = [sys.executable, "-c", RECORDS]
-        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=600)
-        assert done.returncode == 0, done.stderr
-    num_called, bad = json.loads(done.stdout)
+        num_called, bad = json.loads(printed("-c", RECORDS, ASSOC_INTERPRET=0))
     assert num_called > 50
     assert bad == []
 
@@ -145,17 +135,14 @@ print(heard > 3, cost, flush=True)
 @pytest.mark.slow
 def test_while_a_kernel_is_loaded():
     # LLVM asks Python for compiled code, and takes none for empty code
-    compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}
     for word, heard in (("alone", "False"), ("interrupted", "True")):
-        command = [sys.executable, "-c", LOADING, word]
-        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=600)
-        assert (done.returncode, done.stdout.split(), told(done.stderr)) == (0, [heard, "-5.0"], "")
+        assert printed("-c", LOADING, word, ASSOC_INTERPRET=0).split() == [heard, "-5.0"]
 
 
 @pytest.mark.slow
 def test_in_the_library():
     names = ["exact", "aco", "tabu", "genetic", "milp", "kbest"]
-    done = subprocess.run([sys.executable, "-c", LIBRARY, ",".join(names)], capture_output=True, text=True, timeout=600)
+    done = process("-c", LIBRARY, ",".join(names))
     assert done.returncode == 0, done.stderr
     # what is not interrupted comes back at its time limit
     assert json.loads(done.stdout) == dict.fromkeys(names, True)

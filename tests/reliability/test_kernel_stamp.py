@@ -1,11 +1,6 @@
 """Compiled code is kept as long as what the kernel can reach is the same, and no longer."""
 
-from __future__ import annotations
-
 import json
-import os
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
@@ -15,8 +10,8 @@ import pytest
 import assoc
 from assoc._system.kernel_stamp import KernelStamp
 from tests.reliability.test_processes import copied
+from tests.running import printed
 from tests.sizes import few_or_all
-from tests.told import told
 
 KERNEL = '''"""Kernels."""
 from typing import Any
@@ -85,13 +80,8 @@ NEW = {
 
 
 def run(folder: Path) -> list:
-    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
-    environment.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUN], env=environment, text=True, cwd=folder, capture_output=True
-    )
-    assert (done.returncode, told(done.stderr)) == (0, "")
-    return json.loads(done.stdout)
+    variables = {"PYTHONPATH": folder, "PYTHONDONTWRITEBYTECODE": 1, "NUMBA_CACHE_DIR": ""}
+    return json.loads(printed("-W", "error", "-c", RUN, cwd=folder, **variables))
 
 
 def edit(folder: Path, file: str, before: str, after: str) -> None:
@@ -131,8 +121,7 @@ def test_what_is_not_understood_takes_the_whole_package(folder):
         "assert 'whole package' in str(KernelStamp(k.shifted.py_func, {}))\n"
         "assert 'whole package' not in str(KernelStamp(k.other.py_func, {}))"
     )
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    subprocess.run([sys.executable, "-c", code], env=environment, cwd=folder, check=True)
+    printed("-c", code, cwd=folder, PYTHONPATH=folder)
 
 
 def test_all_kernels_of_the_package_are_understood():

@@ -1,11 +1,7 @@
 """Memory is estimated before it is taken: guards refuse in time, estimates are right, searches stay within."""
 
-from __future__ import annotations
-
 import math
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -33,6 +29,7 @@ from assoc.solvers.assign import assign
 from tests.oracles import gated_problem
 from tests.reliability.big import axial, ghosts
 from tests.reliability.memory import peak_of
+from tests.running import process
 from tests.sizes import sample
 
 linux = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux how much memory there is")
@@ -62,8 +59,7 @@ def test_an_address_space_limit_counts() -> None:
         "memory.require(1 << 28, 'small', '')\n"
         "memory.require(1.95e9, 'tuples = 3', 'take fewer')\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
-    last = done.stderr.strip().splitlines()[-1]
+    last = process("-c", code).stderr.strip().splitlines()[-1]
     assert re.search(r"LimitExceededError: tuples = 3 would take about 1\.95 GB of memory, .* available; take f", last)
 
 

@@ -1,24 +1,16 @@
 """The same answers without the compiler; `make test-uncompiled` runs more of the tests so."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
-
 import pytest
 
 from tests.reliability.answers import answers, differences
+from tests.running import printed
 
 
 @pytest.mark.slow
 def test_answers_without_the_compiler():
     parts = ["solutions", "rankings", "costs", "tracks"]
-    command = [sys.executable, "-W", "error", "-m", "tests.reliability.answers", "--only", ",".join(parts)]
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment)
-    assert done.returncode == 0, done.stderr
-    assert differences(done.stdout, answers(parts), 1e-9) == []
+    command = ["-W", "error", "-m", "tests.reliability.answers", "--only", ",".join(parts)]
+    assert differences(printed(*command, NUMBA_DISABLE_JIT=1), answers(parts), 1e-9) == []
 
 
 def test_the_comparison_sees_differences():

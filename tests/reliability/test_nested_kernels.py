@@ -1,11 +1,10 @@
 """Kernels that kernels call: for which types they are compiled, and those that Python cannot call compiled."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
+
+from tests.running import printed
 
 _PROGRAM = """
 import json
@@ -72,9 +71,7 @@ print(json.dumps([found, overloads, sum(one.is_start for _, one in compiled.buff
 def run(tmp_path, **variables):
     program = tmp_path / "program.py"
     program.write_text(_PROGRAM)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "ASSOC_INTERPRET": "0", **variables}
-    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
-    return json.loads(done.stdout)
+    return json.loads(printed(program, NUMBA_CACHE_DIR=tmp_path / "cache", ASSOC_INTERPRET=0, **variables))
 
 
 @pytest.mark.slow

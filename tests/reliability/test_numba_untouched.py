@@ -1,15 +1,10 @@
 """numba stays as it was for everybody else in the process, and kernels work without what numba does not promise."""
 
-from __future__ import annotations
-
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
-from tests.told import told
+from tests.running import printed
 
 UNTOUCHED = """
 import sys
@@ -69,11 +64,8 @@ print(json.dumps([compiled.private is None, found.tuples.tolist(), found.cost]))
 IN_TREE = "delattr(caching, next(name for name in vars(caching) if name.endswith('InTreeCacheLocator')))"
 
 
-def run(code, **environment):
-    environment = {**os.environ, "ASSOC_INTERPRET": "0", **environment}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
-    assert (done.returncode, told(done.stderr)) == (0, "")
-    return done.stdout.splitlines()
+def run(code, **variables):
+    return printed("-c", code, **{"ASSOC_INTERPRET": 0, **variables}).splitlines()
 
 
 @pytest.mark.parametrize("interpret", ["0", "1"])

@@ -1,7 +1,5 @@
 """Threads, pools of processes, installations without a place for a cache, first runs at the same time."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Programs whose outputs would overwrite what they read, with strange names, closed streams, and signals."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Kernels that came with the package are taken where they fit, and give the bytes of those compiled here."""
 
-from __future__ import annotations
-
 import functools
 import os
 import pickle

@@ -3,8 +3,6 @@
 python -m tests.reliability.writers FOLDER      tries each in FOLDER; prints what it said and what is there then
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -2,8 +2,6 @@
 
 import datetime
 import re
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -19,6 +17,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import names, recording_names, simulate, simulate_recording
 from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
 from assoc.tracking.offline.plots import step_windows
+from tests.running import program
 from tests.sizes import sample
 
 FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(
@@ -211,13 +210,12 @@ def test_dates_elsewhere_are_refused():
 def test_programs_say_it_in_a_line(tmp_path):
     with pytest.warns(AssocWarning):
         changed(simulate("three-radar", scans=6), [0.001, 1.0, 1.0]).save(tmp_path / "km.npz")
-    for program in (["solve", "km.npz", "--jobs", "2", "--report", "a.html"],
-                    ["track", "km.npz", "-o", "tracks.csv", "--report", "b.html"]):  # fmt: skip
-        command = [sys.executable, "-W", "error", "-m", f"assoc.{program[0]}", *program[1:]]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    for name, *words in (["solve", "km.npz", "--jobs", "2", "--report", "a.html"],
+                         ["track", "km.npz", "-o", "tracks.csv", "--report", "b.html"]):  # fmt: skip
+        done = program(f"assoc.{name}", *words, cwd=tmp_path)
         lines = done.stderr.splitlines()
         assert done.returncode == 0 and len(lines) == 3
-        assert all(one.startswith(f"assoc.{program[0]}: warning: Radar3D 'radar ") for one in lines)
+        assert all(one.startswith(f"assoc.{name}: warning: Radar3D 'radar ") for one in lines)
     for page in ("a.html", "b.html"):
         text = (tmp_path / page).read_text()
         assert "<b>3 warnings</b>" in text and text.count("lie outside of its field of view") == 3

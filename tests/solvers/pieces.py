@@ -1,7 +1,5 @@
 """Problems and components on which metaheuristics are compared with plain references, step by step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import assoc

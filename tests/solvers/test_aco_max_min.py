@@ -1,7 +1,5 @@
 """Mode mmas against a plain max-min ant system, cycle by cycle, same random numbers; pheromone by tuple."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

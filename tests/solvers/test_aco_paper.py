@@ -1,7 +1,5 @@
 """Mode paper against equations 7 to 11 and the stopping rule in plain numpy, cycle by cycle, same random numbers."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """No wrong choice of columns passes the certificate, and a right one comes back as the problem's own tuples."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

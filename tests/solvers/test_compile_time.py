@@ -1,9 +1,6 @@
 """Compiling is told apart from solving: in a first process after installation, in a later one, and in none."""
 
 import json
-import os
-import subprocess
-import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +13,7 @@ from assoc._system.compile_time import compile_seconds, is_compiling, loading
 from assoc.packing.run import Run
 from assoc.simulation import simulate
 from assoc.solvers import Outcome, registry
+from tests.running import printed
 
 # one small kernel in place of a solver's many
 _PROGRAM = """
@@ -58,9 +56,7 @@ def test_a_first_process_and_a_second(text, tmp_path):
     program.write_text(text)
     answers = []
     for _ in range(2):
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-        done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
-        answers.append(json.loads(done.stdout))
+        answers.append(json.loads(printed(program, NUMBA_CACHE_DIR=tmp_path / "cache")))
     (cold, again), (warm, warm_again) = answers
     whole, runtime, compiling = cold
     assert compiling > 0.3 and runtime < 0.2 * compiling
@@ -105,9 +101,7 @@ def test_a_time_limit_begins_after_compiling(tmp_path):
     """The kernel is compiled after its deadline was computed."""
     program = tmp_path / "program.py"
     program.write_text(_LIMIT)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "ASSOC_INTERPRET": "0"}
-    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
-    in_time, compiling, stopped = json.loads(done.stdout)
+    in_time, compiling, stopped = json.loads(printed(program, NUMBA_CACHE_DIR=tmp_path / "cache", ASSOC_INTERPRET=0))
     assert compiling > 1.0 and in_time and not stopped
 
 

@@ -1,7 +1,5 @@
 """The genetic algorithm against a plain one, generation by generation, same random numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,9 +1,5 @@
 """A solver of one's own: registered once, it is one of them; its answers are checked and certified."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +9,7 @@ import pytest
 import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.solvers import Outcome, Parameters, registry
+from tests.running import printed
 
 
 @dataclass(frozen=True)
@@ -142,8 +139,7 @@ def test_convention():
         "    assert registry.solver(name) is module.solve and not hasattr(module, 'parameters')\n"
         "assert 'ortools' not in sys.modules\n"
     )
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    printed("-W", "error", "-c", code)
 
 
 def test_what_solvers_of_ones_own_are_written_with():

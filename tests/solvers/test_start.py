@@ -1,7 +1,5 @@
 """Warm starts: every solver takes one, none answers worse, and what is no solution is refused at the door."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

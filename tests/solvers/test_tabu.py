@@ -1,7 +1,5 @@
 """Tabu search against a plain one, move by move, same random numbers; tenure and aspiration on problems by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

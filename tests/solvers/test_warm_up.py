@@ -1,12 +1,10 @@
 """What ``warm_up`` promises: hard scenes meet no kernel that is not loaded."""
 
-import subprocess
-import sys
-
 import pytest
 
 import assoc
 from assoc.errors import InvalidInputError
+from tests.running import process
 
 _PROGRAM = """
 import assoc
@@ -29,7 +27,8 @@ print(loaded()[0] - before)
 
 @pytest.mark.slow
 def test_no_kernel_is_left_to_load():
-    done = subprocess.run([sys.executable, "-c", _PROGRAM], capture_output=True, text=True, timeout=600, check=True)
+    done = process("-c", _PROGRAM)
+    assert done.returncode == 0, done.stderr
     seconds, more = done.stdout.split()
     assert float(seconds) > 0.0
     assert int(more) == 0

@@ -1,14 +1,13 @@
 """Designs: grids, random designs, TOML tables, and what is refused."""
 
 import pickle
-import subprocess
-import sys
 
 import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sweeps import Setting, grid, random_settings, settings_from
 from assoc.sweeps.design import designed, read_words
+from tests.running import printed
 
 
 def test_a_grid_is_every_combination_and_the_last_varies_fastest():
@@ -27,8 +26,7 @@ def test_equal_settings_have_equal_keys_whatever_was_left_out():
 
 def test_keys_are_the_same_in_another_process():
     code = "from assoc.sweeps import Setting; print(Setting('aco', {'alpha': 2}).key)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == Setting("aco", {"alpha": 2}).key
+    assert printed("-c", code).strip() == Setting("aco", {"alpha": 2}).key
 
 
 def test_a_longer_random_design_begins_with_the_shorter_one():

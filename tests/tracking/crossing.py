@@ -1,7 +1,5 @@
 """A recording of two aircraft that cross, with codes and addresses."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from assoc.recordings import Recording, radar_of

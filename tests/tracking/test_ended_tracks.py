@@ -1,8 +1,6 @@
 """Tracks that are written as they end are those of a table that holds them all."""
 
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
@@ -16,6 +14,7 @@ from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
 from assoc.tracking.offline.ended_tracks import EndedTracks
+from tests.running import process
 
 WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
 
@@ -120,8 +119,7 @@ sys.exit(track.start())
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
 def test_an_interrupt_of_tracking_does_not_reach_the_writing(here):
-    command = [sys.executable, "-c", SLOW, "plots.csv", "-o", "t.csv", *WORDS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    done = process("-c", SLOW, "plots.csv", "-o", "t.csv", *WORDS)
     told = "assoc.track: interrupted; the tracks of 59 of 169 scans are written\n"
     assert (done.returncode, done.stderr) == (130, told)
     assert pd.read_csv("t.csv").time.max() < 600.0

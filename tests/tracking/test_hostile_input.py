@@ -1,7 +1,5 @@
 """What no sensor can have made is refused in one line, and the tracker is as it was."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

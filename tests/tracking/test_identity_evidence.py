@@ -1,7 +1,5 @@
 """Codes and addresses as evidence: Bayes by enumeration, aircraft that cross, wrong codes, saved trackers."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

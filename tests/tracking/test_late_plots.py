@@ -1,7 +1,5 @@
 """Late measurements: the tracks are those of a tracker that got everything in order."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trackers that decide each scan at once, of bearings alone: their tracks grow up in a nursery of hypotheses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Measurements with times of their own, against a plain Kalman filter, an enumeration and simultaneous scans."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

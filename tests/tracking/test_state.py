@@ -1,7 +1,5 @@
 """A tracker is its settings and one state: a step that is thrown away never was, and a file is the state."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

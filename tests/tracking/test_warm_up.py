@@ -1,9 +1,8 @@
 """What ``warm_up`` promises for trackers: no step meets a kernel that is not loaded."""
 
-import subprocess
-import sys
-
 import pytest
+
+from tests.running import process
 
 _PROGRAM = """
 import assoc, warnings
@@ -35,5 +34,5 @@ for scene in scenes:
 
 @pytest.mark.slow
 def test_no_step_compiles_or_loads():
-    done = subprocess.run([sys.executable, "-c", _PROGRAM], capture_output=True, text=True, timeout=900, check=True)
-    assert done.stdout == ""
+    done = process("-c", _PROGRAM)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
