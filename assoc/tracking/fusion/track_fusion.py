@@ -21,99 +21,27 @@ Y. Bar-Shalom, H. Chen, Multisensor track-to-track association for tracks with d
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from assoc._parameters import positive
-from assoc._system.door import door, doors
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.motion.models import Motion
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
-from assoc.tracking.births.initiation import velocity_components
+from assoc.tracking.fusion.systems import SystemTracks, check_tracks, open_states
 from assoc.tracking.track import Track
-from assoc.tracking.track_table import TrackTable
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-_OPEN_HEIGHT, _OPEN_VELOCITY = 5e3, 200.0
-"""Standard deviations of a height and of velocities that a system does not report, metres and m/s."""
 _LEAST_BOX = 1e4
 """Least side of the box of all tracks from which a density of targets is estimated, metres."""
 _ROUNDS = 15
 """Steps of the search for the weights of an intersection."""
-_CSV = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz")
-
-
-class SystemTracks(NamedTuple):
-    """The n tracks of one system at one time: positions and velocities."""
-
-    ids: Array
-    """Whole numbers above 0, (n,)."""
-    mean: Array
-    """x, y, z, vx, vy, vz; metres, m/s, (n, 6)."""
-    covariance: Array
-    """(n, 6, 6)."""
-    existence: Array
-    """Probability that there is a target, (n,)."""
-
-    @staticmethod
-    def of(tracks: Iterable[Track], motion: Motion) -> SystemTracks:
-        """Those of a tracker, whose filter has this motion model."""
-        tracks = list(tracks)
-        components = np.concatenate([np.array(motion.position), velocity_components(motion)]).astype(np.int64)
-        axes = len(motion.position)
-        kept = np.concatenate([np.arange(axes), 3 + np.arange(len(components) - axes)])
-        mean, covariance = open_states(len(tracks))
-        for row, track in enumerate(tracks):
-            mean[row, kept] = track.mean[components]
-            covariance[row, kept[:, None], kept] = track.covariance[components[:, None], components]
-        ids, existence = [track.track_id for track in tracks], [track.existence for track in tracks]
-        return SystemTracks(np.array(ids, dtype=np.int64), mean, covariance, np.array(existence, dtype=np.float64))
-
-    @staticmethod
-    def of_rows(rows: pd.DataFrame, sigma: float, sigma_velocity: float) -> SystemTracks:
-        """Those of rows of a table; values that are missing are open, standard deviations that are missing as given."""
-        mean, covariance = open_states(len(rows))
-        values = rows[list(_CSV[2:])].to_numpy(dtype=np.float64)
-        sigmas = np.full(values.shape, sigma_velocity)
-        sigmas[:, :3] = rows.reindex(columns=["sigma_x", "sigma_y", "sigma_z"]).fillna(sigma).to_numpy(dtype=np.float64)
-        known = np.isfinite(values) & (sigmas > 0.0)
-        known[:, 5] &= known[:, 2]
-        mean[known] = values[known]
-        diagonal = np.einsum("nii->ni", covariance)
-        diagonal[known] = sigmas[known] ** 2
-        existence = rows["existence"] if "existence" in rows else np.ones(len(rows))
-        return SystemTracks(rows["track_id"].to_numpy(dtype=np.int64), mean, covariance, np.asarray(existence, float))
-
-    def moved(self, seconds: float | Array, noise: float) -> SystemTracks:
-        """The tracks so many seconds later, with constant velocity and accelerations of this spectral density."""
-        dt = np.broadcast_to(np.asarray(seconds, dtype=np.float64), (len(self.ids),))
-        if not dt.any():
-            return self
-        F, Q = np.zeros((2, len(dt), 6, 6))
-        F[:], i = np.eye(6), np.arange(3)
-        F[:, i, i + 3] = dt[:, None]
-        size = np.abs(dt)[:, None]
-        Q[:, i, i], Q[:, i + 3, i + 3] = size**3 / 3.0, size
-        Q[:, i, i + 3] = Q[:, i + 3, i] = dt[:, None] * size / 2.0
-        mean = np.einsum("nij,nj->ni", F, self.mean)
-        return self._replace(mean=mean, covariance=F @ self.covariance @ F.transpose(0, 2, 1) + noise**2 * Q)
-
-
-def open_states(count: int) -> tuple[Array, Array]:
-    """Means (n, 6) and covariances of tracks of which nothing is known but that they are near the plane z = 0."""
-    covariance = np.zeros((count, 6, 6))
-    covariance[:] = np.diag([0.0, 0.0, _OPEN_HEIGHT, *[_OPEN_VELOCITY] * 3]) ** 2
-    return np.zeros((count, 6)), covariance
 
 
 @dataclass(frozen=True)
@@ -233,7 +161,7 @@ class TrackFusion:
         if len(tracks) != self.systems:
             raise InvalidInputError(f"tracks: expected those of {self.systems} systems, got {len(tracks)}")
         for s, one in enumerate(tracks):
-            _check(one, s)
+            check_tracks(one, s)
         chosen = self.parameters
         known = _part(self._known, time - self._known.seen <= chosen.patience)
         if len(known.ids):
@@ -387,93 +315,6 @@ def intersected(mean: Array, covariance: Array, used: Array) -> tuple[Array, Arr
         weights[several] *= np.einsum("gij,gsji->gs", P, inverse[several]) / mean.shape[2]
     P = np.linalg.inv(np.einsum("gs,gsij->gij", weights, inverse))
     return np.einsum("gij,gs,gsjk,gsk->gi", P, weights, inverse, mean, optimize=True), P
-
-
-@door
-def fuse_tables(
-    tables: Sequence[TrackTable | pd.DataFrame | str | os.PathLike[str]],
-    parameters: FusionParameters | None = None,
-    *,
-    interval: float | None = None,
-    sigma: float = 100.0,
-    sigma_velocity: float = 20.0,
-) -> TrackTable:
-    """Fuse tables of tracks of several systems into one.
-
-    Parameters
-    ----------
-    tables : sequence of TrackTable, DataFrame or path
-        Columns as in tracks.csv: track_id, time, x, y, z, vx, vy, vz, and sigma_x, sigma_y, sigma_z and existence if
-        known. All in one frame and of one clock. `assoc.integrations.asterix.read_tracks` reads category 062.
-    parameters : FusionParameters, optional
-    interval : float, optional
-        Seconds from picture to picture; default: the usual seconds between two times of the slowest system. A track
-        counts until twice as long after its last row.
-    sigma, sigma_velocity : float
-        Standard deviations of positions where a table has none, and of velocities, metres and m/s.
-
-    Raises
-    ------
-    InvalidInputError
-        There is no table, one cannot be read or lacks a column.
-    """
-    frames = [_frame(table, number) for number, table in enumerate(tables, 1)]
-    if not frames:
-        raise InvalidInputError("tables: expected at least one")
-    positive(sigma, "sigma")
-    positive(sigma_velocity, "sigma_velocity")
-    times = [np.unique(frame["time"].to_numpy(dtype=np.float64)) for frame in frames]
-    paces = [float(np.median(np.diff(one))) for one in times if len(one) > 1]
-    pace = max(paces, default=1.0) if interval is None else positive(interval, "interval")
-    every = np.concatenate(times)
-    fusion, table = TrackFusion(len(frames), parameters), TrackTable()
-    first, last = (float(every.min()), float(every.max())) if len(every) else (0.0, -1.0)
-    for time in first + pace * np.arange(int((last - first) / pace + 1e-9) + 1):
-        found = []
-        for frame in frames:
-            rows = frame[(frame["time"] <= time + 1e-9) & (frame["time"] > time - 2.0 * pace)]
-            rows = rows.drop_duplicates("track_id", keep="last")
-            one = SystemTracks.of_rows(rows, sigma, sigma_velocity)
-            found.append(one.moved(time - rows["time"].to_numpy(dtype=np.float64), fusion.parameters.noise))
-        table.add(fusion.step(float(time), found).tracks)
-    return table
-
-
-def _frame(table: Any, number: int) -> pd.DataFrame:
-    """A table as rows sorted by time, without tracks that are not confirmed."""
-    import pandas as pd
-
-    name = f"table {number}"
-    if isinstance(table, TrackTable):
-        table = table.to_frame()
-    elif isinstance(table, (str, os.PathLike)):
-        name = os.fspath(table)
-        try:
-            table = pd.read_csv(table)
-        except (OSError, ValueError) as error:
-            raise InvalidInputError(f"{name}: cannot be read as a table of tracks ({error})") from None
-    if not isinstance(table, pd.DataFrame):
-        raise InvalidInputError(f"{name}: expected a TrackTable, a DataFrame or a path, got {type(table).__name__}")
-    for column in _CSV:
-        if column not in table or table[column].dtype.kind not in "iuf":
-            raise InvalidInputError(f"{name}: expected numbers in the column {column!r}")
-    needed = table[["track_id", "time", "x", "y"]].to_numpy(dtype=np.float64)
-    if not np.isfinite(needed).all() or not (needed[:, 0] > 0).all():
-        raise InvalidInputError(f"{name}: expected a track_id above 0, time, x and y in each row")
-    if "confirmed" in table:
-        table = table[table["confirmed"].astype(bool)]
-    return table.sort_values("time", kind="stable")
-
-
-def _check(tracks: SystemTracks, s: int) -> None:
-    n = len(tracks.ids)
-    shapes = np.shape(tracks.mean), np.shape(tracks.covariance)
-    if shapes != ((n, 6), (n, 6, 6)):
-        raise InvalidInputError(f"tracks of system {s}: expected shapes {((n, 6), (n, 6, 6))}, got {shapes}")
-    if len(np.unique(tracks.ids)) < n or (n and tracks.ids.min() < 1):
-        raise InvalidInputError(f"tracks of system {s}: expected different ids above 0")
-    if not np.isfinite(tracks.mean).all() or (n and not np.linalg.eigvalsh(tracks.covariance).min() > 0.0):
-        raise InvalidInputError(f"tracks of system {s}: expected finite states and positive definite covariances")
 
 
 def _part(known: _Known, rows: Array) -> _Known:
