@@ -197,6 +197,8 @@ def _bound_blocks(
         entries = max(entries, count)
     tables, totals = _new_tables(widest, entries), np.empty(1 << widest)
     valid = False
+    # visits of blocks are counted: when each was the last, and when the price of each row changed
+    visit, seen, changed = 0, np.full(ptr.size - 1, -1), np.zeros(graph.number.size, np.int64)
     for turn in range(_PASSES + _FALLING):
         # a pass without a change has seen all blocks at these prices
         valid = True
@@ -204,6 +206,10 @@ def _bound_blocks(
             if is_over(deadline):
                 return False
             block = rows[ptr[b] : ptr[b + 1]]
+            if not _is_new(graph, block, changed, seen[b]):
+                continue
+            visit += 1
+            seen[b] = visit
             _summed(graph, block, prices, tables)
             _limited(block.size, tables)
             now = prices[block]
@@ -211,7 +217,9 @@ def _bound_blocks(
                 valid = False
             if turn < _PASSES and _raised(now, tables.limit, totals):
                 valid = False
-            prices[block] = now
+            for i in range(block.size):
+                if now[i] != prices[block[i]]:
+                    prices[block[i]], changed[block[i]] = now[i], visit + 1
         if valid:
             break
     if valid:
@@ -220,6 +228,17 @@ def _bound_blocks(
             _summed(graph, block, prices, tables)
             _narrowed(graph, block, tables, lower, upper)
     return valid
+
+
+@inner_njit
+def _is_new(graph: _Graph, block: Ints, changed: Ints, seen: int) -> bool:
+    """Whether the price of a row that the block's tuples touch has changed since it was seen."""
+    for r in block:
+        for x in range(graph.row_ptr[r], graph.row_ptr[r + 1]):
+            for q in graph.cols[graph.row_cols[x]]:
+                if q >= 0 and changed[q] > seen:
+                    return True
+    return False
 
 
 @inner_njit

@@ -15,8 +15,8 @@ from assoc.ranking.sweep import Graph, cluster, most_steps, new_work, planned, r
 
 _LEAST, _STEP = math.log(1e-12), math.log(4.0)
 """Where too many vertices would be open, tuples below this probability are left out; then it rises by this factor."""
-_MOST_NUMBERS = 2**26
-"""Numbers that a sweep holds at most, 8 bytes each."""
+_MOST_NUMBERS, _FEWER = 2**26, 2**24
+"""Numbers that a sweep holds at most, 8 bytes each, and where tuples are left out: there more of them gain little."""
 
 
 class Plan(NamedTuple):
@@ -53,13 +53,13 @@ def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[ND
     limit = np.full(vertices, _LEAST)
     members, work = np.empty(vertices, np.int64), new_work(vertices, edges)
     count = clusters = 0
-    largest = 1
+    largest, most_numbers = 1, _FEWER if drop else _MOST_NUMBERS
     for v in range(vertices):
         while label[v] < 0 and not wide[v]:
             inside = members[: cluster(graph, kept, v, clusters, label, members)]
             added = planned(graph, kept, inside, most, steps[count:], work)
             needed = room(steps[count : count + added]) if added >= 0 else 0
-            if added >= 0 and needed <= _MOST_NUMBERS:
+            if added >= 0 and needed <= most_numbers:
                 count += added
                 largest = max(largest, needed)
                 ends[clusters] = count
