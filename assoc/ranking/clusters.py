@@ -14,9 +14,6 @@ from assoc.packing.kernels.sorting import ascending_whole
 from assoc.packing.packing import find
 from assoc.problem import AssignmentProblem
 
-# number of tuples above which numbering by a mask is quicker than by sorting
-_MANY = 2000
-
 
 def clusters_of(problem: AssignmentProblem) -> list[NDArray[np.int64]]:
     """Return ``problem.components()``: rows of each cluster's tuples, ascending; clusters by their first tuple."""
@@ -46,14 +43,9 @@ def cluster_problems(problem: AssignmentProblem) -> Iterator[tuple[AssignmentPro
 
 def _numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
     """Renumber one sensor's measurements in a cluster from 1 (0 is the dummy); return the numbers and their count."""
-    if column.size < _MANY:
-        used, number = np.unique(column, return_inverse=True)
-        alone = used[0] != 0
-        return number.reshape(-1) + int(alone), used.size - int(not alone)
-    seen = np.zeros(int(column.max()) + 1, dtype=np.int64)
-    seen[column] = 1
-    seen[0] = 0
-    return np.cumsum(seen)[column] * (column > 0), int(seen.sum())
+    used, number = np.unique(column, return_inverse=True)
+    alone = used[0] != 0
+    return number.reshape(-1) + int(alone), used.size - int(not alone)
 
 
 def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -268,11 +268,6 @@ def _greedy(problem: AssignmentProblem, run: Run) -> NDArray[np.int64]:
 
 def _totals(index: NDArray[np.int64], values: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
     """Return the distinct tuples of a cluster, and the sum of the values of each."""
-    if 10 * index.size > num:
-        seen = np.zeros(num, dtype=bool)
-        seen[index] = True
-        touched = np.flatnonzero(seen)
-        return touched, np.asarray(np.bincount(index, values, num), dtype=np.float64)[touched]
     touched, number = np.unique(index, return_inverse=True)
     return touched, np.asarray(np.bincount(number.reshape(-1), values), dtype=np.float64)
 
