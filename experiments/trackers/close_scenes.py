@@ -101,7 +101,8 @@ def _places(rng: np.random.Generator, count: int) -> Array:
     return rng.uniform([-12_000.0, -12_000.0, 4_000.0], [12_000.0, 12_000.0, 10_000.0], (count, 3))
 
 
-def _level(heading: Array, speed: Array) -> Array:
+def level(heading: Array, speed: Array) -> Array:
+    """Level velocities (n, 3) of these headings and speeds."""
     return np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(len(heading))], axis=1)
 
 
@@ -109,7 +110,7 @@ def _separate(rng: np.random.Generator) -> tuple[Array, Array]:
     # each on a height of its own, so that none come near each other
     places = _places(rng, TARGETS)
     places[:, 2] = rng.permutation(np.linspace(1_000.0, 11_000.0, TARGETS))
-    return places, _level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(150.0, 230.0, TARGETS))
+    return places, level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(150.0, 230.0, TARGETS))
 
 
 def _formations(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -121,9 +122,9 @@ def _formations(rng: np.random.Generator) -> tuple[Array, Array]:
     aside = np.stack([-np.sin(heading), np.cos(heading), np.zeros(groups)], axis=1)
     steps = np.concatenate([np.zeros((groups, 1)), rng.uniform(200.0, 500.0, (groups, _SHARE - 1))], axis=1)
     offset = np.cumsum(steps, axis=1)[:, :, None] * aside[:, None]
-    back = rng.uniform(-50.0, 50.0, (groups, _SHARE, 1)) * _level(heading, np.ones(groups))[:, None]
+    back = rng.uniform(-50.0, 50.0, (groups, _SHARE, 1)) * level(heading, np.ones(groups))[:, None]
     places = (leaders[:, None] + offset + back).reshape(-1, 3)
-    return places, np.repeat(_level(heading, speed), _SHARE, axis=0)
+    return places, np.repeat(level(heading, speed), _SHARE, axis=0)
 
 
 def _crossings(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -134,7 +135,7 @@ def _crossings(rng: np.random.Generator) -> tuple[Array, Array]:
     places[:, :2] += rng.normal(0.0, 50.0, (TARGETS, 2))
     heading = np.repeat(rng.uniform(-np.pi, np.pi, pairs), 2)
     heading[1::2] += np.radians(rng.uniform(5.0, 15.0, pairs))
-    return places, _level(heading, np.repeat(rng.uniform(150.0, 230.0, pairs), 2))
+    return places, level(heading, np.repeat(rng.uniform(150.0, 230.0, pairs), 2))
 
 
 _FLIGHTS = {"separate": _separate, "formations": _formations, "crossings": _crossings}

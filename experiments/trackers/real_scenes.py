@@ -19,9 +19,10 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import Initiation
 from assoc.tracking.filter_choice import make_filter, manoeuvre_noise, two_speeds
-from experiments.trackers.close_scenes import REGION, SETTINGS, Setting, radars, simulate
+from experiments.trackers.close_scenes import REGION, SETTINGS, Setting, level, radars, simulate
 
 TARGETS, SCANS, INTERVAL = 12, 40, 4.0
+TIMES = INTERVAL * np.arange(SCANS)
 SEPARATE = SETTINGS["separate"]
 
 
@@ -114,17 +115,17 @@ def _left(scene: Scene, kept: Sequence[Sequence[Array]]) -> Scene:
 def splitting(seed: int) -> Case:
     """Six targets; a second one leaves each at half time, at 5 to 15 m/s."""
     rng = np.random.default_rng(seed)
-    half, count, times = SCANS // 2, TARGETS // 2, INTERVAL * np.arange(SCANS)
+    half, count = SCANS // 2, TARGETS // 2
     heading, speed = rng.uniform(-np.pi, np.pi, count), rng.uniform(150.0, 230.0, count)
-    ahead = np.stack([np.cos(heading), np.sin(heading), np.zeros(count)], axis=1)
+    ahead = level(heading, np.ones(count))
     aside = np.stack([-np.sin(heading), np.cos(heading), np.zeros(count)], axis=1)
     middle = rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (count, 3))
-    after = (times - times[half])[:, None, None]
+    after = (TIMES - TIMES[half])[:, None, None]
     parents = middle + after * speed[:, None] * ahead
     parted = parents + np.maximum(after, 0.0) * rng.uniform(5.0, 15.0, (count, 1)) * aside
     ids = [np.arange(count if k <= half else TARGETS) for k in range(SCANS)]
     paths = [np.concatenate([parents[k], parted[k]])[: len(ids[k])] for k in range(SCANS)]
-    return Case(observe(radars(SEPARATE), times, ids, paths, rng, region=REGION))
+    return Case(observe(radars(SEPARATE), TIMES, ids, paths, rng, region=REGION))
 
 
 def wind_farm(seed: int) -> Case:
@@ -148,11 +149,9 @@ def wind_farm(seed: int) -> Case:
 def ships(seed: int, reports: bool = True) -> Case:
     """Ships seen by a radar; with `reports`, each tells its position every 10 s, as a sensor that never looks."""
     rng, region = np.random.default_rng(seed), np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 1.0]])
-    times = INTERVAL * np.arange(SCANS)
-    heading, speed = rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(3.0, 10.0, TARGETS)
-    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(TARGETS)], axis=1)
+    velocity = level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(3.0, 10.0, TARGETS))
     middle = np.append(rng.uniform(-8e3, 8e3, (TARGETS, 2)), np.zeros((TARGETS, 1)), axis=1)
-    paths = middle + (times - times.mean())[:, None, None] * velocity
+    paths = middle + (TIMES - TIMES.mean())[:, None, None] * velocity
     view = np.array([[0.0, 15e3], [-np.pi, np.pi]])
     radar = Radar2D(
         position=np.zeros(3), noise=np.array([50.0, 5e-3]), detection_probability=0.9, false_alarm_rate=10.0,
@@ -164,13 +163,13 @@ def ships(seed: int, reports: bool = True) -> Case:
     )  # fmt: skip
     ids = [np.arange(TARGETS)] * SCANS
     sensors: list[Sensor] = [radar, ais] if reports else [radar]
-    scene = observe(sensors, times, ids, list(paths), rng, region=region)
+    scene = observe(sensors, TIMES, ids, list(paths), rng, region=region)
     filter = ExtendedKalmanFilter(ConstantVelocity(0.1, dimensions=2, kind="continuous"))
     options = {"filter": filter, "initiation": Initiation(speed=8.0)}
     if not reports:
         return Case(scene, options=options)
     phase = rng.uniform(0.0, 10.0, TARGETS)
-    turn = np.floor((times[:, None] + phase) / 10.0)
+    turn = np.floor((TIMES[:, None] + phase) / 10.0)
     due = np.diff(turn, axis=0, prepend=turn[:1] - (phase < INTERVAL)) > 0
     scene = _at_times(scene, 1, due)
     everywhere, nowhere = (-np.pi, np.pi), (0.0, 0.0)
@@ -226,16 +225,21 @@ def one_planar(seed: int, declared: float = 100.0) -> Case:
     """Low targets under one radar without heights, 100 false alarms a scan, of which so many are declared."""
     scene, region = simulate(SEPARATE, seed), np.array([*REGION[:2], [0.0, 2e3]])
     assert scene.truth is not None
-    full, rng = scene.sensors[0], np.random.default_rng([seed, 1])
-    radar = Radar2D(
-        position=full.position, noise=full.noise[:2], detection_probability=0.9, false_alarm_rate=100.0,
-        field_of_view=full.field_of_view[:2], name="radar",
-    )  # fmt: skip
+    radar = replace(_planar(scene.sensors[0]), false_alarm_rate=100.0, name="radar")
+    rng = np.random.default_rng([seed, 1])
     paths = [_at_height(at, 1e3) for at in scene.truth.positions]
     scene = observe([radar], scene.times, scene.truth.target_ids, paths, rng, region=region)
     told = [replace(radar, false_alarm_rate=declared)]
     filter = make_filter("imm-cv", told, pace=INTERVAL, region=region)
     return Case(replace(scene, sensors=told), options={"filter": filter}, level=True)
+
+
+def _planar(radar: Sensor) -> Radar2D:
+    """The radar without elevations."""
+    return Radar2D(
+        position=radar.position, noise=radar.covariance[:2, :2], detection_probability=radar.detection_probability,
+        false_alarm_rate=radar.false_alarm_rate, field_of_view=radar.field_of_view[:2], name=radar.name,
+    )  # fmt: skip
 
 
 def _at_height(places: Array, height: float) -> Array:
@@ -244,13 +248,7 @@ def _at_height(places: Array, height: float) -> Array:
 
 def flat_radars(seed: int, height: float | None = None) -> Case:
     """Three radars without elevations, and the filter of the programs; with a height, all targets fly there."""
-    sensors: list[Sensor] = [
-        Radar2D(
-            position=one.position, noise=one.covariance[:2, :2], detection_probability=one.detection_probability,
-            false_alarm_rate=one.false_alarm_rate, field_of_view=one.field_of_view[:2], name=one.name,
-        )
-        for one in radars(SEPARATE)
-    ]  # fmt: skip
+    sensors: list[Sensor] = [_planar(radar) for radar in radars(SEPARATE)]
     scene = simulate(SEPARATE, seed, sensors=sensors)
     assert scene.truth is not None
     if height is not None:
@@ -263,17 +261,17 @@ def flat_radars(seed: int, height: float | None = None) -> Case:
 
 def abreast(seed: int, gap: float) -> Case:
     """Two targets side by side for the whole time."""
-    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    rng = np.random.default_rng(seed)
     heading = rng.uniform(-np.pi, np.pi)
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
     side = np.array([[-0.5], [0.5]]) * gap * np.array([-ahead[1], ahead[0], 0.0])
-    paths = [0.0, 0.0, 6e3] + side + (200.0 * (times - times.mean()))[:, None, None] * ahead
-    return Case(observe(radars(SEPARATE), times, [np.arange(2)] * SCANS, list(paths), rng, region=REGION))
+    paths = [0.0, 0.0, 6e3] + side + (200.0 * (TIMES - TIMES.mean()))[:, None, None] * ahead
+    return Case(observe(radars(SEPARATE), TIMES, [np.arange(2)] * SCANS, list(paths), rng, region=REGION))
 
 
 def landing(seed: int) -> Case:
     """Aircraft at 75 m/s on glide paths of 3 degrees, 5 km apart, to three runways 5 km before each radar."""
-    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
+    rng = np.random.default_rng(seed)
     places = on_circle(np.zeros(3), 20e3, 3)
     sensors = [
         radar_over(
@@ -284,7 +282,7 @@ def landing(seed: int) -> Case:
     ]  # fmt: skip
     ids, paths = [], []
     first = rng.uniform(3e3, 8e3, 3)
-    for t in times.tolist():
+    for t in TIMES.tolist():
         left = first[:, None] + 5e3 * np.arange(TARGETS // 3) - 75.0 * t
         along = -places / np.linalg.norm(places, axis=1)[:, None]
         where = (places + 5e3 * along)[:, None] + left[..., None] * along[:, None]
@@ -292,31 +290,31 @@ def landing(seed: int) -> Case:
         flying = left.ravel() > 0
         ids.append(np.flatnonzero(flying))
         paths.append(where.reshape(-1, 3)[flying])
-    return Case(observe(sensors, times, ids, paths, rng, region=REGION))
+    return Case(observe(sensors, TIMES, ids, paths, rng, region=REGION))
 
 
 def crossing(seed: int) -> Case:
     """Pairs that meet at half time at right angles, 50 m off."""
-    rng, times, pairs = np.random.default_rng(seed), INTERVAL * np.arange(SCANS), TARGETS // 2
+    rng, pairs = np.random.default_rng(seed), TARGETS // 2
     middle = np.repeat(rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (pairs, 3)), 2, axis=0)
     middle[:, 2] = np.repeat(rng.permutation(np.linspace(2e3, 10e3, pairs)), 2)
     middle[:, :2] += rng.normal(0.0, 50.0, (TARGETS, 2))
     heading = np.repeat(rng.uniform(-np.pi, np.pi, pairs), 2) + np.tile([0.0, np.pi / 2], pairs)
-    velocity = 200.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros(TARGETS)], axis=1)
-    paths = middle + (times - times.mean())[:, None, None] * velocity
-    return Case(observe(radars(SEPARATE), times, [np.arange(TARGETS)] * SCANS, list(paths), rng,
-                        region=REGION))  # fmt: skip
+    paths = middle + (TIMES - TIMES.mean())[:, None, None] * level(heading, np.full(TARGETS, 200.0))
+    return _all_seen(paths, rng)
+
+
+def _all_seen(paths: Array, rng: np.random.Generator) -> Case:
+    """Targets that are there all the time, seen by the usual radars."""
+    return Case(observe(radars(SEPARATE), TIMES, [np.arange(TARGETS)] * SCANS, list(paths), rng, region=REGION))
 
 
 def hovering(seed: int) -> Case:
     """Drones that stand for half of the time, then fly at 5 to 15 m/s."""
-    rng, times = np.random.default_rng(seed), INTERVAL * np.arange(SCANS)
-    heading, speed = rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(5.0, 15.0, TARGETS)
-    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(TARGETS)], axis=1)
+    rng = np.random.default_rng(seed)
+    velocity = level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(5.0, 15.0, TARGETS))
     start = rng.uniform([-15e3, -15e3, 300.0], [15e3, 15e3, 1500.0], (TARGETS, 3))
-    paths = start + np.maximum(times - times.mean(), 0.0)[:, None, None] * velocity
-    return Case(observe(radars(SEPARATE), times, [np.arange(TARGETS)] * SCANS, list(paths), rng,
-                        region=REGION))  # fmt: skip
+    return _all_seen(start + np.maximum(TIMES - TIMES.mean(), 0.0)[:, None, None] * velocity, rng)
 
 
 def late_clock(seed: int) -> Case:
@@ -381,14 +379,12 @@ def flat_states(options: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**options, "filter": two_speeds(manoeuvre_noise(INTERVAL), 2)}
 
 
-QUIET, NOISY, LOUD = ((noise, noise, noise) for noise in (80.0, 160.0, 240.0))
+NOISY, LOUD = (160.0,) * 3, (240.0,) * 3
 ADAPTING = "multi-sensor, adapting"
 """What the programs run."""
 JOINT = "joint-probabilistic"
 SITES = "sites"
 """A tracker at each sensor, which sends tracks alone; see `experiments.trackers.sites`."""
-WITHOUT = ("views", "heights", "estimates", "map", "life")
-"""What can be left out of the programs' tracker; `joint-probabilistic, all permutations` is the sixth."""
 
 
 class Row(NamedTuple):
@@ -396,7 +392,7 @@ class Row(NamedTuple):
 
     make: Its scene, from a seed.
     also: Trackers besides the usual ones.
-    without: Of `WITHOUT`, what the scene needs.
+    without: What the scene needs of the programs' tracker: views, heights, estimates, map, life.
     goals: Largest value of what is judged, by tracker and field of `Judged`.
     ids: Whether tracks may get too many ids.
     harmless: Nothing is wrong, or it does no harm: trackers have to be as good as the oracle, nearly.
