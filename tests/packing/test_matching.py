@@ -178,3 +178,35 @@ def test_many_rows_of_few_edges_like_scipy():
     assert found.cost == pytest.approx(matrix[chosen].sum(), rel=1e-12)
     assert found.row_duals.sum() + found.column_duals.sum() == pytest.approx(found.cost, rel=1e-9)
     assert (costs - found.row_duals[row] - found.column_duals[column]).min() > -1e-9
+
+
+@pytest.mark.parametrize("kind", ["any", "whole", "few", "excluding", "narrow"])
+def test_an_auction_leaves_optimal_duals(kind):
+    rng = np.random.default_rng(5)
+    n = 120
+    matrix = rng.random((n, n))
+    if kind in ("whole", "few"):
+        matrix = np.floor(matrix * (100 if kind == "whole" else 3))
+    if kind == "excluding":
+        matrix[rng.random((n, n)) < 0.3] = 1e6
+    # narrow: many rows of one edge or two, for whose columns others bid long
+    keep = rng.random((n, n)) < (0.01 if kind == "narrow" else 0.06)
+    keep[np.arange(n), rng.permutation(n)] = True
+    forced = np.full(n, np.inf)
+    assert _check(matrix, keep, forced, forced)
+    found = match(*_sparse(matrix, keep), forced, forced)
+    if kind in ("whole", "few"):
+        assert (found.row_duals == np.round(found.row_duals)).all()
+        assert (found.column_duals == np.round(found.column_duals)).all()
+
+
+def test_an_auction_ends_where_there_is_no_matching():
+    rng = np.random.default_rng(6)
+    n = 200
+    keep = rng.random((n, n)) < 0.05
+    # eleven rows for ten columns
+    keep[:11] = False
+    keep[:11, :10] = True
+    forced = np.full(n, np.inf)
+    with pytest.raises(InfeasibleError):
+        match(*_sparse(rng.random((n, n)), keep), forced, forced)

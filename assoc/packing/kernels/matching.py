@@ -1,9 +1,9 @@
 """Two-dimensional assignment: exact, sparse, with slack on either side, and with its duals.
 
 Rows are matched to columns at the cost of the edge; an unmatched row or column costs its slack
-(``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima
-and the augmenting row reduction of [1]_, then Dijkstra with a heap from every row that is left. A row's slack is a
-private column at which any path can end.
+(``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima, then an auction
+with falling steps [2]_ where all rows and columns must be matched, else the augmenting row reduction of [1]_, then
+Dijkstra with a heap from every row that is left. A row's slack is a private column at which any path can end.
 
 The duals solve
 
@@ -15,10 +15,13 @@ References
 ----------
 .. [1] R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear
    assignment problems", Computing 38, 325-340 (1987).
+.. [2] D. P. Bertsekas, "The auction algorithm: a distributed relaxation method for the assignment problem", Annals of
+   Operations Research 14, 105-123 (1988).
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +36,11 @@ from assoc.packing.kernels.heap import doubled, pop, push
 _MANY = 20_000
 # most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
 _STEPS, _CHEAP = 4, 256
+# least steps of the auction, in units of the rows' gap between best and second best: the first, those that follow as
+# shares of the one before, the last; no smaller once below a share of 1 for whole-numbered costs
+_FIRST, _FALL, _LAST, _WHOLE = 1.0, 0.1, 0.009, 0.15
+# most bids in all for each row; rows that are left where no bids are made
+_BIDS, _FEW = 40, 8
 
 
 class Matching(NamedTuple):
@@ -156,7 +164,11 @@ def match_sparse(
     state = _State(row_edge, u, v, owner, pending)
     many = indices.size > _MANY
     dense = many and 4 * indices.size > n * m
-    num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
+    if price == 0.0 and not dense and num_pending > _FEW:
+        # free columns may keep a price here, as none stays free
+        num_pending = _hold_auction(problem, state, num_pending)
+    else:
+        num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
     if num_pending > 0:
         if not (_augment_dense(problem, state, num_pending) if dense else _augment_all(problem, state, num_pending)):
             return np.inf
@@ -168,6 +180,110 @@ def match_sparse(
         if owner[j] < 0:
             total += column_slack[j]
     return total
+
+
+@inner_njit
+def _hold_auction(problem: _Costs, state: _State, num_pending: int) -> int:
+    """Bring duals near optimal ones by auctions with smaller and smaller steps; return how many rows are pending.
+
+    Unlike the row reduction it does not stall where prices rise by little, or not at all (ties). It leaves each
+    matched row at its least reduced cost, as augmenting paths need it.
+    """
+    gap, whole = _typical_gap(problem)
+    bids = _BIDS * state.u.size
+    step = _FIRST * gap
+    while step > _LAST * gap:
+        bids = _bid(problem, state, num_pending, (step, gap), bids)
+        last = bids <= 0 or (whole and step < _WHOLE) or _FALL * step <= _LAST * gap
+        if whole and last:
+            # optimal duals are whole numbers, too
+            for j in range(state.v.size):
+                state.v[j] = math.floor(state.v[j] + 0.5)
+        num_pending = _unmatch_loose(problem, state)
+        if last:
+            break
+        step *= _FALL
+    return num_pending
+
+
+@inner_njit
+def _typical_gap(problem: _Costs) -> tuple[float, bool]:
+    """The geometric mean of the rows' gaps between least and second least cost; whether all are whole numbers."""
+    indptr, above = problem.indptr, problem.above
+    total, count, whole = 0.0, 0, True
+    for i in range(indptr.size - 1):
+        least = second = np.inf
+        for k in range(indptr[i], indptr[i + 1]):
+            value = above[k]
+            whole = whole and (value == math.floor(value) or value == np.inf)
+            if value < least:
+                least, second = value, least
+            elif least < value < second:
+                second = value
+        if second < np.inf:
+            total += math.log(second - least)
+            count += 1
+    # few large costs, as of forbidden edges, do not move this mean
+    return (math.exp(total / count) if count > 0 else 1.0), whole
+
+
+@inner_njit
+def _bid(problem: _Costs, state: _State, num_pending: int, sizes: tuple[float, float], bids: int) -> int:
+    """Match all pending rows, each at a price that is above the second best offer by a step; return the bids left."""
+    indptr, indices, unsigned, _, _, above = problem
+    row_edge, _, v, owner, pending = state
+    step, gap = sizes
+    while num_pending > 0 and bids > 0:
+        num_pending -= 1
+        i = pending[num_pending]
+        while i >= 0 and bids > 0:
+            bids -= 1
+            least, second, best = np.inf, np.inf, -1
+            for k in range(indptr[i], indptr[i + 1]):
+                value = above[k] - v[unsigned[k]]
+                if value < least:
+                    least, second, best = value, least, k
+                elif value < second:
+                    second = value
+            if best < 0:
+                break
+            j = indices[best]
+            # a row of one edge bids a usual gap
+            v[j] -= (second - least if second < np.inf else gap) + step
+            other = owner[j]
+            owner[j] = i
+            row_edge[i] = best
+            if other >= 0:
+                row_edge[other] = -1
+            i = other
+    return bids
+
+
+@inner_njit
+def _unmatch_loose(problem: _Costs, state: _State) -> int:
+    """Set the rows' duals for the columns' and unmatch rows above theirs; return how many rows are not matched."""
+    indptr, indices, unsigned, _, _, above = problem
+    row_edge, u, v, owner, pending = state
+    for i in range(u.size):
+        least = np.inf
+        for k in range(indptr[i], indptr[i + 1]):
+            least = min(least, above[k] - v[unsigned[k]])
+        u[i] = least
+        e = row_edge[i]
+        if e >= 0 and above[e] - v[unsigned[e]] > least:
+            owner[indices[e]], row_edge[i] = -1, -1
+    count = 0
+    for i in range(u.size):
+        if row_edge[i] >= 0:
+            continue
+        for k in range(indptr[i], indptr[i + 1]):
+            if owner[unsigned[k]] < 0 and above[k] - v[unsigned[k]] <= u[i]:
+                row_edge[i], owner[unsigned[k]] = k, i
+                break
+        if row_edge[i] < 0:
+            pending[count] = i
+            count += 1
+    return count
 
 
 @inner_njit
