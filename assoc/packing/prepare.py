@@ -128,7 +128,8 @@ def _lower_to_least(
         for s in range(offsets.size):
             if tuples[k, s] > 0:
                 r = offsets[s] + tuples[k, s] - 1
-                least[r] = min(least[r], costs[k])
+                if costs[k] < least[r]:
+                    least[r] = costs[k]
 
 
 def prepare(problem: AssignmentProblem) -> Prepared:
@@ -143,7 +144,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
             problem.tuples, problem.costs, offsets, int(sizes.sum())
         )
     else:
-        rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
+        rows = problem.tuples + (offsets - 1).astype(np.int32)
         slack = np.repeat(sizes > sizes.min(), sizes)
         # copies: the problem's arrays are read-only, and numba would compile kernels again for those
         costs = problem.costs.copy()

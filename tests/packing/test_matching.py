@@ -210,3 +210,19 @@ def test_an_auction_ends_where_there_is_no_matching():
     forced = np.full(n, np.inf)
     with pytest.raises(InfeasibleError):
         match(*_sparse(rng.random((n, n)), keep), forced, forced)
+
+
+@pytest.mark.parametrize("kind", ["any", "whole", "few", "product", "like columns"])
+def test_dense_ones_are_solved_by_their_cheapest_edges_first(kind):
+    rng = np.random.default_rng(7)
+    n = 160
+    matrix = rng.random((n, n))
+    if kind in ("whole", "few"):
+        matrix = np.floor(matrix * (100 if kind == "whole" else 3))
+    if kind == "product":
+        matrix = np.outer(np.arange(1.0, n + 1), np.arange(1.0, n + 1))
+    if kind == "like columns":
+        # all rows have the same cheapest columns, which cannot match them
+        matrix += 10.0 * np.arange(n)
+    forced = np.full(n, np.inf)
+    assert _check(matrix, np.ones((n, n), dtype=np.bool_), forced, forced)

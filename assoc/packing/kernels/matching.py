@@ -36,11 +36,13 @@ from assoc.packing.kernels.heap import doubled, pop, push
 _MANY = 20_000
 # most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
 _STEPS, _CHEAP = 4, 256
-# least steps of the auction, in units of the rows' gap between best and second best: the first, those that follow as
-# shares of the one before, the last; no smaller once below a share of 1 for whole-numbered costs
-_FIRST, _FALL, _LAST, _WHOLE = 1.0, 0.1, 0.009, 0.15
-# most bids in all for each row; rows that are left where no bids are made
+# steps of the auction: the first as a share of the spread of a row's costs (a gap between best and second best, if that
+# is more), those that follow as shares of the one before, the last as a share of a gap, or of 1 for whole-numbered costs
+_FIRST, _FALL, _LAST, _WHOLE = 0.05, 0.1, 0.05, 0.15
+# most bids for each row with one step; rows that are left where no bids are made
 _BIDS, _FEW = 40, 8
+# cheapest edges of each row that dense problems are solved with at first: so many to twice as many
+_CORE = 16
 
 
 class Matching(NamedTuple):
@@ -164,9 +166,12 @@ def match_sparse(
     state = _State(row_edge, u, v, owner, pending)
     many = indices.size > _MANY
     dense = many and 4 * indices.size > n * m
-    if price == 0.0 and not dense and num_pending > _FEW:
+    if price == 0.0 and num_pending > _FEW:
         # free columns may keep a price here, as none stays free
-        num_pending = _hold_auction(problem, state, num_pending)
+        if dense:
+            num_pending = _solve_core(problem, state)
+        if not dense or num_pending > n // 2:
+            num_pending = _hold_auction(problem, state, num_pending)
     else:
         num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
     if num_pending > 0:
@@ -183,38 +188,107 @@ def match_sparse(
 
 
 @inner_njit
+def _solve_core(problem: _Costs, state: _State) -> int:
+    """Match the rows by their cheapest edges alone, then unmatch those that others undercut; return how many are left.
+
+    Mostly few are: an optimal matching takes none but cheap edges.
+    """
+    row_edge, u, v, owner, pending = state
+    places, indptr = _cheapest(problem)
+    indices = np.empty(places.size, np.int64)
+    above, chosen = np.empty(places.size), np.full(u.size, -1, np.int64)
+    for e in range(places.size):
+        indices[e], above[e] = problem.indices[places[e]], problem.above[places[e]]
+    for i in range(u.size):
+        pending[i] = i
+    for j in range(v.size):
+        owner[j] = -1
+    core = _Costs(indptr, indices, indices.astype(np.uint64), above, problem.row_slack, above)
+    part = _State(chosen, u, v, owner, pending)
+    left = _hold_auction(core, part, u.size)
+    if left > 0:
+        # where the core has no matching what is found is still a beginning
+        _augment_all(core, part, left)
+    for i in range(u.size):
+        row_edge[i] = places[chosen[i]] if chosen[i] >= 0 else -1
+    return _unmatch_loose(problem, state)
+
+
+@inner_njit
+def _cheapest(problem: _Costs) -> tuple[Ints, Ints]:
+    """About as many of the cheapest edges of each row as a core has, and where each row's begin."""
+    indptr, above = problem.indptr, problem.above
+    num = indptr.size - 1
+    places, begin = np.empty(2 * num * _CORE, np.int64), np.zeros(num + 1, np.int64)
+    for i in range(num):
+        row = above[indptr[i] : indptr[i + 1]]
+        limit = _limit_of_cheap(row)
+        end = begin[i]
+        for t in range(row.size):
+            if row[t] <= limit and end < begin[i] + 2 * _CORE:
+                places[end] = indptr[i] + t
+                end += 1
+        begin[i + 1] = end
+    return places[: begin[num]].copy(), begin
+
+
+@inner_njit
+def _limit_of_cheap(row: Floats) -> float:
+    """A cost that between one and two times as many as a core has are below or at, if halving finds one."""
+    low, high = np.inf, -np.inf
+    for t in range(row.size):
+        low = min(low, row[t])
+        if row[t] < np.inf:
+            high = max(high, row[t])
+    if row.size > 2 * _CORE:
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            count = 0
+            for t in range(row.size):
+                count += row[t] <= middle
+            if count < _CORE:
+                low = middle
+            else:
+                high = middle
+                if count <= 2 * _CORE:
+                    break
+    return high
+
+
+@inner_njit
 def _hold_auction(problem: _Costs, state: _State, num_pending: int) -> int:
     """Bring duals near optimal ones by auctions with smaller and smaller steps; return how many rows are pending.
 
     Unlike the row reduction it does not stall where prices rise by little, or not at all (ties). It leaves each
     matched row at its least reduced cost, as augmenting paths need it.
     """
-    gap, whole = _typical_gap(problem)
-    bids = _BIDS * state.u.size
-    step = _FIRST * gap
-    while step > _LAST * gap:
-        bids = _bid(problem, state, num_pending, (step, gap), bids)
-        last = bids <= 0 or (whole and step < _WHOLE) or _FALL * step <= _LAST * gap
+    gap, spread, whole = _typical_gap(problem)
+    step = max(gap, _FIRST * spread)
+    while True:
+        bids = _bid(problem, state, num_pending, (step, gap), _BIDS * state.u.size)
+        last = bids <= 0 or step <= _LAST * gap or (whole and step < _WHOLE)
         if whole and last:
             # optimal duals are whole numbers, too
             for j in range(state.v.size):
                 state.v[j] = math.floor(state.v[j] + 0.5)
         num_pending = _unmatch_loose(problem, state)
         if last:
-            break
+            return num_pending
         step *= _FALL
-    return num_pending
 
 
 @inner_njit
-def _typical_gap(problem: _Costs) -> tuple[float, bool]:
-    """The geometric mean of the rows' gaps between least and second least cost; whether all are whole numbers."""
+def _typical_gap(problem: _Costs) -> tuple[float, float, bool]:
+    """Geometric means of the rows' gaps between least and second least cost, and largest; whether all are whole."""
     indptr, above = problem.indptr, problem.above
-    total, count, whole = 0.0, 0, True
+    total, wide, count, whole = 0.0, 0.0, 0, True
     for i in range(indptr.size - 1):
         least = second = np.inf
+        largest = -np.inf
         for k in range(indptr[i], indptr[i + 1]):
             value = above[k]
+            if value < np.inf:
+                largest = max(largest, value)
             whole = whole and (value == math.floor(value) or value == np.inf)
             if value < least:
                 least, second = value, least
@@ -222,9 +296,12 @@ def _typical_gap(problem: _Costs) -> tuple[float, bool]:
                 second = value
         if second < np.inf:
             total += math.log(second - least)
+            wide += math.log(largest - least)
             count += 1
-    # few large costs, as of forbidden edges, do not move this mean
-    return (math.exp(total / count) if count > 0 else 1.0), whole
+    if count == 0:
+        return 1.0, 1.0, whole
+    # few large costs, as of forbidden edges, do not move these means
+    return math.exp(total / count), math.exp(wide / count), whole
 
 
 @inner_njit
