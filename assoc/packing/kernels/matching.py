@@ -36,8 +36,8 @@ from assoc.packing.kernels.heap import doubled, pop, push
 _MANY = 20_000
 # most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
 _STEPS, _CHEAP = 4, 256
-# steps of the auction: the first as a share of the spread of a row's costs (a gap between best and second best, if that
-# is more), those that follow as shares of the one before, the last as a share of a gap, or of 1 for whole-numbered costs
+# steps of the auction: the first as a share of the spread of a row's costs (if more, a gap between its two best), the
+# next as a share of the one before, the last as a share of a gap, or of 1 for whole-numbered costs
 _FIRST, _FALL, _LAST, _WHOLE = 0.05, 0.1, 0.05, 0.15
 # most bids for each row with one step; rows that are left where no bids are made
 _BIDS, _FEW = 40, 8
