@@ -15,7 +15,8 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
+from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_pairs
+from assoc.filters.base import Filter
 from assoc.filters.batches import placed
 from assoc.tracking.progress import Progress
 from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
@@ -115,39 +116,68 @@ class Growth(ABC):
 
 
 class AtOnce(Growth):
-    """All sensors looked everywhere at one instant: predicted branches are updated sensor by sensor."""
+    """All sensors looked everywhere at one instant: predicted branches are updated sensor by sensor.
+
+    Where no sensor measures velocities only positions are: the whole states of those that are left in the end follow.
+    """
 
     def __init__(self, progress: Progress) -> None:
         super().__init__(progress)
+        settings, states = progress.settings, self._before.states
         self.order = range(self.rows.shape[1])
-        self._states = self._before.states
+        self._filter, self._states = self._seen(states)
+        self._partly = self._filter is not settings.filter
         self._corrected: Callable[[Array], Any] = self._states.__getitem__
-        self._begun: Any = None
+        # states at the beginning, one batch after the other: where each branch comes from, and what it was corrected by
+        self._begun, self._sources = [states], self.origin
+        self._since = self.rows
+
+    def _seen(self, states: Any) -> tuple[Filter[Any], Any]:
+        """What says how well measurements fit, and what it reads of states."""
+        settings = self._progress.settings
+        if any(getattr(sensor, "measures_velocity", True) for sensor in settings.sensors):
+            return settings.filter, states
+        return settings.filter.positions_alone(states)
 
     def offers(self, s: int) -> Offers:
         """Candidates by the measurements of sensor s."""
         settings, time = self._progress.settings, self._progress.scan.time
         z, sensor, terms = self._progress.scan.measurements[s], settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
-        pairs = track_pairs(settings.filter, self._states, z, sensor, gate)
+        pairs = track_pairs(self._filter, self._states, z, sensor, gate)
         begun, fit, positions, score = settings.births.singles(s, self._progress.scan, np.arange(len(z)))
-        self._corrected, self._begun = pairs.correct, begun
+        self._corrected = pairs.correct
+        self._begun.append(begun)
         numbers = np.flatnonzero(fit)
         births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
-        missed, gain = misses_of(self._progress, self._states, s), pairs.log_likelihood + terms.detection[s]
-        gain = gain - self._progress.scan.crowd(s, pairs.measurement)
+        missed = misses_of(self._progress, self._states, s, self._partly)
+        gain = pairs.log_likelihood + terms.detection[s] - self._progress.scan.crowd(s, pairs.measurement)
         return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
-        # states are corrected for the pairs that are kept, in blocks that stay in the cache
-        ends = np.array([len(self._states), len(self._states) + len(offers.branch)])
-        which = np.searchsorted(ends, kept, side="right")
-        sources = self._states.__getitem__, self._corrected, self._begun.__getitem__
-        parts = []
-        for number, (source, first) in enumerate(zip(sources, (0, *ends.tolist()), strict=True)):
-            rows = np.flatnonzero(which == number)
-            parts += [(part, source, kept[part] - first) for part in np.split(rows, range(_BLOCK, len(rows), _BLOCK))]
-        self._states = placed(len(kept), ((part, source(chosen)) for part, source, chosen in parts))
+        hit, begun = self._since[offers.branch], self._begun[-1]
+        hit[:, s] = offers.measurement + 1
+        self._since = np.concatenate([self._since, hit, np.zeros_like(offers.births.rows)])[kept]
+        first = sum(map(len, self._begun[:-1]))
+        new = np.arange(first, first + len(begun))
+        self._sources = np.concatenate([self._sources, self._sources[offers.branch], new])[kept]
+        _, positions = self._seen(begun)
+        sources = self._states.__getitem__, self._corrected, positions.__getitem__
+        lengths = len(self._states), len(offers.branch), len(begun)
+        self._states = _in_blocks(kept, lengths, lambda part, _, rows: sources[part](rows))
+
+    def _whole_states(self) -> Any:
+        """The states of all branches, corrected by all that belongs to them."""
+        settings, scan = self._progress.settings, self._progress.scan
+        if not self._partly:
+            return self._states
+        require_states(self._before.states, len(self._sources))
+
+        def grown(part: int, places: Array, rows: Array) -> Any:
+            begun = self._begun[part][rows]
+            return corrected(settings.filter, begun, scan.measurements, settings.sensors, self._since[places])
+
+        return _in_blocks(self._sources, [len(states) for states in self._begun], grown)
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
         """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
@@ -169,7 +199,8 @@ class AtOnce(Growth):
         ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
         begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
-        self._corrected, self._begun = self._states.__getitem__, begun
+        self._corrected = self._states.__getitem__
+        self._begun.append(begun)
         nothing = np.zeros(0, dtype=np.int64)
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
@@ -177,8 +208,9 @@ class AtOnce(Growth):
         """The branches at the end of the scan."""
         hit = np.asarray(self.rows.any(axis=1))
         seen = np.where(hit, self._progress.scan.time, np.nan)
-        at_all = detected_or_in_view(self._progress, self._states, hit)
-        return Grown(self._states, seen, seen, at_all)
+        states = self._whole_states()
+        at_all = detected_or_in_view(self._progress, states, hit)
+        return Grown(states, seen, seen, at_all)
 
 
 class InOrder(Growth):
@@ -220,6 +252,20 @@ class InOrder(Growth):
         last = np.where(self.rows.any(axis=1), followed.when, np.nan)
         at_all = looked(self._progress, self._misses[self._anchor])
         return Grown(self._timed.at_end(followed, self.origin), followed.first, last, at_all)
+
+
+def _in_blocks(kept: Array, lengths: Sequence[int], states: Callable[[int, Array, Array], Any]) -> Any:
+    """The states of rows `kept` (K,) of several batches one after the other, of these lengths, in blocks.
+
+    A block is `states` of the number of a batch, places in the result and rows of the batch; it stays in the cache.
+    """
+    ends = np.cumsum(lengths)
+    which = np.searchsorted(ends, kept, side="right")
+    blocks = []
+    for part, first in enumerate((ends - lengths).tolist()):
+        places = np.flatnonzero(which == part)
+        blocks += [(part, some, kept[some] - first) for some in np.split(places, range(_BLOCK, len(places), _BLOCK))]
+    return placed(len(kept), ((places, states(part, places, rows)) for part, places, rows in blocks))
 
 
 def growth_of(progress: Progress, timed: TimedScan | None) -> AtOnce | InOrder:
