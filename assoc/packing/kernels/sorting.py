@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array, Floats
+from assoc.packing.kernels.copying import copy_to
 
 # bits of a digit; for fewer numbers radix sort does not pay
 _BITS = 11
 _FEW = 5000
-# length of the runs sorted by insertion before they are merged
+# length up to which runs are sorted by insertion
 _RUN = 16
 
 
@@ -43,34 +44,76 @@ def _order_by_numpy(values: Array) -> Any:
 
 @partial(njit, stand_in=_order_by_numpy)
 def order_of(values: Array) -> Any:
-    """Return a stable argsort, for kernels."""
+    """Return a stable argsort, for kernels; the more the values are in order already, the faster."""
     num = values.size
-    order, other = np.empty(num, np.int64), np.empty(num, np.int64)
+    order, left = np.empty(num, np.int64), np.empty(num, np.int64)
     for i in range(num):
         order[i] = i
-    for begin in range(0, num, _RUN):
-        for i in range(begin + 1, min(begin + _RUN, num)):
-            moved = order[i]
-            index = i
-            while index > begin and values[order[index - 1]] > values[moved]:
-                order[index] = order[index - 1]
-                index -= 1
-            order[index] = moved
-    width = _RUN
-    while width < num:
-        for begin in range(0, num, 2 * width):
-            middle, end = min(begin + width, num), min(begin + 2 * width, num)
-            i, j = begin, middle
-            for index in range(begin, end):
-                if i < middle and (j == end or values[order[i]] <= values[order[j]]):
-                    other[index] = order[i]
-                    i += 1
-                else:
-                    other[index] = order[j]
-                    j += 1
-        order, other = other, order
-        width *= 2
+    # runs that ascend by themselves; shorter ones are sorted by insertion up to a length of their own
+    runs = np.empty(num // _RUN + 2, np.int64)
+    count = begin = 0
+    while begin < num:
+        end = begin + 1
+        while end < num and values[end - 1] <= values[end]:
+            end += 1
+        if end - begin < _RUN:
+            end = min(begin + _RUN, num)
+            _insert(order, values, begin, end)
+        runs[count] = begin
+        count += 1
+        begin = end
+    runs[count] = num
+    while count > 1:
+        pairs = count // 2
+        for p in range(pairs):
+            _merge(order, left, values, runs[2 * p], runs[2 * p + 1], runs[2 * p + 2])
+            runs[p] = runs[2 * p]
+        if count % 2:
+            runs[pairs] = runs[count - 1]
+        count -= pairs
+        runs[count] = num
     return order
+
+
+@inner_njit
+def sort_by(rows: Array, values: Array, begin: int, end: int) -> None:
+    """Sort a part of rows, mostly few, in place by their values; those of one value stay in order."""
+    if end - begin > _RUN:
+        part = rows[begin:end]
+        copy_to(part, part[order_of(values[part])])
+    else:
+        _insert(rows, values, begin, end)
+
+
+@lean_inner_njit
+def _insert(rows: Array, values: Array, begin: int, end: int) -> None:
+    for i in range(begin + 1, end):
+        moved, k = rows[i], i
+        while k > begin and values[rows[k - 1]] > values[moved]:
+            rows[k] = rows[k - 1]
+            k -= 1
+        rows[k] = moved
+
+
+@lean_inner_njit
+def _merge(order: Array, left: Array, values: Array, begin: int, middle: int, end: int) -> None:
+    """Merge two sorted runs of rows side by side, in place; `left` is working space."""
+    # what is in its place already stays there
+    while begin < middle and values[order[begin]] <= values[order[middle]]:
+        begin += 1
+    size = middle - begin
+    for i in range(size):
+        left[i] = order[begin + i]
+    i, j = 0, middle
+    for k in range(begin, end):
+        if i == size:
+            break
+        if j == end or values[left[i]] <= values[order[j]]:
+            order[k] = left[i]
+            i += 1
+        else:
+            order[k] = order[j]
+            j += 1
 
 
 @njit

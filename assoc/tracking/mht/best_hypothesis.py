@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.sorting import order_of
+from assoc.packing.kernels.sorting import order_of, sort_by
 from assoc.tracking.mht.losses import Priced
 
 VISITS = 20_000
@@ -53,12 +53,8 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
     none; and the largest relative gap of the other groups, 0 but for the largest.
     """
     chosen, doubtful = np.zeros(score.size, np.bool_), np.zeros(score.size, np.bool_)
-    good = np.flatnonzero(score > 0.0)
     num = known.trees.size
-    # branches of each tree, the least loss first
-    good = good[order_of(known.loss[good])]
-    good = good[order_of(known.number[good])]
-    start = np.searchsorted(known.number[good], np.arange(num + 1))
+    good, start = _by_tree(score, known)
     # trees that share a measurement belong to one group
     parent = np.arange(num)
     holder = np.full(known.measurements.size, -1, np.int64)
@@ -81,6 +77,13 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
         end = begin + 1
         while end < num and group[order[end]] == group[order[begin]]:
             end += 1
+        if end - begin == 1:
+            # nobody contends for measurements of this tree: the best of its branches loses nothing
+            t = order[begin]
+            if start[t] < start[t + 1]:
+                chosen[good[start[t]]] = True
+            begin = end
+            continue
         trees = order[begin:end]
         if trees.size * (trees.size - 1) // 2 <= visits:
             settled = _search(branches, trees, visits, chosen) >= 0
@@ -94,6 +97,25 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
                 doubtful[good[start[t] : start[t + 1]]] = True
         begin = end
     return chosen, doubtful, gap
+
+
+@inner_njit
+def _by_tree(score: Floats, known: Priced) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The branches of positive score, tree by tree, the least loss first, and where each tree begins, (T + 1,)."""
+    start = np.zeros(known.trees.size + 1, np.int64)
+    for row in range(score.size):
+        if score[row] > 0.0:
+            start[known.number[row] + 1] += 1
+    for t in range(known.trees.size):
+        start[t + 1] += start[t]
+    rows, place = np.empty(start[-1], np.int64), start.copy()
+    for row in range(score.size):
+        if score[row] > 0.0:
+            rows[place[known.number[row]]] = row
+            place[known.number[row]] += 1
+    for t in range(known.trees.size):
+        sort_by(rows, known.loss, start[t], start[t + 1])
+    return rows, start
 
 
 @inner_njit

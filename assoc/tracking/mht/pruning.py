@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats
-from assoc.packing.kernels.sorting import order_of
+from assoc.packing.kernels.sorting import order_of, sort_by
 
 
 @inner_njit
@@ -27,12 +27,14 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
         end = begin + 1
         while end < order.size and tree[order[end]] == tree[order[begin]]:
             end += 1
-        group = order[begin:end]
-        group = group[order_of(loss[group])]
-        limit = drop + max(0.0, -score[group].max())
-        for rank in range(min(most, group.size)):
-            if loss[group[rank]] <= limit:
-                kept[count] = group[rank]
+        sort_by(order, loss, begin, end)
+        best = -np.inf
+        for k in range(begin, end):
+            best = max(best, score[order[k]])
+        limit = drop + max(0.0, -best)
+        for k in range(begin, min(begin + most, end)):
+            if loss[order[k]] <= limit:
+                kept[count] = order[k]
                 count += 1
         begin = end
     return kept[:count].copy()
