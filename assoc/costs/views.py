@@ -23,6 +23,7 @@ from assoc.sensors.kernels.dispatch import linearise
 
 # shares nearer to 0 or 1 than this are 0 or 1
 _SURE = 1e-6
+_DEEP = 8.0
 _FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 BANDS = 10
 """Bands of range, equally wide, up to a sensor's reach."""
@@ -170,6 +171,9 @@ def _looked(bounds: Array, weights: Array, means: Array, covariances: Array, axe
                     for k in range(3):
                         variance += H[a, i] * spread[i, k] * H[a, k]
                 unit = math.sqrt(2.0) * max(math.sqrt(max(variance, 0.0)), 1e-12)
+                if min(high, -low) > _DEEP * unit:
+                    # the error functions below are 2 and 0 to the last digit
+                    continue
                 share *= 0.5 * (math.erfc(-high / unit) - math.erfc(-low / unit))
             share = 0.0 if share < _SURE else 1.0 if share > 1.0 - _SURE else share
             if bounds[s, 14] > 0.0:

@@ -76,9 +76,12 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
         for strip in range(low, high + 1):
             start, end = first[strip], first[strip + 1]
             if axis >= 0:
-                part = along[start:end]
-                end = start + np.searchsorted(part, h[t, axis] + reach[t, axis], side="right")
-                start += np.searchsorted(part, h[t, axis] - reach[t, axis], side="left")
+                start = _first(along, h[t, axis] - reach[t, axis], start, end)
+                farthest = h[t, axis] + reach[t, axis]
+                stop = start
+                while stop < end and along[stop] <= farthest:
+                    stop += 1
+                end = stop
             looked += max(end - start, 0)
             for k in range(start, end):
                 if _inside(h, t, z, order[k], reach, turning):
@@ -91,6 +94,18 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
                         return tracks[:count].copy(), found[:count].copy(), looked
         _sort(found, before, count)
     return tracks[:count].copy(), found[:count].copy(), looked
+
+
+@lean_inner_njit
+def _first(along: Array, least: float, begin: int, end: int) -> int:
+    """Where in this part of a sorted array numbers from `least` on begin."""
+    while begin < end:
+        middle = (begin + end) // 2
+        if along[middle] < least:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
 
 
 @inner_njit
