@@ -74,7 +74,8 @@ def scan(sensors, states, rng):
 
 def grown(filter_, states, z, sensors, **options):
     terms = score_terms(sensors)
-    misses = np.broadcast_to(terms.miss, (len(states), len(sensors)))
+    # an array of its own: one without steps between rows would be compiled for anew
+    misses = np.broadcast_to(terms.miss, (len(states), len(sensors))).copy()
     return grow_track_tuples(filter_, states, z, sensors, terms, misses, gate_probability=GATE, **options)
 
 
