@@ -104,6 +104,8 @@ def test_packed_files_that_are_cut_or_unpack_to_too_much(tmp_path):
         "assoc-solution 1\n1 " + "9" * 1_000_000 + "\n",
         "assoc-solution 1\ncost 1e999999\n1 1\n0 2\n",
     ],
+    # names of tests are given to the programs that they start, whole by older pytest
+    ids=lambda content: content[:24],
 )
 def test_hostile_proofs(content, tmp_path):
     (tmp_path / "i.txt").write_text(GOOD)

@@ -159,6 +159,9 @@ def test_sorting_as_numpy_does():
         np.where(rng.random(20_000) < 0.5, -0.0, 0.0),
         np.where(rng.random(20_000) < 0.1, np.inf, 1e300 * rng.normal(size=20_000)),
         -5e-324 * rng.integers(0, 9, 20_000),
+        # parts that ascend already, of any length, and all of them at once
+        np.concatenate([np.sort(rng.integers(0, 99, size)) for size in rng.integers(1, 80, 500)]).astype(float),
+        np.arange(20_000.0),
         np.zeros(0),
     ):
         assert np.array_equal(ascending(values), np.argsort(values, kind="stable"))

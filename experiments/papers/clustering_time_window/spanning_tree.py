@@ -36,7 +36,9 @@ def clusters(recording: Recording, windows: list[Window]) -> Taken:
     near = cKDTree(points).query_pairs(LONGEST * SPEED * traffic.ROTATION, output_type="ndarray")
     near = near[turns[near[:, 0]] != turns[near[:, 1]]]
     lengths = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
-    tree = minimum_spanning_tree(coo_array((lengths, near.T), shape=(len(rows), len(rows))))
+    # older scipy takes no wider numbers
+    edges = coo_array((lengths, near.T.astype(np.int32)), shape=(len(rows), len(rows)))
+    tree = minimum_spanning_tree(edges)
     _, parts = connected_components(tree, directed=False)
     return Taken(turns, rows, parts, np.bincount(parts)[parts] >= LEAST)
 
