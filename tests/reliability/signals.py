@@ -105,7 +105,7 @@ def trial(way: str, after: float, scenes: Path, rng: random.Random) -> Trial:
         if library:
             # Python itself says 1 where the interrupt came in code that it did not compile from a text
             good = process.returncode in (1, -signal.SIGINT, 130) and lines[-1:] == ["KeyboardInterrupt"]
-            good = good and (not begun or ("Exception ignored" not in errors and errors.count("Traceback") == 1))
+            good = good and (not begun or alone(errors, lines))
         else:
             good = process.returncode == 130 and len(lines) == 1 and ": interrupted" in lines[0]
             # before the program has begun
@@ -140,6 +140,15 @@ def _end_processes_with(text: str) -> list[str]:
             found.append(" ".join((path / "cmdline").read_text().split("\0"))[-150:])
             os.kill(int(path.name), signal.SIGKILL)
     return found
+
+
+def alone(errors: str, lines: list[str]) -> bool:
+    """Whether nothing but one interrupt is told; where it came in an except clause, Python tells what that handled.
+
+    As in functools.singledispatch, which looks for the classes of arguments when it does not find them.
+    """
+    tracebacks = errors.count("Traceback") - errors.count("During handling of the above exception")
+    return tracebacks == lines.count("KeyboardInterrupt") == 1 and "Exception ignored" not in errors
 
 
 def _processes_with(text: str) -> Iterator[Path]:

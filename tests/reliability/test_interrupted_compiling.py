@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.reliability.signals import WAYS, folder_of_scenes, trial
+from tests.reliability.signals import WAYS, alone, folder_of_scenes, trial
 from tests.running import printed
 
 
@@ -25,6 +25,25 @@ def test_it_ends_as_it_should(way, tmp_path):
         assert found.verdict in ("as it should", "done before"), (after, found)
         # usually it is less than one; to compile all takes ten times as much
         assert found.cpu < 10.0, (after, found)
+
+
+TRACE = "Traceback (most recent call last):\n  File\n"
+HANDLED = TRACE + "KeyError: 1\n\nDuring handling of the above exception, another exception occurred:\n\n"
+
+
+@pytest.mark.parametrize(
+    ("errors", "good"),
+    [
+        (TRACE + "KeyboardInterrupt\n", True),
+        (HANDLED + HANDLED + TRACE + "KeyboardInterrupt\n", True),
+        (HANDLED.replace("KeyError: 1", "KeyboardInterrupt") + TRACE + "KeyboardInterrupt\n", False),
+        ("Exception in thread compiler:\n" + TRACE + "ValueError\n" + TRACE + "KeyboardInterrupt\n", False),
+        ("Exception ignored in: <f>\n" + TRACE + "KeyboardInterrupt\n", False),
+        (TRACE + "SystemError\n", False),
+    ],
+)
+def test_an_interrupt_tells_of_nothing_else(errors, good):
+    assert alone(errors, errors.splitlines()) == good
 
 
 COMPILING = """
