@@ -23,6 +23,7 @@ from assoc.sensors.kernels.dispatch import linearise
 
 # shares nearer to 0 or 1 than this are 0 or 1
 _SURE = 1e-6
+# inside by so many standard deviations, times the root of two, is inside for certain
 _DEEP = 8.0
 _FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 BANDS = 10

@@ -180,13 +180,17 @@ def test_many_rows_of_few_edges_like_scipy():
     assert (costs - found.row_duals[row] - found.column_duals[column]).min() > -1e-9
 
 
+def _costs(kind, n, rng):
+    """Random costs, whole numbers, or few different ones."""
+    matrix = rng.random((n, n))
+    return np.floor(matrix * (100 if kind == "whole" else 3)) if kind in ("whole", "few") else matrix
+
+
 @pytest.mark.parametrize("kind", ["any", "whole", "few", "excluding", "narrow"])
 def test_an_auction_leaves_optimal_duals(kind):
     rng = np.random.default_rng(5)
     n = 120
-    matrix = rng.random((n, n))
-    if kind in ("whole", "few"):
-        matrix = np.floor(matrix * (100 if kind == "whole" else 3))
+    matrix = _costs(kind, n, rng)
     if kind == "excluding":
         matrix[rng.random((n, n)) < 0.3] = 1e6
     # narrow: many rows of one edge or two, for whose columns others bid long
@@ -216,9 +220,7 @@ def test_an_auction_ends_where_there_is_no_matching():
 def test_dense_ones_are_solved_by_their_cheapest_edges_first(kind):
     rng = np.random.default_rng(7)
     n = 160
-    matrix = rng.random((n, n))
-    if kind in ("whole", "few"):
-        matrix = np.floor(matrix * (100 if kind == "whole" else 3))
+    matrix = _costs(kind, n, rng)
     if kind == "product":
         matrix = np.outer(np.arange(1.0, n + 1), np.arange(1.0, n + 1))
     if kind == "like columns":
