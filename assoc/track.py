@@ -98,7 +98,7 @@ def _track(words: list[str]) -> None:
 def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
     file = given["file"]
     started, compiled = time.perf_counter(), compile_seconds()
-    if len(given["files"]) > 1 and not all(_has_plots(one) for one in given["files"]):
+    if len(given["files"]) > 1 and not all(_has_plots(path) for path in given["files"]):
         raise InvalidInputError(f"{given['files'][1]}: only recorded plots may be in several files")
     of = _of_radars if file.lower().endswith(".toml") else _of_scene if _is_npz(file) else _of_plots
     with ExitStack() as outputs:

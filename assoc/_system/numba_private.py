@@ -229,7 +229,7 @@ class _InnerLibrary(_CODEGEN.JITCodeLibrary):  # type: ignore[misc]
 
     def _finalize_final_module(self) -> None:
         whole = self._final_module
-        if not any(one.name.startswith(_UNRESOLVED) for one in whole.global_variables):
+        if not any(variable.name.startswith(_UNRESOLVED) for variable in whole.global_variables):
             # callers link the whole; this process has use for its variables alone
             self._finalized = True
             self._get_module_for_linking()

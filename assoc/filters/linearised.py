@@ -203,7 +203,7 @@ class GaussianFilter(Filter[Gaussian]):
         seen = [self.observe(sensor) for sensor in sensors]
         if not all(self._linearises(o) for o in seen):
             return None
-        mean, P = (np.require(one, requirements=("C", "W")) for one in (state.mean, state.covariance))
+        mean, P = (np.require(array, requirements=("C", "W")) for array in (state.mean, state.covariance))
         return Parts(mean[:, None], P[:, None], np.ones((len(state), 1)), seen)
 
     def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:

@@ -107,7 +107,7 @@ class Qualities:
     def _take(self, ids: Array, squares: Array, dims: Array) -> None:
         """Take in a scan: NIS and components of measurements (n,) of tracks (n,); those of one err together."""
         rows, of, counts = np.unique(self._rows(ids), return_inverse=True, return_counts=True)
-        square, freedom = (np.bincount(of, weights=one) / counts for one in (squares, dims))
+        square, freedom = (np.bincount(of, weights=values) / counts for values in (squares, dims))
         self._sums[rows] *= _KEEP, _KEEP, _KEEP**2
         self._sums[rows] += np.stack([square, freedom, 2.0 * freedom], axis=1)
 
@@ -179,4 +179,4 @@ class Qualities:
             taken = ids[number[inside]]
             found.append((taken, square[inside], np.full(len(taken), float(sensor.dim))))
         if found:
-            self._take(*(np.concatenate(one) for one in zip(*found, strict=True)))
+            self._take(*(np.concatenate(column) for column in zip(*found, strict=True)))

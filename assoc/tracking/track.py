@@ -114,7 +114,7 @@ class TrackColumns(NamedTuple):
     @staticmethod
     def of(tracks: Sequence[Track]) -> TrackColumns:
         """The columns of one or more tracks."""
-        return TrackColumns(*(np.array([getattr(one, name) for one in tracks]) for name in TrackColumns._fields))
+        return TrackColumns(*(np.array([getattr(track, name) for track in tracks]) for name in TrackColumns._fields))
 
     @property
     def status(self) -> Array:
@@ -226,8 +226,8 @@ def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: A
 def renamed(step: Step, ids: Array, names: Array) -> Step:
     """The step with these names (K,) of confirmed tracks in place of ids (K,)."""
     name_of = dict(zip(ids.tolist(), names.tolist(), strict=True))
-    assigned = tuple(np.array([name_of.get(i, i) for i in one.tolist()], dtype=np.int64) for one in step.assigned)
-    confirmed = tuple(flags | np.isin(one, names) for flags, one in zip(step.confirmed, assigned, strict=True))
+    assigned = tuple(np.array([name_of.get(i, i) for i in taken.tolist()], dtype=np.int64) for taken in step.assigned)
+    confirmed = tuple(flags | np.isin(taken, names) for flags, taken in zip(step.confirmed, assigned, strict=True))
     now: dict[str, Any] = {"assigned": assigned, "confirmed": confirmed}
-    final = tuple(replace(one, **now) if one.scan == step.scan else one for one in step.final)
+    final = tuple(replace(decision, **now) if decision.scan == step.scan else decision for decision in step.final)
     return replace(step, **now, final=final)

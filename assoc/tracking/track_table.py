@@ -129,7 +129,7 @@ class TrackTable(Shown):
             part |= {f"hits_{s}": column for s, column in enumerate(hits.T, 1)}
         if truth is not None:
             both = zip(tracks.mean, tracks.covariance, strict=True)
-            part["nees"] = np.array([_nees(*one, positions, truth) for one in both])
+            part["nees"] = np.array([_nees(*state, positions, truth) for state in both])
         self._parts.append(part)
 
     def _column(self, name: str) -> Array:
@@ -189,7 +189,7 @@ class TrackTable(Shown):
             frame = frame.assign(target=_texts([self.targets.get(number, "") for number in ids.tolist()])[of])
         if self.identities:
             names = [self.identities.get(number, ("", "")) for number in ids.tolist()]
-            addresses, codes = (_texts([one[kind] for one in names])[of] for kind in (0, 1))
+            addresses, codes = (_texts([identity[kind] for identity in names])[of] for kind in (0, 1))
             frame = frame.assign(address_hex=addresses, mode3_oct=codes)
         return frame
 
@@ -249,7 +249,7 @@ def against_truth(scene: Scene, tracks: Trajectories) -> tuple[Trajectories, Tra
     both = Trajectories.from_scene(scene), tracks
     if not open_heights(scene.sensors):
         return both
-    truth, found = (Trajectories(one.times, one.ids, one.positions[:, :2]) for one in both)
+    truth, found = (Trajectories(paths.times, paths.ids, paths.positions[:, :2]) for paths in both)
     return truth, found
 
 

@@ -64,7 +64,7 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
 def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:
     """Give a tracker the scans of a scene, as of one instant or with times of their own."""
     for when, z in zip(scene.times, scene.measurements, strict=True):
-        tracker.step(float(when), z, [np.full(len(one), when) for one in z] if own_times else None)
+        tracker.step(float(when), z, [np.full(len(rows), when) for rows in z] if own_times else None)
 
 
 def _scenes() -> list[Scene]:

@@ -97,7 +97,7 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
     for number, area in enumerate(value, 1):
         where = f"{label}: area {number}"
         corners = area if isinstance(area, list) else []
-        if len(corners) < 2 or not all(_is_corner(one) for one in corners):
+        if len(corners) < 2 or not all(_is_corner(corner) for corner in corners):
             raise InvalidInputError(
                 f"{where}: expected 2 corners of a box, or 3 or more, [latitude, longitude] in degrees, got {area!r}"
             )
@@ -109,7 +109,7 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
 
 def _is_corner(value: object) -> bool:
     """Whether it is two numbers."""
-    return isinstance(value, list) and [type(one) in (int, float) for one in value] == [True, True]
+    return isinstance(value, list) and [type(number) in (int, float) for number in value] == [True, True]
 
 
 def _days(recordings: list[Recording]) -> list[float]:
@@ -177,7 +177,7 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
     if not file.lower().endswith(ASTERIX):
         options = {key: table.get(key, {}) for key in ("columns", "units")}
         for key, value in options.items():
-            if not isinstance(value, dict) or not all(isinstance(one, str) for one in value.values()):
+            if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
                 raise InvalidInputError(f"{where}: {key}: expected a table such as {{ range = 'm' }}")
         try:
             return read_plots(file, **options), None, None
@@ -210,6 +210,6 @@ def _place(value: object, label: str) -> tuple[float, float, float]:
     """Latitude and longitude in radians, height."""
     from assoc._cli.values import position_on_earth
 
-    if not isinstance(value, list) or not all(isinstance(one, (int, float)) for one in value):
+    if not isinstance(value, list) or not all(isinstance(number, (int, float)) for number in value):
         raise InvalidInputError(f"{label}: expected [latitude, longitude, height] in degrees and metres, got {value!r}")
     return position_on_earth(",".join(map(repr, value)), label)

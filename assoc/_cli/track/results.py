@@ -100,7 +100,7 @@ def _write_asterix(path: str, found: Tracked) -> None:
     frame = found.table.to_frame()
     if found.table.identities:
         # aircraft with a transponder have heights by Mode C, if any sensor has heights by it
-        mode_c = found.plots or any("height" in one.components[: one.dim] for one in found.tracker.sensors)
+        mode_c = found.plots or any("height" in sensor.components[: sensor.dim] for sensor in found.tracker.sensors)
         frame["barometric"] = bool(mode_c) & ((frame["address_hex"] != "") | (frame["mode3_oct"] != ""))
     write_tracks(path, frame)
 
@@ -180,7 +180,7 @@ def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float)
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
-    worst = sorted(rows.inconsistent().items(), key=lambda one: -one[1])
+    worst = sorted(rows.inconsistent().items(), key=lambda item: -item[1])
     if worst:
         shown = ", ".join(f"{track} ({nis:.2g})" for track, nis in worst[:5]) + (", ..." if len(worst) > 5 else "")
         print_lines(f"tracks that do not agree with their measurements (NIS, at most 1 expected): {shown}")

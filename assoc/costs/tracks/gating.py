@@ -32,7 +32,7 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     # not compiled once more for arrays that are read only, as those of scenes are, or a part of larger ones
-    covariance, z = (np.require(one, requirements=("C", "W")) for one in (expected.covariance, z))
+    covariance, z = (np.require(array, requirements=("C", "W")) for array in (expected.covariance, z))
     tracks, found, _ = _sweep(h, covariance, z, _turning(angular), gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
         # ordered by track: extrapolated to those left

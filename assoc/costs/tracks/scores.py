@@ -65,7 +65,7 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     axis, given the axes before it, the integral is at most the region's width: heights that nothing measures may vary
     more than the region is high. Directions in which the region has no width are left out.
     """
-    covariances, region = (np.require(one, requirements=("C", "W")) for one in (covariances, region))
+    covariances, region = (np.require(array, requirements=("C", "W")) for array in (covariances, region))
     return np.asarray(_log_birth(covariances, region, math.log(birth_rate)))
 
 

@@ -195,11 +195,11 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
         spread[list(growth.angles[s])] = 0.0
         axes.append(int(spread.argmax()) if spread.max() > 0.0 else -1)
         order = np.argsort(z[:, axes[s]], kind="stable")
-        one = _near(growth, states, s, z[order])
-        near.append(one._replace(found=order[one.found]))
-        places.append(np.zeros((len(one.found), widest)))
+        pairs = _near(growth, states, s, z[order])
+        near.append(pairs._replace(found=order[pairs.found]))
+        places.append(np.zeros((len(pairs.found), widest)))
         places[s][:, : sensor.dim] = z[near[s].found]
-    begin = np.cumsum([0, *(len(one.found) for one in near)])[:-1, None]
+    begin = np.cumsum([0, *(len(pairs.found) for pairs in near)])[:-1, None]
     with np.errstate(divide="ignore"):
         logs = np.log(parts.weights)
     most = growth.margin - misses.sum(axis=1)
@@ -207,8 +207,8 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
         depth_first.Tracks(parts.means, parts.covariances, parts.weights, logs, np.array(misses), most),
         depth_first.sensors_of(parts.observations, growth.terms.detection, growth.ahead, np.array(growth.gates)),
         depth_first.Measured(
-            begin + [one.first for one in near], np.concatenate([one.found for one in near]), np.concatenate(places),
-            np.array(axes),
+            begin + [pairs.first for pairs in near], np.concatenate([pairs.found for pairs in near]),
+            np.concatenate(places), np.array(axes),
         ),
         max_tuples,
     )  # fmt: skip
@@ -216,7 +216,7 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
         complain(status)
     if len(track) > max_tuples:
         # ordered by track: extrapolated to those left
-        work = np.sum([one.first for one in near], axis=0)
+        work = np.sum([pairs.first for pairs in near], axis=0)
         _too_many(len(track) * work[-1] / work[int(track[-1]) + 1], max_tuples)
     return TrackTuples(track, rows, costs)
 
@@ -224,13 +224,13 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
 def _in_blocks(growth: _Growth, states: Any, misses: Array, max_tuples: int) -> TrackTuples:
     """The same sensor by sensor, for all filters."""
     near = [_near(growth, states, s, z) for s, z in enumerate(growth.measurements)]
-    count, work = len(states), np.sum([one.first for one in near], axis=0)
+    count, work = len(states), np.sum([pairs.first for pairs in near], axis=0)
     blocks: list[TrackTuples] = []
     low = made = 0
     while low < count or not blocks:
         high = min(max(low + 1, int(np.searchsorted(work, work[low] + _BLOCK, side="right")) - 1), count)
-        here = [Near(one.first[low : high + 1] - one.first[low], one.found[one.first[low] : one.first[high]])
-                for one in near]  # fmt: skip
+        here = [Near(pairs.first[low : high + 1] - pairs.first[low], pairs.found[pairs.first[low] : pairs.first[high]])
+                for pairs in near]  # fmt: skip
         block = _grown(growth, states[low:high], misses[low:high], here, max_tuples - made)
         made += len(block.track)
         if made > max_tuples:

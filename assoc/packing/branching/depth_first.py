@@ -110,7 +110,7 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
             break
         num = open_node(work, stack, top, at_work)
         at_work = -1
-        one, two, likely = -1, -1, 0.5
+        row, other, likely = -1, -1, 0.5
         closed = False
         late = False
         while True:
@@ -142,13 +142,13 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
             if status == OPTIMAL and not whole:
                 in_doubt = doubtful_pairs(cols, basis, trials)
             if in_doubt == 0:
-                one, two = any_open_pair(cols, allowed, work.trial)
+                row, other = any_open_pair(cols, allowed, work.trial)
                 break
             which, verdict = decide(program, cols, allowed, basis, trials, in_doubt, Effort(cut, 0, deadline))
-            one, two, likely = int(trials.pairs[which, 0]), int(trials.pairs[which, 1]), trials.values[which]
+            row, other, likely = int(trials.pairs[which, 0]), int(trials.pairs[which, 1]), trials.values[which]
             if verdict == NEITHER:
                 break
-            num = keep_side(work, num, (one, two), verdict == TOGETHER)
+            num = keep_side(work, num, (row, other), verdict == TOGETHER)
         if late:
             # the node is unchanged on the stack
             break
@@ -156,13 +156,13 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
         nodes += 1
         if closed:
             continue
-        if one < 0:
+        if row < 0:
             weight, count = _lightest(work, num)
             if weight < incumbent:
                 incumbent = weight
                 count_found = count
                 copy_to(work.found[:count], work.trial[:count])
             continue
-        num_open = branch(work, stack, top, num, (one, two), likely >= 0.5, lower)
+        num_open = branch(work, stack, top, num, (row, other), likely >= 0.5, lower)
         at_work = num_open - 1
     return num_open, incumbent, count_found, nodes

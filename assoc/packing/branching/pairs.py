@@ -75,11 +75,11 @@ def new_trials(program: Program, num_rows: int) -> Trials:
 
 
 @inner_njit
-def is_dropped(cols: Ints, j: int, one: int, two: int, joined: bool) -> bool:
+def is_dropped(cols: Ints, j: int, row: int, other: int, joined: bool) -> bool:
     """Whether column j is forbidden where two rows are together (no column has only one) or apart (none has both)."""
     uses = 0
     for s in range(cols.shape[1]):
-        if cols[j, s] == one or cols[j, s] == two:
+        if cols[j, s] == row or cols[j, s] == other:
             uses += 1
     return uses == 1 if joined else uses == 2
 
@@ -90,13 +90,13 @@ def answer(cols: Ints, allowed: Allowed, pair: tuple[int, int], joined: bool, si
     active, columns, slack = side.active, side.columns, side.slack
     columns[:] = False
     copy_to(slack, allowed.slack)
-    one, two = pair
+    row, other = pair
     if joined:
-        slack[one] = False
-        slack[two] = False
+        slack[row] = False
+        slack[other] = False
     count = 0
     for j in allowed.active:
-        if not is_dropped(cols, j, one, two, joined):
+        if not is_dropped(cols, j, row, other, joined):
             active[count] = j
             columns[j] = True
             count += 1
@@ -116,17 +116,17 @@ def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
                 continue
             for s in range(num_sensors):
                 for t in range(s + 1, num_sensors):
-                    one, two = cols[j, s], cols[j, t]
-                    if one < 0 or two < 0:
+                    row, other = cols[j, s], cols[j, t]
+                    if row < 0 or other < 0:
                         continue
-                    if one > two:
-                        one, two = two, one
+                    if row > other:
+                        row, other = other, row
                     if not clear:
-                        mass[one, two] += basis.values[i]
+                        mass[row, other] += basis.values[i]
                         continue
-                    value = mass[one, two]
+                    value = mass[row, other]
                     # each pair once
-                    mass[one, two] = 0.0
+                    mass[row, other] = 0.0
                     if not WHOLE < value < 1.0 - WHOLE:
                         continue
                     doubt = value * (1.0 - value)
@@ -142,7 +142,7 @@ def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
                         pairs[position, 0], pairs[position, 1] = pairs[position - 1, 0], pairs[position - 1, 1]
                         position -= 1
                     values[position] = value
-                    pairs[position, 0], pairs[position, 1] = one, two
+                    pairs[position, 0], pairs[position, 1] = row, other
     return count
 
 
@@ -186,22 +186,22 @@ def decide(
     for i in range(count):
         if in_vain >= _IN_VAIN or (i > 0 and is_over(effort.deadline)):
             break
-        one, two = trials.pairs[i]
+        row, other = trials.pairs[i]
         value = trials.values[i]
         for joined in range(2):
             share = 1.0 - value if joined else value
-            known = trials.tried[joined, one, two]
+            known = trials.tried[joined, row, other]
             if known >= _RELIABLE:
-                gains[joined] = trials.gain[joined, one, two] * share
+                gains[joined] = trials.gain[joined, row, other] * share
                 continue
-            status, reached = _try(program, cols, allowed, basis, trials, ((one, two), joined == 1), trial)
+            status, reached = _try(program, cols, allowed, basis, trials, ((row, other), joined == 1), trial)
             if reached >= effort.cutoff:
                 return i, APART if joined else TOGETHER
             gain = max(reached - bound, 0.0)
             gains[joined] = gain
-            mean = trials.gain[joined, one, two]
-            trials.gain[joined, one, two] = mean + (gain / share - mean) / (known + 1.0)
-            trials.tried[joined, one, two] = known + 1
+            mean = trials.gain[joined, row, other]
+            trials.gain[joined, row, other] = mean + (gain / share - mean) / (known + 1.0)
+            trials.tried[joined, row, other] = known + 1
         score = min(max(gains[0], 1e-4 * gap), gap) * min(max(gains[1], 1e-4 * gap), gap)
         if score > best:
             pick, best, in_vain = i, score, 0
@@ -224,13 +224,13 @@ def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> Any:
     for j in allowed.active:
         for s in range(cols.shape[1]):
             for t in range(s + 1, cols.shape[1]):
-                one, two = cols[j, s], cols[j, t]
-                if one >= 0 and two >= 0 and (counts[one] > 1 or counts[two] > 1):
+                row, other = cols[j, s], cols[j, t]
+                if row >= 0 and other >= 0 and (counts[row] > 1 or counts[other] > 1):
                     both = 0
                     for i in allowed.active:
-                        both += is_dropped(cols, i, one, two, False)
-                    if both < counts[one] or both < counts[two]:
-                        return int(one), int(two)
+                        both += is_dropped(cols, i, row, other, False)
+                    if both < counts[row] or both < counts[other]:
+                        return int(row), int(other)
     return -1, -1
 
 
@@ -251,15 +251,15 @@ def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, co
             continue
         for s in range(num_sensors):
             for t in range(s + 1, num_sensors):
-                one, two = cols[j, s], cols[j, t]
+                row, other = cols[j, s], cols[j, t]
                 # if no other column has one of the rows and both must be covered, the pair is decided
                 if (
-                    one < 0
-                    or two < 0
-                    or not (counts[one] > 1 or counts[two] > 1 or allowed.slack[one] or allowed.slack[two])
+                    row < 0
+                    or other < 0
+                    or not (counts[row] > 1 or counts[other] > 1 or allowed.slack[row] or allowed.slack[other])
                 ):
                     continue
-                others = float(counts[one] + counts[two])
+                others = float(counts[row] + counts[other])
                 position = found
                 if found < values.size:
                     found += 1
@@ -272,7 +272,7 @@ def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, co
                     pairs[position, 0], pairs[position, 1] = pairs[position - 1, 0], pairs[position - 1, 1]
                     position -= 1
                 values[position] = others
-                pairs[position, 0], pairs[position, 1] = one, two
+                pairs[position, 0], pairs[position, 1] = row, other
     return found
 
 
@@ -290,13 +290,13 @@ def part_certain(
     for i in range(count):
         if pick >= 0 and is_over(effort.deadline):
             break
-        one, two = trials.pairs[i]
-        open_question = allowed.slack[one] or allowed.slack[two]
+        row, other = trials.pairs[i]
+        open_question = allowed.slack[row] or allowed.slack[other]
         for j in allowed.active:
-            open_question = open_question or is_dropped(cols, j, one, two, True)
+            open_question = open_question or is_dropped(cols, j, row, other, True)
         if not open_question:
             continue
-        _, reached = _try(program, cols, allowed, basis, trials, ((one, two), False), trial)
+        _, reached = _try(program, cols, allowed, basis, trials, ((row, other), False), trial)
         if reached >= effort.cutoff:
             return i, TOGETHER
         if reached > best:

@@ -376,8 +376,8 @@ def best_of_both(
     for r in range(top, end):
         for j in (owner[r], other[r]):
             if j >= 0:
-                one, two = find(parent, r), find(parent, first_row(cols, j))
-                parent[max(one, two)] = min(one, two)
+                first, second = find(parent, r), find(parent, first_row(cols, j))
+                parent[max(first, second)] = min(first, second)
     for r in range(top, end):
         root = find(parent, r)
         if owner[r] >= 0 and first_row(cols, owner[r]) == r:

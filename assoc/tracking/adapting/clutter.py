@@ -110,7 +110,7 @@ def _densities(sensor: Sensor, here: Array, places: Array, clocks: Array, now: f
     dense = np.flatnonzero(farther < near_by)
     if not len(dense):
         return result
-    distance, near = (np.asarray(one) for one in tree.query(here[dense], min(_LOOKED_AT, len(every))))
+    distance, near = (np.asarray(array) for array in tree.query(here[dense], min(_LOOKED_AT, len(every))))
     turn = np.floor(np.append(clocks, np.full(n, now)))[near]
     nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
     others = np.cumsum(nearer >= _TARGETS, axis=1)

@@ -162,7 +162,7 @@ class Estimates(NamedTuple):
         declared = declared_values(sensors)
         choice = _choice(_scales(self.used), _scales(declared), _scales(found), spreads)
         used = np.choose(choice, [declared, self.used, found])
-        of_sensor, before = (np.broadcast_to(one[:, DETECTION, None], self.bands.shape) for one in (used, self.used))
+        of_sensor, before = (np.broadcast_to(own[:, DETECTION, None], self.bands.shape) for own in (used, self.used))
         bands = np.where(self.bands == before, of_sensor, self.bands)
         seen, spreads_of_bands = self.by_range(found[:, DETECTION])
         # all bands of a sensor as soon as one is surely different

@@ -76,14 +76,14 @@ class SensorHealth:
         found = [
             *([f"noise about {_times(noise.seen)} the declared"] if noise.differs else []),
             *([f"detects {seen.seen:.0%} of targets, declared {seen.declared:.0%}"] if seen.differs else []),
-            *([self._ranges] if any(one.differs for _, one in self.by_range) else []),
+            *([self._ranges] if any(band.differs for _, band in self.by_range) else []),
             *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
         ]
         return "; ".join(found) or "as declared"
 
     @property
     def _ranges(self) -> str:
-        return "by range " + ", ".join(f"{one.seen:.0%} up to {end / 1e3:.3g} km" for end, one in self.by_range)
+        return "by range " + ", ".join(f"{band.seen:.0%} up to {end / 1e3:.3g} km" for end, band in self.by_range)
 
 
 @dataclass(frozen=True)

@@ -58,12 +58,12 @@ class OddIdentity(NamedTuple):
 
     def __str__(self) -> str:
         word, by = ("code" if self.column == _CODE else "address"), self.sensors
-        (one, *rest), number = self.tracks, [self._digits(number) for number in self.numbers]
+        (track, *rest), number = self.tracks, [self._digits(number) for number in self.numbers]
         texts = {
-            "became": lambda: f"track {one}: {word} {number[0]} became {number[1]} ({by[0]})",
-            "goes on": lambda: f"track {one} goes on as {rest[0]}: {word} {number[0]} became {number[1]} ({by[0]})",
-            "twice": lambda: f"{word} {number[0]} is that of tracks {one} and {rest[0]} at once ({by[0]})",
-            "differ": lambda: f"track {one}: {word} {number[0]} by {by[0]}, {number[1]} by {by[1]}",
+            "became": lambda: f"track {track}: {word} {number[0]} became {number[1]} ({by[0]})",
+            "goes on": lambda: f"track {track} goes on as {rest[0]}: {word} {number[0]} became {number[1]} ({by[0]})",
+            "twice": lambda: f"{word} {number[0]} is that of tracks {track} and {rest[0]} at once ({by[0]})",
+            "differ": lambda: f"track {track}: {word} {number[0]} by {by[0]}, {number[1]} by {by[1]}",
         }
         return f"{texts[self.kind]()}, {moment(self.time)}"
 
@@ -183,7 +183,7 @@ class IdentityWatch(NamedTuple):
             {(int(c), int(n)): Heard(float(last), int(scan), tuple((int(t), float(x)) for t, x in of))
              for c, n, last, scan, of in numbers},
             {(int(t), int(c), str(s)): Doubt(int(n), int(o), float(x)) for t, c, s, n, o, x in doubts},
-            tuple(_odd(*one) for one in found),
+            tuple(_odd(*row) for row in found),
             int(forget_at),
         )  # fmt: skip
 
@@ -234,7 +234,7 @@ class _Hearing:
         heard = self._numbers.get((column, number))
         carriers = () if heard is None else heard.carriers
         alone = len(carriers) == 1 and carriers[0][0] == track
-        others = () if alone else tuple(one for one in carriers if one[0] != track)
+        others = () if alone else tuple(carrier for carrier in carriers if carrier[0] != track)
         if track:
             carriers = ((track, time), *others[:1])
         self._numbers[column, number] = Heard(time, self._scan, carriers)
@@ -303,9 +303,9 @@ class _Hearing:
             if when <= voice.begin:
                 continue
             mine, theirs = self._of(track, column), self._of(other, column)
-            if not any(one.said == voice.said and _at_once(voice, one) for one in theirs.values()):
+            if not any(their.said == voice.said and _at_once(voice, their) for their in theirs.values()):
                 continue
-            said = ({one.said for one in voices.values() if one.last >= voice.begin} for voices in (mine, theirs))
+            said = ({own.said for own in voices.values() if own.last >= voice.begin} for voices in (mine, theirs))
             # two in common: they have exchanged plots
             if len(set.intersection(*said)) == 1 and other not in self._sight.near(track):
                 self._add(voice.last, "twice", column, (min(track, other), max(track, other)), (voice.said,), (sensor,))
@@ -322,7 +322,7 @@ class _Hearing:
             carriers = (
                 self._numbers[column, number].carriers for number, _ in pairs if (column, number) in self._numbers
             )
-            if all(one == track or when < since for of in carriers for one, when in of):
+            if all(carrier == track or when < since for of in carriers for carrier, when in of):
                 numbers, sensors = zip(*pairs, strict=True)
                 self._add(voice.last, "differ", column, (track,), numbers, sensors)
 
@@ -333,13 +333,13 @@ class _Hearing:
 
     def _add(self, time: float, kind: str, column: int, tracks: Any, numbers: Any, sensors: Any) -> None:
         odd = OddIdentity(time, kind, column, tracks, numbers, sensors, self._before.decimal)
-        if len(self._found) < MOST and not any(one.key == odd.key for one in self._found):
+        if len(self._found) < MOST and not any(found.key == odd.key for found in self._found):
             self._found.append(odd)
 
 
-def _at_once(one: Voice, other: Voice) -> bool:
-    """Whether `one`, heard now, and another have both been heard twice since the other's number was first said.
+def _at_once(voice: Voice, other: Voice) -> bool:
+    """Whether `voice`, heard now, and another have both been heard twice since the other's number was first said.
 
     A track that has ended, and takes one more plot of those of its successor, is not meant.
     """
-    return min(one.run, other.run) >= SURE and one.before > other.begin and other.before > one.begin
+    return min(voice.run, other.run) >= SURE and voice.before > other.begin and other.before > voice.begin

@@ -157,7 +157,7 @@ def _predicted(states: Any, axes: list[int]) -> Predicted:
     """Positions of predicted states."""
     mean, covariance = states.mean[:, axes], states.covariance[:, axes][:, :, axes]
     if not isinstance(states, Mixture):
-        one = np.ones((len(mean), 1))
-        return Predicted(covariance, np.zeros((len(mean), 1, len(axes))), covariance[:, None], one)
+        weights = np.ones((len(mean), 1))
+        return Predicted(covariance, np.zeros((len(mean), 1, len(axes))), covariance[:, None], weights)
     offsets = states.means[:, :, axes] - mean[:, None]
     return Predicted(covariance, offsets, states.covariances[:, :, axes][:, :, :, axes], states.weights)

@@ -106,8 +106,8 @@ def _lead(progress: Progress, states: Any, new: Any) -> Array:
     filter, when = progress.settings.filter, np.full(len(new), progress.state.pace)
     axes = list(filter.motion.position)
     noise, areas = new.covariance[:, axes][:, :, axes], []
-    for one in (new, states):
-        spread = predict_each(filter, one, when).covariance[:, axes][:, :, axes]
+    for kind in (new, states):
+        spread = predict_each(filter, kind, when).covariance[:, axes][:, :, axes]
         areas.append(0.5 * np.linalg.slogdet(spread + noise)[1])
     return np.asarray(np.maximum(areas[0] - areas[1], 0.0))
 

@@ -125,12 +125,12 @@ def _joint(progress: Progress, track: Array, rows: Array, gain: Array, permutati
     for s, size in enumerate(sizes.tolist()):
         here = np.flatnonzero(rows[:, s])
         key, number = np.unique(track[here] * (size + 1) + rows[here, s], return_inverse=True)
-        one, measurement = key // (size + 1), key % (size + 1) - 1
+        index, measurement = key // (size + 1), key % (size + 1) - 1
         sums = [np.bincount(number, values[here], len(key)) for values in (estimate, lower, upper, share)]
-        pairs.append((tracks.track_id[one], measurement, *(np.minimum(each, 1.0) for each in sums)))
+        pairs.append((tracks.track_id[index], measurement, *(np.minimum(each, 1.0) for each in sums)))
         likely = sums[3] > 0.5
         owner.append(np.full(size, -1))
-        owner[-1][measurement[likely]] = one[likely]
+        owner[-1][measurement[likely]] = index[likely]
         taken.append(np.minimum(np.bincount(measurement, sums[0], size), 1.0))
     return _Joint(used, weight, np.clip(odds, -_SURE, _SURE), detected > 0.5, tuple(pairs), owner, taken)
 

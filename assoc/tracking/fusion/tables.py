@@ -55,7 +55,7 @@ def fuse_tables(
     positive(sigma, "sigma")
     positive(sigma_velocity, "sigma_velocity")
     times = [np.unique(frame["time"].to_numpy(dtype=np.float64)) for frame in frames]
-    paces = [float(np.median(np.diff(one))) for one in times if len(one) > 1]
+    paces = [float(np.median(np.diff(own))) for own in times if len(own) > 1]
     pace = max(paces, default=1.0) if interval is None else positive(interval, "interval")
     every = np.concatenate(times)
     fusion, table = TrackFusion(len(frames), parameters), TrackTable()
@@ -65,8 +65,8 @@ def fuse_tables(
         for frame in frames:
             rows = frame[(frame["time"] <= time + 1e-9) & (frame["time"] > time - 2.0 * pace)]
             rows = rows.drop_duplicates("track_id", keep="last")
-            one = _of_rows(rows, sigma, sigma_velocity)
-            found.append(one.moved(time - rows["time"].to_numpy(dtype=np.float64), fusion.parameters.noise))
+            latest = _of_rows(rows, sigma, sigma_velocity)
+            found.append(latest.moved(time - rows["time"].to_numpy(dtype=np.float64), fusion.parameters.noise))
         table.add(fusion.step(float(time), found).tracks)
     return table
 

@@ -160,18 +160,18 @@ class TrackFusion:
             raise InvalidInputError(f"time: {time!r} s comes after {self._time:g} s, expected times in order")
         if len(tracks) != self.systems:
             raise InvalidInputError(f"tracks: expected those of {self.systems} systems, got {len(tracks)}")
-        for s, one in enumerate(tracks):
-            check_tracks(one, s)
+        for s, system in enumerate(tracks):
+            check_tracks(system, s)
         chosen = self.parameters
         known = _part(self._known, time - self._known.seen <= chosen.patience)
         if len(known.ids):
             known = known._replace(state=known.state.moved(time - self._time, chosen.noise))
         # a fused track that some system still has is found by its members, the others by their states
         left = np.ones(len(known.ids), dtype=np.bool_)
-        for one, ids in zip(tracks, known.members.T, strict=True):
-            left &= ~np.isin(ids, one.ids)
+        for system, ids in zip(tracks, known.members.T, strict=True):
+            left &= ~np.isin(ids, system.ids)
         rows, costs = self._candidates(tracks, known, np.flatnonzero(left))
-        problem = AssignmentProblem(rows, costs, [len(known.ids), *(len(one.ids) for one in tracks)])
+        problem = AssignmentProblem(rows, costs, [len(known.ids), *(len(system.ids) for system in tracks)])
         solution = assign(problem, self.solver, advise=False)
         groups = solution.tuples[solution.tuples[:, 1:].any(axis=1)]
         return self._after(time, tracks, known, groups, solution)
@@ -181,16 +181,16 @@ class TrackFusion:
         lists = [SystemTracks(*(part[left] for part in known.state)), *tracks]
         price = self._price(tracks)
         grown = _Grown.none(len(lists))
-        for s, one in enumerate(lists):
-            number = left + 1 if s == 0 else np.arange(1, len(one.ids) + 1)
-            grown = grown.with_list(s, number, one, price, self.parameters.gate_probability)
+        for s, system in enumerate(lists):
+            number = left + 1 if s == 0 else np.arange(1, len(system.ids) + 1)
+            grown = grown.with_list(s, number, system, price, self.parameters.gate_probability)
         rows, costs = grown.rows, grown.costs
         # with the fused track of each of its members
         was = np.zeros_like(rows[:, 1:])
-        for s, one in enumerate(tracks):
+        for s, system in enumerate(tracks):
             # those that some system had last come first, and count
             of_id = {i: f for f, i in reversed([*enumerate(known.members[:, s].tolist(), 1)]) if i}
-            owner = np.array([0, *(of_id.get(i, 0) for i in one.ids.tolist())], dtype=np.int64)
+            owner = np.array([0, *(of_id.get(i, 0) for i in system.ids.tolist())], dtype=np.int64)
             was[:, s] = owner[rows[:, s + 1]]
         more = [(rows, costs)]
         for s in range(self.systems):
@@ -205,9 +205,9 @@ class TrackFusion:
         """What a further track costs that joins others: ln of the density of tracks that no other system has."""
         chosen, density = self.parameters, self.parameters.density
         if density is None:
-            places = np.concatenate([one.mean[:, :3] for one in tracks])
+            places = np.concatenate([system.mean[:, :3] for system in tracks])
             sides = np.maximum(np.ptp(places, axis=0), _LEAST_BOX) if len(places) else np.full(3, _LEAST_BOX)
-            density = max(1, *(len(one.ids) for one in tracks)) / float(np.prod(sides))
+            density = max(1, *(len(system.ids) for system in tracks)) / float(np.prod(sides))
         velocities = 3.0 * np.log(np.sqrt(2.0 * np.pi) * chosen.speed)
         return float(np.log(density) - velocities + self.systems * np.log1p(-chosen.coverage))
 
@@ -218,11 +218,11 @@ class TrackFusion:
         mean, covariance = np.zeros((len(groups), self.systems, 6)), np.zeros((len(groups), self.systems, 6, 6))
         members, absent = np.zeros((len(groups), self.systems), np.int64), np.ones((len(groups), self.systems))
         covariance[:] = np.eye(6)
-        for s, one in enumerate(tracks):
+        for s, system in enumerate(tracks):
             there = groups[:, s + 1] > 0
             row = groups[there, s + 1] - 1
-            mean[there, s], covariance[there, s] = one.mean[row], one.covariance[row]
-            members[there, s], absent[there, s] = one.ids[row], 1.0 - one.existence[row]
+            mean[there, s], covariance[there, s] = system.mean[row], system.covariance[row]
+            members[there, s], absent[there, s] = system.ids[row], 1.0 - system.existence[row]
         fused = intersected(mean, covariance, members > 0)
         before, fresh = groups[:, 0] - 1, groups[:, 0] == 0
         ids = np.empty(len(groups), dtype=np.int64)

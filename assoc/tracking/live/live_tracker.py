@@ -386,8 +386,8 @@ class LiveTracker:
         begin, step = clock.perf_counter(), None
         try:
             step = state.tracker.step(end, z, times, sectors, identities)
-            for one in zip(step.assigned, step.confirmed, times, identities, strict=True):
-                self._kept.take(*one)
+            for of_sensor in zip(step.assigned, step.confirmed, times, identities, strict=True):
+                self._kept.take(*of_sensor)
             for odd in state.tracker.odd_identities:
                 if odd.key not in self._told:
                     self._told.add(odd.key)
@@ -428,7 +428,7 @@ class LiveTracker:
             self._qualities.compare(late.tracker, last.before, on_time, last.measurements, last.times, late.names)
         self._qualities.keep(track.track_id for track in late.tracks)
         known = {track.track_id: self._qualities.of_track(track.track_id) for track in tracks}
-        return {number: Agreement(one.nis, one.consistent, tuple(one.hits.tolist())) for number, one in known.items()}
+        return {number: Agreement(q.nis, q.consistent, tuple(q.hits.tolist())) for number, q in known.items()}
 
     def summary(self) -> str:
         """One line: plots, steps and their times, plots left out, and how many tracks kept one identity."""

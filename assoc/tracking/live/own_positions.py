@@ -140,7 +140,7 @@ class OwnPositions:
         A platform that has sent none and whose positions in the scene have ended goes on as at their end.
         """
         self.paths = {number: path.since(begin) for number, path in self.paths.items()}
-        ended = {k: _path_of(one) for k, one in enumerate(self.platforms) if end > one.times[-1]}
+        ended = {k: _path_of(platform) for k, platform in enumerate(self.platforms) if end > platform.times[-1]}
         known = {number: path.platform(begin, end) for number, path in (ended | self.paths).items()}
         if not known:
             return scene
@@ -157,7 +157,7 @@ class OwnPositions:
         for number, path in self.paths.items():
             if end - path.poses[-1].time > SILENCE and number not in self._told:
                 self._told.add(number)
-                first = next(s for s, one in enumerate(scene.sensors) if one.platform == self.platforms[number])
+                first = next(s for s, sensor in enumerate(scene.sensors) if sensor.platform == self.platforms[number])
                 found.append((first, path.poses[-1].time))
         return found
 

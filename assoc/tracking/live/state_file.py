@@ -52,12 +52,12 @@ def save(
     inner, past = late.tracker, late.past
     width = max(sensor.dim for sensor in inner.sensors)
     plots = [
-        _row(k, SoundPlot(s, *one), width)
+        _row(k, SoundPlot(s, *row), width)
         for k, scan in enumerate(past)
         for s, rows in enumerate(scan.by_sensor())
-        for one in zip(*rows, strict=True)
+        for row in zip(*rows, strict=True)
     ]
-    plots += [_row(-1, one, width) for one in state.pending]
+    plots += [_row(-1, plot, width) for plot in state.pending]
     arrays: dict[str, Any] = {
         "live.settings": _described(settings),
         "live.counts": json.dumps(counts),
@@ -66,9 +66,9 @@ def save(
         "live.names": np.array([*late.names.items()], dtype=np.int64).reshape(-1, 2),
         "live.confirmed": np.array(sorted(confirmed), dtype=np.int64),
         "live.antennas": np.array([(a.last, a.plots, a.phase.real, a.phase.imag, a.silent) for a in state.antennas]),
-        "live.scans": np.array([one.time for one in past]),
+        "live.scans": np.array([scan.time for scan in past]),
         "live.own": state.own_positions.rows(),
-        "live.sectors": np.array([one.sectors for one in past]).reshape(-1, len(inner.sensors), 2),
+        "live.sectors": np.array([scan.sectors for scan in past]).reshape(-1, len(inner.sensors), 2),
         "live.plots": np.array(plots).reshape(-1, _BEFORE_VALUES + width),
     }
     first = past[0].before if past else inner.state
@@ -108,7 +108,7 @@ def _filled(
     own = OwnPositions(settings.scene)
     own.restore(found.get("live.own", np.zeros((0, 6))))
     state = LiveState(late, antennas, own, end, newest, pending, recent={plot.key: None for plot in kept})
-    by_sensor = [(sensor == s, _BEFORE_VALUES + one.dim) for s, one in enumerate(sensors)]
+    by_sensor = [(sensor == s, _BEFORE_VALUES + model.dim) for s, model in enumerate(sensors)]
     with state.under_way(settings):
         for k, (time, sectors) in enumerate(zip(found["live.scans"], found["live.sectors"], strict=True)):
             rows = [plots[(scan == k) & of_sensor, :last] for of_sensor, last in by_sensor]

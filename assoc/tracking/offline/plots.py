@@ -126,16 +126,16 @@ def track_plots(
         table.add(*followed.listed(confirmed))
     table.name_by_identities()
     if smooth and done:
-        decisions = [decision for one in done for decision in one.step.final]
-        ends, settings = np.array([one.step.time for one in done]), tracker.settings
-        plots, times = [one.measurements for one in done], [one.times for one in done]
+        decisions = [decision for f in done for decision in f.step.final]
+        ends, settings = np.array([f.step.time for f in done]), tracker.settings
+        plots, times = [f.measurements for f in done], [f.times for f in done]
         scene = Scene(tracker.sensors, ends, plots, settings.scene.region, measurement_times=times)
         named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
         table.take_names(named)
-    ends = np.array([one.step.time for one in done])
-    tracks = np.concatenate([np.zeros(0, dtype=np.int64), *(one.tracks for one in done)])
+    ends = np.array([f.step.time for f in done])
+    tracks = np.concatenate([np.zeros(0, dtype=np.int64), *(f.tracks for f in done)])
     rates, kept = takers.rates(), takers.kept()
-    return PlotTracks(recording, [one.window for one in done], ends, tracks, rates, table, kept)
+    return PlotTracks(recording, [f.window for f in done], ends, tracks, rates, table, kept)
 
 
 class Followed(NamedTuple):

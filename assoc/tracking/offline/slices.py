@@ -54,7 +54,7 @@ def slices_of(windows: Iterable[Window], seconds: float, early: float) -> Iterat
     for window in windows:
         if len(held) > known and window.times[-1] >= held[known].times[-1] + seconds:
             yield Slice(number, held, known)
-            held = [one for one in held if one.times[-1] >= held[-1].times[-1] - early]
+            held = [earlier for earlier in held if earlier.times[-1] >= held[-1].times[-1] - early]
             number, known = number + 1, len(held)
         held.append(window)
     if len(held) > known:
@@ -115,12 +115,12 @@ class TrackSlice:
             part.number,
             tables[True].to_frame(),
             tables[False].to_frame(),
-            np.array([one.step.time for one in own]),
-            np.array([len(one.window) for one in own]),
-            np.concatenate([none, *(one.tracks for one in done[: part.early])]),
-            np.concatenate([one.tracks for one in own]),
-            np.concatenate([one.sure for one in own]),
-            np.concatenate([known_of(one.window) for one in own]),
+            np.array([f.step.time for f in own]),
+            np.array([len(f.window) for f in own]),
+            np.concatenate([none, *(f.tracks for f in done[: part.early])]),
+            np.concatenate([f.tracks for f in own]),
+            np.concatenate([f.sure for f in own]),
+            np.concatenate([known_of(f.window) for f in own]),
             self._tracker.odd_identities,
         )
 
@@ -155,8 +155,8 @@ class Stitching:
         tracks = np.array([names[local] for local in part.tracks.tolist()], dtype=np.int64)
         # of tracks that this slice shows alone
         shown, known = {*part.tracks.tolist()}, {odd.key for odd in self.odd_identities}
-        odd = (one.named(names.__getitem__) for one in part.odd if shown >= {*one.tracks})
-        self.odd_identities += [one for one in odd if one.key not in known]
+        odd = (found.named(names.__getitem__) for found in part.odd if shown >= {*found.tracks})
+        self.odd_identities += [found for found in odd if found.key not in known]
         self._before = part._replace(frame=frame, tracks=tracks)
         return self._before
 
