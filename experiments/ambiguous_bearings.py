@@ -5,7 +5,6 @@ proven optimum where five seconds will do: with the costs of equation 5, and wit
 (`target_density="auto"`). Counted are the targets found and the true tuples among them.
 """
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,8 +73,5 @@ def _ratio(part: Any, whole: Any) -> tuple[float, tuple[float, float]]:
     return 100.0 * share, (100.0 * (share + low), 100.0 * (share + high))
 
 
-program = partial(main, "ambiguous_bearings", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("ambiguous_bearings", experiment, __doc__))

@@ -1,7 +1,5 @@
 """Has something become twice as slow? Processor times as multiples of HiGHS's, beside those of a committed file.
 
-    python -m experiments.bench_quick [--write]        (make bench-quick)
-
 Each piece of work is done in turns with one fixed problem for HiGHS (scipy), in one process, with all kernels compiled:
 the median of the ratios depends little on the machine and on what else it does. What is more than twice its figure in
 bench_quick.json is measured once more, and makes the exit code 1 if it stays so. ``--write`` writes the file.

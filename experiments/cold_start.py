@@ -1,7 +1,5 @@
 """How long a user waits after an installation: commands with an empty folder of compiled kernels, each several times.
 
-    python -m experiments.cold_start [--wheel FILE] [--runs N] [--json FILE] [--publish]        (make bench-cold)
-
 Each run starts from an empty cache of its own, as a fresh clone does, and is followed by a second, warm one with the
 cache that the first left. ``--wheel`` names a wheel, such as one with compiled kernels (``make dist``): it is installed
 with its dependencies into an empty environment (this needs a network, or an index that pip knows; nothing comes from
@@ -25,8 +23,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from assoc.simulation import simulate
-from experiments.common.claims import Claim, save_json
-from experiments.common.results import result_file
+from experiments.common.claims import Claim
+from experiments.common.command import add_files, report, whole
 from experiments.installation import install, wheel_of
 
 COMMANDS = {
@@ -141,16 +139,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m experiments.cold_start", description="What a user waits for after an installation."
     )
     parser.add_argument("--wheel", type=Path, metavar="FILE", help="a wheel: installed, and measured as well")
-    parser.add_argument("--runs", type=int, default=3, metavar="N", help="runs of each command (default 3)")
-    parser.add_argument("--json", metavar="FILE", help="write the seconds here")
-    parser.add_argument("--publish", action="store_true", help="write the result file that the pages are made from")
+    parser.add_argument("--runs", type=whole(1), default=3, metavar="N", help="runs of each command (default 3)")
+    add_files(parser, "cold_start")
     chosen = parser.parse_args(arguments)
-    if chosen.runs < 1:
-        parser.error("--runs must be at least 1")
     claims = experiment(chosen.runs, chosen.wheel and wheel_of(parser, chosen.wheel))
-    for path in (chosen.json, str(result_file("cold_start")) if chosen.publish else None):
-        if path:
-            save_json(path, claims, "cold_start", 0, " ".join((__doc__ or "").split()))
+    report(chosen, claims, "cold_start", __doc__)
     return 0
 
 

@@ -1,12 +1,9 @@
 """What each extra adds to an installation on the disk: its packages here and what they install, bytecode included.
 
-    python -m experiments.extra_sizes [--quick] [--seed N] [--json FILE] [--publish]
-
 What an installation without extras has already does not count; what several extras share counts for each of them.
 """
 
 import re
-from functools import partial
 from importlib import metadata
 
 import numpy as np
@@ -50,8 +47,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return [*claims, Claim("stonesoup without what it requires", "MB", ours=weight("stonesoup"))]
 
 
-program = partial(main, "extra_sizes", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("extra_sizes", experiment, __doc__))

@@ -1,7 +1,5 @@
 """The ten best associations of scenes full of ghosts, and the probabilities of tuples, each proved.
 
-    python -m experiments.ghost_rankings [--quick] [--only KIND ...] [--json FILE] [--publish]
-
 ``kbest`` ranks ten solutions of scenes of three bearing-only sensors (the seeds of the benchmarks), also of those whose
 linear program is far below the optimum; ``marginals`` gives the probability of every tuple from as many. Rankings are
 cut after the last rank that is proved: one of ten is proved. On scenes of 20 targets HiGHS (scipy) then looks for
@@ -9,7 +7,6 @@ something better with the ten forbidden: it must not find any. Processor time of
 compiled, from the candidate tuples on: building them counts, too.
 """
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -109,8 +106,5 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
     return claims
 
 
-program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))

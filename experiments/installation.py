@@ -1,8 +1,6 @@
 """What an installation takes on the disk, package by package, with and without the bytecode that pip makes.
 
-    python -m experiments.installation WHEEL [--json FILE] [--publish]
-
-installs a wheel, such as one with compiled kernels (``make dist``), with its dependencies into an empty environment
+Installs a wheel, such as one with compiled kernels (``make dist``), with its dependencies into an empty environment
 (this needs a network, or an index that pip knows; nothing comes from pip's cache).
 """
 
@@ -14,8 +12,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.common.claims import Claim, save_json
-from experiments.common.results import result_file
+from experiments.common.claims import Claim
+from experiments.common.command import add_files, report
 
 # bytes of each installed package, with and without bytecode; what came with the environment is left out
 _WEIGH = """
@@ -64,17 +62,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m experiments.installation", description="What an installation takes on the disk."
     )
     parser.add_argument("wheel", type=Path, metavar="WHEEL", help="what to install")
-    parser.add_argument("--json", metavar="FILE", help="write the sizes here")
-    parser.add_argument("--publish", action="store_true", help="write the result file that the pages are made from")
+    add_files(parser, "installation")
     chosen = parser.parse_args(arguments)
     wheel = wheel_of(parser, chosen.wheel)
     with tempfile.TemporaryDirectory() as folder:
         claims = [Claim("wheel", "MB", ours=wheel.stat().st_size / 1e6), *weighed(install(wheel, Path(folder)))]
-    for claim in claims:
-        print(f"{claim.quantity:42s} {claim.ours:8.2f} {claim.unit}")
-    for path in (chosen.json, str(result_file("installation")) if chosen.publish else None):
-        if path:
-            save_json(path, claims, "installation", 0, " ".join((__doc__ or "").split()))
+    report(chosen, claims, "installation", __doc__)
     return 0
 
 

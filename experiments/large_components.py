@@ -1,7 +1,5 @@
 """Problems that are one large component: three lists under wide gates beside HiGHS, two lists beside scipy.
 
-    python -m experiments.large_components [--quick] [--json FILE] [--publish]
-
 Three lists: points in the plane with a gate that joins nearly all tuples (`wide_gates`), to proven optima. HiGHS runs
 through `scipy.optimize.milp` with a relative gap of 1e-9; both get the same problem, and must find the same cost. Two
 lists: ten candidates each, or all pairs; scipy's time is that of its routine alone, ours that of `assoc.assign`.
@@ -123,8 +121,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "large_components", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("large_components", experiment, __doc__))

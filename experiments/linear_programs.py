@@ -1,7 +1,5 @@
 """The linear programs of ghost scenes and of axial problems: our dual simplex method beside HiGHS.
 
-    python -m experiments.linear_programs [--quick] [--json FILE] [--publish]
-
 Each program is that of the largest component of a problem (seeds of the benchmarks). Ours is solved from the
 multipliers of the dual ascent, whose time counts, too. Then one column after the other of those that the solution takes
 a part of is masked, and both are solved again: ours goes on from its last basis, HiGHS (dual simplex, through scipy,
@@ -10,7 +8,6 @@ to a core, kernels compiled; ratios are of the same programs.
 """
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -119,8 +116,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "linear_programs", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("linear_programs", experiment, __doc__))

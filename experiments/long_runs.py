@@ -1,7 +1,5 @@
 """Trackers and solvers that run for weeks: memory, speed and covariances must not get worse.
 
-    python -m experiments.long_runs [--quick] [--seed N] [--json FILE]
-
 The multi-sensor tracker processes 10^5 scans of three radars (four circling targets and false alarms), a tracker of
 each other family a fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by
 another solver. All in one process, one after the other, as in a program that never ends. Measured a hundred times on
@@ -18,7 +16,6 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -236,8 +233,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims + solve(steps, rng)[0]
 
 
-program = partial(main, "long_runs", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("long_runs", experiment, __doc__))

@@ -1,7 +1,5 @@
 """How wide the certified intervals of association probabilities are, and how good the estimates.
 
-    python -m experiments.probabilities [--quick] [--only KIND ...] [--json FILE] [--publish]
-
 Widths and processor time of one thread of ``assoc.marginals``: two lists of points whose ten nearest of the other list
 are candidates (distances of a unit, cost 2 d^2 - 2, one point per 0.01), position sensors and bearings of the
 benchmarks. Estimates are compared with longer runs: sweeps with eight times as many states, or, where too many matter,
@@ -11,7 +9,6 @@ all of them.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 from scipy.stats import beta
@@ -161,8 +158,5 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
         return claims + reliability(_SCENES // 10 if quick else _SCENES)
 
 
-program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))

@@ -1,7 +1,5 @@
 """Probabilities of tuples beside other ways to them, against exact sums.
 
-    python -m experiments.probabilities_beside [--quick] [--only KIND ...] [--json FILE] [--publish]
-
 The same problems for all, small enough that ``assoc.marginals`` closes every interval: its middle is the truth. *Ours*
 is ``assoc.marginals`` with defaults. *Plain MCMC*: Metropolis moves that add, remove or replace one tuple or let two
 measurements of a sensor change places, drawn uniformly (after Oh, Russell and Sastry, 2009, for one scan), ten million
@@ -218,8 +216,5 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
         return [claim for name in kinds for claim in compared(name, range(2_000, 2_001 if quick else 2_005))]
 
 
-program = partial(main_of_parts, NAME, list(KINDS), experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))

@@ -1,7 +1,5 @@
 """From one scan's measurements to a proven answer: what a tracker without tracks waits for, part by part.
 
-    python -m experiments.scan_time [--quick] [--seed N] [--json FILE] [--publish]
-
 Each scene is taken apart as often as it takes a tenth of a second, and the median counts: ``build_problem`` (the tuples
 within the gates, their positions and costs), ``AssignmentProblem`` of tuples and costs that are there already (for
 users with costs of their own), ``exact`` and ``greedy``, both with their bounds. A problem prepares itself at the
@@ -11,7 +9,6 @@ ratios say more than times of one machine. Processor time of one thread, pinned 
 
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,8 +90,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "scan_time", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("scan_time", experiment, __doc__))

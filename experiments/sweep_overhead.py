@@ -1,7 +1,5 @@
 """The overhead of a parameter study, its time without the solves, on every backend.
 
-    python -m experiments.sweep_overhead [--quick] [--seed N] [--json FILE]
-
 The wall time of a study from the moment when a tenth of its runs is done until its end, less the seconds that those
 runs took in the solver, shared among the workers, is the overhead of these runs: all of it, from design to disk.
 The start of processes comes before and is reported separately. Runs that take longer (those of the paper's ant colony)
@@ -19,7 +17,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -126,8 +123,5 @@ def _wait_for_workers(address: str) -> None:
         client.wait_for_workers(WORKERS, timeout=60)
 
 
-program = partial(main, "sweep_overhead", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("sweep_overhead", experiment, __doc__))

@@ -66,13 +66,12 @@ def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse
     parser.add_argument("--quick", action="store_true", help="fewer or shorter runs, for a first look")
     text = "seed of all random numbers (default %(default)s)"
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help=text)
-    parser.add_argument("--json", metavar="FILE", help="write the results here")
     if figure is not None:
         default = f"{name.rpartition('.')[2]}.png"
         parser.add_argument(
             "--figure", metavar="FILE", default=default, help=f"write the figure here (default {default})"
         )
-    add_publish(parser, name)
+    add_files(parser, name)
     return parser
 
 
@@ -105,8 +104,9 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", metavar="FILE.csv", help=text)
 
 
-def add_publish(parser: argparse.ArgumentParser, name: str) -> None:
-    """Add the option that writes the result file of an experiment."""
+def add_files(parser: argparse.ArgumentParser, name: str) -> None:
+    """Add the options that write what an experiment found: a file, and its result file."""
+    parser.add_argument("--json", metavar="FILE", help="write the results here")
     parser.add_argument(
         "--publish",
         action="store_true",
@@ -123,18 +123,44 @@ def add_only(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
     )  # fmt: skip
 
 
-def publish(claims: list[Claim], name: str, seed: int, about: str | None, *, partly: bool = False) -> None:
-    """Write the result file of an experiment; `partly`: what these claims do not say stays as it is."""
-    path = result_file(name)
-    save_json(path, replaced(load_json(path), claims) if partly else claims, name, seed, about or "")
-    print(f"{path}: written; now: python -m experiments.pages")
+def report(
+    chosen: argparse.Namespace,
+    claims: list[Claim],
+    name: str,
+    about: str | None,
+    *,
+    seed: int = 0,
+    is_row: Callable[[Claim], bool] = lambda claim: claim.quantity.startswith("setting"),
+    kept: Callable[[list[Claim], list[Claim]], list[Claim]] | None = None,
+) -> None:
+    """Print the claims of an experiment, and write the files that are asked for (`add_files`).
+
+    is_row: Whether a claim is a row of a long table, which is not printed.
+    kept: Of the claims published before and these, what is published; these alone without it.
+    """
+    about = about or ""
+    print_table([claim for claim in claims if not is_row(claim)], about.split("\n")[0].rstrip("."))
+    if chosen.json:
+        save_json(chosen.json, claims, name, seed, about)
+    if chosen.publish:
+        path = result_file(name)
+        if kept is not None and path.exists():
+            claims = kept(load_json(path), claims)
+        save_json(path, claims, name, seed, about)
+        print(f"{path}: written; now: python -m experiments.pages")
+
+
+def without_subjects(of: Callable[[Claim], str], claims: list[Claim], newer: list[Claim]) -> list[Claim]:
+    """Claims but those of a subject that newer ones are of, then the newer ones."""
+    subjects = {of(claim) for claim in newer}
+    return [claim for claim in claims if of(claim) not in subjects] + newer
 
 
 def replaced(claims: list[Claim], newer: list[Claim]) -> list[Claim]:
     """Claims, those of a quantity that newer ones have replaced by them; new quantities follow those before them."""
     found, index = list(claims), len(claims)
     for claim in newer:
-        known = [i for i, one in enumerate(found) if one.quantity == claim.quantity]
+        known = [i for i, other in enumerate(found) if other.quantity == claim.quantity]
         if known:
             index = known[0]
             found[index] = claim
@@ -157,14 +183,8 @@ def run(
         parser.error("--publish needs the full run, got --quick")
     found = experiment(chosen.quick, np.random.default_rng(chosen.seed))
     claims, shown = (found, None) if figure is None else found
-    # of long tables the file has the rows
-    print_table(
-        [claim for claim in claims if not claim.quantity.startswith("setting")], about.split("\n")[0].rstrip(".")
-    )
-    if chosen.json:
-        save_json(chosen.json, claims, name, chosen.seed, about)
-    if chosen.publish:
-        publish(claims, name, chosen.seed, about, partly=bool(getattr(chosen, "only", None)))
+    only = getattr(chosen, "only", None)
+    report(chosen, claims, name, about, seed=chosen.seed, kept=replaced if only else None)
     if figure is not None:
         save_figure(Path(chosen.figure), figure[0], shown, figure[1])
         print(f"{chosen.figure}: written")

@@ -1,7 +1,5 @@
 """Time of one prediction and correction against filterpy and Stone Soup, on the same problem in one run.
 
-    python -m experiments.filters.benchmark [--quick] [--seed N] [--json FILE]
-
 The problem: tracks of nearly constant velocity; position measurements for the Kalman filter, a radar (range, azimuth,
 elevation) for the others, N = 100 for the ensemble. The other packages take one track at a time. Ours takes all tracks
 in one call, which is how its filters are meant to be used, and in separate rows one track at a time: all steps of its
@@ -15,7 +13,6 @@ import datetime
 import math
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -258,8 +255,5 @@ def _time_all(quick: bool) -> list[Claim]:
     return claims
 
 
-program = partial(main, "filters.benchmark", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("filters.benchmark", experiment, __doc__))

@@ -1,7 +1,5 @@
 """Consistency: NEES and NIS of every filter on a linear case and on B1, with their chi-square bounds.
 
-    python -m experiments.filters.consistency [--quick] [--seed N] [--json FILE]
-
 300 runs of 100 steps. NEES is averaged over the runs at the last step, because NEES of one run is correlated in time.
 NIS is not for an exact filter, so it is averaged over the second half of the steps, too. The bounds are those of means
 of as many independent values (99.9 %). On the linear case the exact filters must lie inside; on B1 no filter is exact,
@@ -9,7 +7,6 @@ and the table says by how much. Ensembles have 100 or 1,000 members.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -122,8 +119,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "filters.consistency", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("filters.consistency", experiment, __doc__))

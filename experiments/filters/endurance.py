@@ -1,14 +1,11 @@
 """Covariances of every filter through 10^5 predictions and corrections: symmetric, positive definite, bounded?
 
-    python -m experiments.filters.endurance [--quick] [--seed N] [--json FILE]
-
 A target that stands still is measured by a radar (by a position sensor for the Kalman filter), corrections come in
 bursts of three for each prediction, which is the hardest case for a covariance. Checked every 100 steps: the least
 eigenvalue of the correlation matrix (above 0: positive definite, whatever the units), and the largest asymmetry, in
 units of the standard deviations.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -69,8 +66,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "filters.endurance", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("filters.endurance", experiment, __doc__))

@@ -1,7 +1,5 @@
 """Tune the fuzzy rules and the IMM in the same way; writes assoc/filters/fuzzy/tuned_parameters.json.
 
-    python -m experiments.filters.tune [--evaluations N] [--flights N] [--seed N] [--output FILE]
-
 Both see the same random flights and the same measurements, and have the same search: adaptation of a covariance matrix
 (CMA-ES, package `cma`), as many evaluations, the same first spread, starting from the package's parameters. None
 of these flights is in the report (experiments/papers/fuzzy_ekf.py). At the end both are measured on as many others,

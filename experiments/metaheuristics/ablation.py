@@ -1,8 +1,5 @@
 """What each part of `aco`, `genetic` and `tabu` contributes, and what a second core does.
 
-    python -m experiments.metaheuristics.ablation [--problems NAME ...] [--seconds S] [--count N] [--parts WORDS ...]
-                                                  [--workers]
-
 Each solver runs with one part taken out (parts.py) on the same problems as the whole, with the same seeds and the
 same processor time (with two workers: of each core). A figure is the mean over the problems of the cost with the part
 out, less the cost of the whole, in percent of it: above 0, the part helps. Parts that one solver alone has are also
@@ -15,23 +12,21 @@ these parts alone, so that the whole table can be measured in several runs.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 import assoc
 from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval
-from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.command import above_zero, add_publish, publish, whole
-from experiments.common.results import RESULTS, result_file
+from experiments.common.claims import Claim
+from experiments.common.command import above_zero, add_files, report, whole, without_subjects
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS, problem
 from experiments.metaheuristics.running import log, run
 
 NAME = "metaheuristics.ablation"
-TITLE = "What the parts of the metaheuristics contribute"
 WORKERS = ", workers"
 """How the name of a group of claims ends that is about workers."""
 _BASES = (parts.WHOLE, parts.ALONE)
@@ -95,16 +90,7 @@ def prefix(name: str, seconds: float) -> str:
     return f"{name}, {seconds:g} s"
 
 
-def merged(new: list[Claim], *, folder: Path = RESULTS, of: Callable[[Claim], str] | None = None) -> list[Claim]:
-    """The published claims, those of the same problems, budgets and solvers (or what else ``of`` names) replaced."""
-    path = result_file(NAME, folder)
-    old = load_json(path) if path.exists() else []
-    subject = of or _subject
-    measured_anew = {subject(claim) for claim in new}
-    return [claim for claim in old if subject(claim) not in measured_anew] + new
-
-
-def _subject(claim: Claim) -> str:
+def subject(claim: Claim) -> str:
     """Problem, budget and solver of a claim."""
     group, what = claim.quantity.split(": ", 1)
     return f"{group}: {what.split(',')[0]}"
@@ -112,7 +98,7 @@ def _subject(claim: Claim) -> str:
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=(__doc__ or "").split("\n")[0])
     add = parser.add_argument
     text = ", ".join(PROBLEMS)
     add("--problems", nargs="+", choices=PROBLEMS, default=["ghosts 40"], metavar="NAME", help=text)
@@ -123,8 +109,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     words = [part.words for part in parts.PARTS if part.words not in _BASES]
     what.add_argument("--parts", nargs="+", choices=words, metavar="WORDS", help="only these, as the table names them")
     what.add_argument("--workers", action="store_true", help="no parts: one worker against two, on two cores")
-    add("--json", metavar="FILE", help="write the results here")
-    add_publish(parser, NAME)
+    add_files(parser, NAME)
     chosen = parser.parse_args(arguments)
     taken = (parts.PARTS[0], parts.TWO_WORKERS) if chosen.workers else parts.PARTS
     if chosen.parts:
@@ -145,11 +130,8 @@ def program(arguments: Sequence[str] | None = None) -> int:
             # how good the whole and the bare metaheuristic are is told by a run of all parts
             found = [one for one in found if any(f", {words}, above " in one.quantity for words in chosen.parts)]
         claims += found
-    print_table(claims, TITLE)
-    if chosen.json:
-        save_json(chosen.json, claims, NAME, 0, __doc__ or "")
-    if chosen.publish:
-        publish(merged(claims, of=(lambda claim: claim.quantity) if chosen.parts else None), NAME, 0, __doc__)
+    of = (lambda claim: claim.quantity) if chosen.parts else subject
+    report(chosen, claims, NAME, __doc__, kept=partial(without_subjects, of))
     return 0
 
 

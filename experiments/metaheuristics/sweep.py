@@ -1,7 +1,5 @@
 """What alpha, beta, rho, the number of ants and the refinement do where problems are not easy.
 
-    python -m experiments.metaheuristics.sweep [--quick] [--cases NAME ...] [--seed N] [--publish]
-
 On the ant colony paper's own scene every setting finds every optimum, so that its table 1 says nothing of solutions.
 Here are the same scene with noise of 200 m and ten times the false alarms ("noisy radars"; still easy: greedy finds
 every optimum), with noise of 4 km and thirty times the false alarms ("poor radars"), and scenes of three bearing-only
@@ -17,6 +15,7 @@ The gallery draws the published figures: mean excess over alpha and beta, and ov
 import itertools
 import tempfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -29,14 +28,12 @@ from assoc.problem import AssignmentProblem
 from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.sources import StudySource
-from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.command import make_parser, publish
-from experiments.common.results import result_file
+from experiments.common.claims import Claim
+from experiments.common.command import make_parser, report, without_subjects
 from experiments.metaheuristics.problems import problem
 from experiments.metaheuristics.running import UNLIMITED, log
 
 NAME = "metaheuristics.sweep"
-TITLE = "Settings of the ant colony where problems are not easy"
 Grid = Mapping[str, tuple[float, ...]]
 GRID: Grid = {
     "alpha": (0.0, 1.0, 2.0),
@@ -201,15 +198,8 @@ def program(arguments: Sequence[str] | None = None, *, cases: Sequence[Case] = C
         problems, optima = known[case.problems]
         claims += claims_of(case, excesses(case, problems[: case.count], optima[: case.count], chosen.seed, grid), grid)
         log(f"{case.name}: done")
-    if chosen.publish and result_file(NAME).exists():
-        groups = {claim.quantity.split(": ")[0] for claim in claims}
-        old = load_json(result_file(NAME))
-        claims = [claim for claim in old if claim.quantity.split(": ")[0] not in groups] + claims
-    print_table([claim for claim in claims if not _is_cell(claim)], TITLE)
-    if chosen.json:
-        save_json(chosen.json, claims, NAME, chosen.seed, __doc__ or "")
-    if chosen.publish:
-        publish(claims, NAME, chosen.seed, __doc__)
+    of = partial(without_subjects, lambda claim: claim.quantity.split(": ")[0])
+    report(chosen, claims, NAME, __doc__, seed=chosen.seed, is_row=_is_cell, kept=of)
     return 0
 
 

@@ -1,7 +1,5 @@
 """Write the tables of the pages (docs/_tables), and the pages of experiments/pages/prose, from the published results.
 
-    python -m experiments.pages [--check]
-
 The results are the files of experiments/results, which the experiments write with --publish, the rows of the benchmarks
 and those of the benchmark set; a test fails where a table and they differ.
 """

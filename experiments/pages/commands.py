@@ -1,7 +1,5 @@
 """Run each command that a row of docs/papers.md names, small: tests without the slow ones, experiments with --quick.
 
-python -m experiments.pages.commands [--folder FOLDER]
-
 FOLDER is that of the thesis's tables; without it the rows that need it are left out. Some ten minutes of an idle
 core.
 """

@@ -1,8 +1,5 @@
 """Air traffic control: radars with biases over recorded or simulated flights, from plots to reference trajectories.
 
-    python -m experiments.real.air_traffic [FILE] [--seeds N] [--quick] [--seed N] [--json FILE] [--publish]
-                                           [--only simulated|recorded]
-
 Four turning radars with errors of range, azimuth and gain see the flights of FILE (trajectories, as for from-tracks)
 and simulated ones, while 0, 20 and 100 % of the aircraft have no transponder: their plots have neither altitude, code
 nor address (primary only). The radars are registered, the plots tracked without codes and addresses, and the tracks

@@ -1,8 +1,5 @@
 """Two boats seen by lidar, radar and cameras of a moving ferry, with their true positions (Autoferry, CC0).
 
-    python -m experiments.real.autoferry FOLDER [--only NAME ...] [--sensors NAME ...] [--quick] [--json FILE]
-                                                [--publish]
-
 FOLDER holds scenarioN_detections.json and scenarioN_groundTruth.json. One setting for all scenarios, below; the
 radar's reach is 300 m. GOSPA (cutoff 50 m, order 2) at the radar's frames, beside the nearest detection within 25 m of
 each boat ("oracle"). Only tracks that move are judged (`assoc.tracking.MovingTargets`: 15 m from where they began;

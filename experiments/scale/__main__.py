@@ -1,7 +1,5 @@
 """How time and memory grow with the work: scans, trackers, processes, an hour of air traffic.
 
-    python -m experiments.scale [--quick] [--only PART ...] [--json FILE] [--publish]
-
 *One scan*: from measurements to a certified answer, at a constant density of targets: position sensors, 2-D radars, two
 of these and a bearing sensor. *Trackers*: the worst scan, which is one of the first, and the median of later ones.
 *Processes*: scans solved by one and by two. *Hour*: three radars, 500 aircraft at a time. Each row is a process of its
@@ -10,7 +8,6 @@ own, so that peak memory is its own; processor time of all threads, kernels load
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from experiments.common.claims import Claim
 from experiments.common.command import main_of_parts
@@ -118,8 +115,5 @@ def experiment(quick: bool, names: Sequence[str]) -> list[Claim]:
     return [claim for name in names for claim in PARTS[name](quick)]
 
 
-program = partial(main_of_parts, "scale", list(PARTS), experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main_of_parts("scale", list(PARTS), experiment, __doc__))

@@ -1,7 +1,5 @@
 """How fast recordings of one radar are tracked, and in how much memory.
 
-    python -m experiments.scale.recordings [--quick] [--seed N] [--json FILE] [--publish]
-
 500 aircraft at a time within 250 km, each for half an hour, turns of 4 s, P_d 0.9, 5 % false plots, altitudes and
 codes: a CSV file, tracked by the program `assoc track` in a process of its own. Plots a second of processor time, all
 of it: reading, grouping, tracking, writing. A first run on a short recording loads the kernels. Memory at the peak is
@@ -16,7 +14,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -118,7 +115,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "scale.recordings", experiment, __doc__)
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("scale.recordings", experiment, __doc__))

@@ -1,8 +1,5 @@
 """Sensors as they are: trackers where views are limited, parameters wrong, or targets and clutter not as declared.
 
-    python -m experiments.trackers.as_they_are [--seeds N] [--others N] [--only ROW ...] [--trackers NAME ...]
-                                               [--quick] [--seed N] [--json FILE] [--publish]
-
 Each row of `experiments.trackers.real_scenes` (40 scans of 4 s) runs through an oracle that is told which measurement
 is whose (same filter), through `multi-sensor` by what is declared, and through `multi-sensor` and `mht` as the programs
 run them: they estimate what is not known ("adapting"). "If known" is `multi-sensor` that is told the truth about the

@@ -1,8 +1,5 @@
 """Turning radars, each at its own pace: measurements with times of their own, and late ones.
 
-    python -m experiments.trackers.asynchronous [FILE.csv] [--quick] [--seed N] [--json FILE]
-                                                [--seeds N] [--only NAME ...] [--publish]
-
 Three radars with 4, 5 and 5.5 seconds for a turn see thirty airliners, and with a file recorded traffic. GOSPA (order
 2), identity switches and CPU time of a scan, beside an oracle that is told which measurement is whose and when it was
 made; and what comes of it when the plots of four seconds are taken to be of one instant. Then a fifth of the plots

@@ -1,8 +1,5 @@
 """Bearings alone: which trackers find the targets among the ghosts, and how soon.
 
-    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE]
-                                            [--only NAME ...] [--publish]
-
 Four targets and three sensors that measure bearings alone (scenario `bearing-only`, 40 scans of 10 s, default
 settings). A target has a track where a reported one is within 2 km of it on the ground (a bearing says nothing of
 heights); a reported track that is further than that from every target is false. Seeds are --seed (200) and those that
@@ -80,13 +77,10 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
     return claims
 
 
-program = partial(
-    main, "trackers.bearings",
-    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
-    options=(partial(add_seeds, default=SEEDS, of="scenes"), partial(add_only, names=NAMES)),
-    said=" {seeds} scenes.", seed=FIRST,
-)  # fmt: skip
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main(
+        "trackers.bearings",
+        lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
+        options=(partial(add_seeds, default=SEEDS, of="scenes"), partial(add_only, names=NAMES)),
+        said=" {seeds} scenes.", seed=FIRST,
+    ))  # fmt: skip

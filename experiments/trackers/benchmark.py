@@ -1,8 +1,5 @@
 """Our trackers compared with Stone Soup's, and with a labelled multi-Bernoulli filter, on the same detections.
 
-    python -m experiments.trackers.benchmark [--quick] [--seed N] [--budget S] [--json FILE]
-                                             [--publish]
-
 Stone Soup's multi-frame assignment (MFA), its global nearest neighbour (GNN) and its JPDA (by loopy belief propagation)
 are given the targets at time 0, and so are ours: a square of targets in nearly straight flight, two clutter densities,
 the same window of 3 scans, the same gates of 0.999. Stone Soup neither starts nor ends tracks; ours do, which may cost

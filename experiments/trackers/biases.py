@@ -1,7 +1,5 @@
 """Biased radars: how exactly registration finds the biases, and what trackers gain by it.
 
-    python -m experiments.trackers.biases [FILE.csv] [--quick] [--seed N] [--json FILE] [--publish]
-
 Three radars (50 m, 0.057 degrees, P_d 0.9) whose ranges and azimuths are off by up to 300 m and 0.3 degrees, each with
 signs of its own. First the errors of the biases found from about 1,000 plots, then GOSPA of the multi-sensor tracker
 over 60 scans: without biases, with them, with a scene that was registered, with registration online. On simulated

@@ -1,7 +1,5 @@
 """What trackers can bear: three radars for long, crowds of targets, and the time of a scan.
 
-    python -m experiments.trackers.capacity [--quick] [--seed N] [--json FILE] [--publish]
-
 The multi-sensor tracker on the three-radar scene (100 seeds of 100 scans: the second scan, false tracks, its error
 against that of the best radar alone), with a thousand targets and over a thousand scans; `mht` with 300 targets, both
 in a box of 10 x 10 x 5 km with noise of 100 m and 10 % false alarms; `mht-hypothesis` with 100 aircraft in straight

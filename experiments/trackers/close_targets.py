@@ -1,8 +1,5 @@
 """Trackers where association is hard: formations, crossings, low P_d, many false alarms, mixed sensors.
 
-    python -m experiments.trackers.close_targets [--quick] [--seeds N] [--seed N] [--json FILE]
-                                                 [--only NAME ...] [--publish]
-
 Twelve targets, 40 scans of 4 s, default settings; GOSPA, OSPA(2) and HOTA with a cutoff of 500 m, identity switches a
 scene and CPU time of a scan, beside an oracle that is told which measurement is whose. Seeds are --seed (200) and those
 that follow, --seeds of them (20).
@@ -37,13 +34,10 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
     return claims
 
 
-program = partial(
-    main, "trackers.close_targets",
-    lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or TRIED), __doc__,
-    options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=TRIED)),
-    said=" {seeds} scenes of each kind.", seed=FIRST,
-)  # fmt: skip
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main(
+        "trackers.close_targets",
+        lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or TRIED), __doc__,
+        options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=TRIED)),
+        said=" {seeds} scenes of each kind.", seed=FIRST,
+    ))  # fmt: skip

@@ -1,8 +1,5 @@
 """Our trackers compared: three radars, and recorded air traffic if a file is given.
 
-    python -m experiments.trackers.comparison [FILE.csv] [--scans N] [--seeds N] [--quick] [--seed N] [--json FILE]
-                                              [--only NAME ...] [--publish]
-
 All trackers with default settings, and an oracle that is told which measurement is whose, on the three-radar scene
 (ten seeds, 100 scans) and on trajectories of a CSV file that three simulated radars see every 10 s (scenario
 from-tracks, --seeds of them). Tracks count while they are reported. GOSPA and what it consists of (root mean squares),

@@ -1,7 +1,5 @@
 """The examples of docs/stonesoup: GOSPA and time of each way to track, beside Stone Soup's own.
 
-    python -m experiments.trackers.in_stone_soup [--quick] [--seed N] [--json FILE] [--publish]
-
 The same four targets and three radars in each, other noise and false alarms in each scene. GOSPA (Stone Soup's, order
 2, cutoff 500 m) is that of the tracks as they are yielded, and the first way of an example is what its others are
 compared with. Six scenes.
@@ -9,7 +7,6 @@ compared with. Six scenes.
 
 import sys
 from collections.abc import Iterator
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -63,8 +60,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "trackers.in_stone_soup", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("trackers.in_stone_soup", experiment, __doc__))

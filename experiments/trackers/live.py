@@ -1,7 +1,5 @@
 """Plots as they come: the time of a step with 500 aircraft under three turning radars.
 
-    python -m experiments.trackers.live [--quick] [--seed N] [--json FILE] [--publish]
-
 What `assoc live` does with its defaults (tracker multi-sensor) and the antennas' turns of 4, 5 and 5.5 s,
 plots taken in every half second: 500 aircraft (scenario `rotating-radars`), 60 s of plots, the first 10 s not counted.
 CPU times of a step, from the plot that ends an interval to the picture, and wall times beside them, which on a busy
@@ -66,8 +64,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     ]
 
 
-program = partial(main, "trackers.live", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("trackers.live", experiment, __doc__))

@@ -11,6 +11,7 @@ from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 from assoc.solvers.aco.parameters import AcoParameters
 from experiments.common.claims import Claim, load_json
+from experiments.common.command import without_subjects
 from experiments.metaheuristics import ablation, parts, running, sweep
 from experiments.metaheuristics.problems import problem
 
@@ -144,24 +145,22 @@ def test_workers_are_published_apart_from_the_parts():
     assert len(names) == 3 and all(name.startswith("ghosts 40, 2 s, workers: ") for name in names)
 
 
-def test_published_results_of_other_problems_and_solvers_stay(tmp_path):
-    path = tmp_path / f"{ablation.NAME}.json"
+def test_published_results_of_other_problems_and_solvers_stay():
     first = [
         Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=1.0),
         Claim("a, 1 s: tabu, all parts, above the best found", ours=2.0),
         Claim("b, 1 s: aco, all parts, above the best found", ours=3.0),
     ]
-    ablation.save_json(path, ablation.merged(first, folder=tmp_path), ablation.NAME, 0)
     new = [
         Claim("a, 1 s: aco, all parts, above the best found", ours=9.0),
         Claim("a, 2 s: tabu, all parts, above the best found", ours=8.0),
     ]
-    again = ablation.merged(new, folder=tmp_path)
-    assert [one.ours for one in again] == [2.0, 3.0, 9.0, 8.0]
+    again = without_subjects(ablation.subject, first, new)
+    assert [claim.ours for claim in again] == [2.0, 3.0, 9.0, 8.0]
     # of a run with --parts only the same rows are replaced
     part = [Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=7.0)]
-    replaced = ablation.merged(part, folder=tmp_path, of=lambda claim: claim.quantity)
-    assert [one.ours for one in replaced] == [2.0, 3.0, 7.0]
+    replaced = without_subjects(lambda claim: claim.quantity, first, part)
+    assert [claim.ours for claim in replaced] == [2.0, 3.0, 7.0]
 
 
 @pytest.mark.slow

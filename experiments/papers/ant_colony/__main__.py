@@ -1,7 +1,5 @@
 """Table 1 of the ant colony paper: 24 settings of alpha, beta and rho on the scene of the paper.
 
-    python -m experiments.papers.ant_colony [--quick] [--json FILE] [--figure FILE] [--study FOLDER] [--publish]
-
 All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
 "paper" (equations 7 to 11, on costs made positive) and in mode "mmas", several seeds each.
 

@@ -1,7 +1,5 @@
 """Multiple hypothesis tracking with a clustering time window (Cahyono 2014): tables 4.25 to 4.27, pairs, false starts.
 
-    python -m experiments.papers.clustering_time_window [--quick] [--seed N] [--json FILE]
-
 The paper's recording is not public. Scenario S1 (`rotating-radar`) has what the paper tells about it: about 18 minutes
 (here 1,130 s), a rotation of about 10 s (here 9.5), ranges in whole nautical miles. 14 aircraft, P_d 0.78 and the false
 plots are chosen by us. Its CT, MT and IT are described in words; docs/metrics.md says what they mean here. Its grouping
@@ -15,7 +13,6 @@ false starts; the IDs are judged by the majority of 6 plots.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -52,8 +49,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return judge(QUICK if quick else Size(), rng)
 
 
-program = partial(main, "papers.clustering_time_window", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.clustering_time_window", experiment, __doc__))

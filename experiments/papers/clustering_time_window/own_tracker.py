@@ -1,7 +1,5 @@
 """The thesis's own tracker (Reid, constant step) beyond tables 4.25 to 4.27: clutter, MT, pairs, starts, clocks.
 
-    python -m experiments.papers.clustering_time_window.own_tracker [--quick] [--seed N] [--json FILE] [--publish]
-
 IT of docs/metrics.md counts a plot in a track that is not confirmed yet as wrong, so a tracker that begins a track with
 each plot it has no place for is charged for false plots that never enter a confirmed track. "Among tracks ever
 confirmed" leaves out the plots of tracks that never are.

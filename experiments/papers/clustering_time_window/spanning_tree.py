@@ -1,15 +1,11 @@
 """Clusters by a minimum spanning tree, which the thesis names (Park and Lee 2011), as tracks.
 
-    python -m experiments.papers.clustering_time_window.spanning_tree [--quick] [--seed N] [--json FILE] [--publish]
-
 Plots are points in place and time (250 metres a second); points of different turns near each other are joined, the
 least spanning tree of these edges is cut where one is longer than three and a half turns (an aircraft that was missed
 once leaves less), and a part of three plots or more is a track. There is no prediction and no filter. The recordings
 are those on which papers.clustering_time_window runs Reid's MHT; the pairs are drawn anew. Full size: 6 recordings of
 1,130 s, 15 pairs of each kind (600 s).
 """
-
-from functools import partial
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -69,8 +65,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "papers.clustering_time_window.spanning_tree", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.clustering_time_window.spanning_tree", experiment, __doc__))

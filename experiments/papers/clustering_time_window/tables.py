@@ -1,7 +1,5 @@
 """The thesis's tables 2.1, 4.1 to 4.24 read again, and its five aircraft tracked by us.
 
-    python -m experiments.papers.clustering_time_window.tables FOLDER [--json FILE] [--publish]
-
 FOLDER holds the tables as CSV files, named as t4_09_groundtruth_mode3_902.csv. Checked are the groups of tables 4.1 to
 4.8, the conversion and headings (equations 3.1 to 3.8), and which of an aircraft's plots (tables 4.9 to 4.17) its
 tracks hold without and with the window (tables 4.10 to 4.23). The recording is not public and the tables have no
@@ -21,8 +19,8 @@ from assoc._types import Array
 from assoc.recordings import Recording, clustering_time_window, estimate_rotation, radar_of, read_plots
 from assoc.recordings.columns import NAUTICAL_MILE
 from assoc.simulation.scenarios.rotating_radar import BEARING_STEP
-from experiments.common.claims import Claim, print_table, save_json
-from experiments.common.command import add_publish, publish
+from experiments.common.claims import Claim
+from experiments.common.command import add_files, report
 from experiments.papers.clustering_time_window import pairs
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import run
@@ -228,17 +226,11 @@ def program(arguments: list[str] | None = None) -> int:
         prog=f"python -m experiments.{NAME}", description="Read the thesis's tables again and track its five aircraft."
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the thesis's tables as CSV files")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results here")
-    add_publish(parser, NAME)
+    add_files(parser, NAME)
     chosen = parser.parse_args(arguments)
     if not chosen.folder.is_dir():
         parser.error(f"{chosen.folder}: expected a folder with the thesis's tables")
-    claims = judge(chosen.folder)
-    print_table(claims, "Tables of the thesis on the clustering time window")
-    if chosen.json:
-        save_json(chosen.json, claims, NAME, 0, __doc__ or "")
-    if chosen.publish:
-        publish(claims, NAME, 0, __doc__)
+    report(chosen, judge(chosen.folder), NAME, __doc__)
     return 0
 
 

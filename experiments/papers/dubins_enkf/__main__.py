@@ -1,7 +1,5 @@
 """Dubins paths and the ensemble Kalman filter for an unmanned aircraft.
 
-    python -m experiments.papers.dubins_enkf [--quick] [--seed N] [--json FILE] [--figure FILE]
-
 Turning radius 100 m, an obstacle of radius 30 m; filters: 400 runs of 120 steps, 10 to 500 members. The paper's path
 around the obstacle turns at the obstacle's radius, tighter than the aircraft can, and has kinks. Its claim that the
 filter improves with the number of members up to 200 or 300 does not hold: above 100 there is no trend. The process

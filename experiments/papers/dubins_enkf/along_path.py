@@ -1,7 +1,5 @@
 """The error along a Dubins path, which the paper's introduction promises: an aircraft that steers by its estimate.
 
-    python -m experiments.papers.dubins_enkf.along_path [--quick] [--seed N] [--json FILE] [--publish]
-
 The aircraft flies the paths of figures 2 and 3 at 20 m/s, the paper's airspeed there, in steps of 0.1 s. Position and
 heading are disturbed in each step and measured with the noise that ensemble.py has for distance and climb angle, chosen
 by us. The turn is that of the path, corrected by what the estimate is off it. "From the path" is the distance from the
@@ -9,7 +7,6 @@ line that the aircraft is planned to fly along. Full size: 50 runs.
 """
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -101,8 +98,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "papers.dubins_enkf.along_path", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.dubins_enkf.along_path", experiment, __doc__))

@@ -1,7 +1,5 @@
 """Fuzzy-adaptive EKF on manoeuvring targets, compared with the best fixed EKF and an IMM.
 
-    python -m experiments.papers.fuzzy_ekf [--quick] [--seed N] [--json FILE] [--figure FILE]
-
 The paper shows one trajectory without units or membership functions and reports 41.93 % (EKF) and 59.97 % (EKF with
 inference) below the raw measurements. Its trajectory is not published, so manoeuvres chosen by us stand for it: 101
 points at 1 s, range noise 50 m, angle noise such that the raw RMSE is the paper's 0.0897 km, 400 runs of each. C: 1 g

@@ -1,13 +1,10 @@
 """The models of Singer and of jerk, which the fuzzy paper names, against its own of constant acceleration.
 
-    python -m experiments.papers.fuzzy_ekf.other_models [--quick] [--seed N] [--json FILE] [--publish]
-
 One EKF of each model, without rules; each is tuned once, on the 50 random flights on which the rules were tuned, over
 a grid of standard deviations and correlation times. Full size: 100 runs of each scenario.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from itertools import product
 from typing import Any
 
@@ -62,8 +59,5 @@ def experiment(
     return claims
 
 
-program = partial(main, "papers.fuzzy_ekf.other_models", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.fuzzy_ekf.other_models", experiment, __doc__))

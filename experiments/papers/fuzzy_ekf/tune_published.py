@@ -1,7 +1,5 @@
 """Tune the sets and the base noise of the paper's filter, which the paper does not give, on random flights.
 
-    python -m experiments.papers.fuzzy_ekf.tune_published [--evaluations N] [--flights N] [--seed N] [--output FILE]
-
 CMA-ES as for the tuned rules and the IMM (experiments/filters/tune.py), on other flights than those of the report.
 Without it the comparison would be between tuned filters and one whose parameters were chosen by eye. Writes
 experiments/papers/fuzzy_ekf/published_rules.json.

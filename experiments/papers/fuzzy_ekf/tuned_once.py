@@ -1,7 +1,5 @@
 """The paper's rules against one fixed EKF that was tuned once, on the flights on which the rules were tuned.
 
-    python -m experiments.papers.fuzzy_ekf.tuned_once [--quick] [--seed N] [--json FILE] [--publish]
-
 papers.fuzzy_ekf compares with the best fixed EKF of each scenario, chosen in hindsight. A user has one noise for all:
 here the EKF of constant acceleration whose noise is best on the 50 random flights of tune_published. The sets tuned
 there lie where they like; "sets as named" are tuned on the same flights with alpha = 1 keeping Q and R (S and N1 at 1,
@@ -11,7 +9,6 @@ Full size: 200 evaluations, 100 runs of each scenario.
 """
 
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,8 +89,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims
 
 
-program = partial(main, "papers.fuzzy_ekf.tuned_once", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.fuzzy_ekf.tuned_once", experiment, __doc__))

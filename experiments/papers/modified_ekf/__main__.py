@@ -1,7 +1,5 @@
 """Modified EKF for a 3-D radar: when it is better than an EKF, and whether its covariances are right.
 
-    python -m experiments.papers.modified_ekf [--quick] [--seed N] [--json FILE]
-
 The paper's own setting (paper_setting.py) has a target 20 m away, 1,000 runs. Benchmark B1 is chosen by us where the
 modification matters: a target 100 km away, azimuth and elevation of 1.5 deg, range of 30 m, steps of 1 s, 1,000 runs,
 the errors of the second half. What decides is beta = r sigma_angle^2 / sigma_range, above about 0.25, and a filter that

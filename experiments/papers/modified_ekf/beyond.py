@@ -1,7 +1,5 @@
 """What the modified EKF's paper leaves open: debiased Cartesian measurements, missed ones, a radar without elevations.
 
-    python -m experiments.papers.modified_ekf.beyond [--quick] [--seed N] [--json FILE] [--publish]
-
 Equations 2.16 to 2.24 (debiased measurements, which the filter does not use) against samples at 100 km, elevation
 30 deg, 30 m and 1.5 deg, in units of the stated standard deviation. The matrices of section 4.1, which depend on the
 state, against equations 4.7 to 4.14 and the Jacobian, at starts around table 4.1. Suggestion 5.2, other measurements:
@@ -11,7 +9,6 @@ predicts. Full size: a million samples, 1,000 runs.
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -171,8 +168,5 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     return claims + about_matrices(rng)
 
 
-program = partial(main, "papers.modified_ekf.beyond", experiment, __doc__)
-
-
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main("papers.modified_ekf.beyond", experiment, __doc__))
