@@ -49,13 +49,13 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     for targets in TARGETS:
         answers = {name: [answer(targets, seed, density) for seed in seeds] for name, density in COSTS.items()}
         for name, ones in answers.items():
-            found, correct, true = (np.array([one[i] for one in ones], dtype=float) for i in range(3))
+            found, correct, true = (np.array([scan[i] for scan in ones], dtype=float) for i in range(3))
             words = f"{targets} targets, {name}"
             claims += [
                 Claim(f"{words}: targets found of each 100 there", "", None, *_ratio(found, true)),
                 Claim(f"{words}: true tuples found", "%", None, *_ratio(correct, true)),
                 Claim(f"{words}: chosen tuples that are true", "%", None, *_ratio(correct, found)),
-                Claim(f"{words}: proven optima", "%", None, 100.0 * np.mean([one.optimal for one in ones])),
+                Claim(f"{words}: proven optima", "%", None, 100.0 * np.mean([scan.optimal for scan in ones])),
             ]
         more = [b.correct - a.correct for a, b in zip(*answers.values(), strict=True)]
         gain = mean_interval(np.array(more, dtype=float))

@@ -51,13 +51,13 @@ def first_sight(figure: Any) -> None:
     figure.set_size_inches(9, 4.9)
     made = simulate("crowd", 4, targets=12, width=2_000.0, height=1_000.0, noise=50.0, false_alarms_per_target=0.3)
     # the truth is not known to the package either
-    one = assoc.Scene(made.sensors, made.times, made.measurements, made.region)
-    scan = assoc.associate(one).scans[0]
+    scene = assoc.Scene(made.sensors, made.times, made.measurements, made.region)
+    scan = assoc.associate(scene).scans[0]
     left, right = figure.subplots(1, 2)
-    plot_scene(one, 0, ax=left).set_title("in: what three sensors measured")
+    plot_scene(scene, 0, ax=left).set_title("in: what three sensors measured")
     alone = int((scan.solution.tuples > 0).sum(axis=1).tolist().count(1))
     found = f"{scan.solution.num_targets} targets, {alone} false alarms"
-    plot_solution(one, scan, ax=right).set_title(f"out: {found}, {scan.solution.status}")
+    plot_solution(scene, scan, ax=right).set_title(f"out: {found}, {scan.solution.status}")
     for ax in (left, right):
         ax.set(xlim=(-0.2, 2.2), ylim=(-0.2, 2.2))
     left.get_legend().remove()
@@ -76,9 +76,9 @@ def solution(figure: Any) -> None:
 
     figure.set_size_inches(11, 5.2)
     left, right = figure.subplots(1, 2)
-    one, association = _radars()
-    plot_solution(one, association.scans[50], ax=left).set_title("scan 50")
-    plot_solution(one, association.scans[50], target=0, ax=right).set_title("its first target")
+    scene, association = _radars()
+    plot_solution(scene, association.scans[50], ax=left).set_title("scan 50")
+    plot_solution(scene, association.scans[50], target=0, ax=right).set_title("its first target")
     left.get_legend().remove()
 
 
@@ -86,8 +86,8 @@ def ghosts(figure: Any) -> None:
     """Draw three bearing sensors, whose lines of sight cross where nobody is."""
     from assoc.plotting import plot_solution
 
-    one = simulate("bearing-only", 0, targets=8, scans=1)
-    plot_solution(one, assoc.associate(one, "exact").scans[0], ax=figure.subplots())
+    scene = simulate("bearing-only", 0, targets=8, scans=1)
+    plot_solution(scene, assoc.associate(scene, "exact").scans[0], ax=figure.subplots())
 
 
 def gates(figure: Any) -> None:
@@ -96,12 +96,12 @@ def gates(figure: Any) -> None:
 
     figure.set_size_inches(11, 4.6)
     left, right = figure.subplots(1, 2)
-    one, association = _radars()
-    plot_scene(one, 50, gates=True, ax=left).set_title("gates around a target, 0.999")
+    scene, association = _radars()
+    plot_scene(scene, 50, gates=True, ax=left).set_title("gates around a target, 0.999")
     place = 1e-3 * association.scans[50].positions[0]
     left.set_xlim(place[0] - 0.5, place[0] + 0.5)
     left.set_ylim(place[1] - 0.4, place[1] + 0.4)
-    plot_gates(one, association, ax=right).set_title("100 scans")
+    plot_gates(scene, association, ax=right).set_title("100 scans")
 
 
 def costs(figure: Any) -> None:
@@ -154,17 +154,17 @@ def tracks(figure: Any) -> None:
     """Draw the tracks that a multi-sensor tracker makes of the radars' scene, over the truth."""
     from assoc.plotting import plot_tracks
 
-    one, frame = _tracked()
-    plot_tracks(frame, one, ax=figure.subplots())
+    scene, frame = _tracked()
+    plot_tracks(frame, scene, ax=figure.subplots())
 
 
 @cache
 def _tracked() -> tuple[assoc.Scene, Any]:
     from assoc.tracking import MultiSensorTracker, track_scene
 
-    one = _radars()[0]
-    table, _ = track_scene(MultiSensorTracker.for_scene(one), one)
-    return one, table.to_frame()
+    scene = _radars()[0]
+    table, _ = track_scene(MultiSensorTracker.for_scene(scene), scene)
+    return scene, table.to_frame()
 
 
 def metric(figure: Any) -> None:
@@ -173,12 +173,12 @@ def metric(figure: Any) -> None:
     from assoc.plotting import plot_metric
 
     figure.set_size_inches(7, 4)
-    one, frame = _tracked()
-    truth = Trajectories.from_scene(one)
+    scene, frame = _tracked()
+    truth = Trajectories.from_scene(scene)
     found = Trajectories(frame["time"], frame["track_id"], frame[["x", "y", "z"]])
     at, values = gospa_over_time(truth, found, 300.0)
-    parts = {"GOSPA": [one.distance for one in values]}
-    parts |= {name: [getattr(one, name) ** 0.5 for one in values] for name in ("localisation", "missed", "false")}
+    parts = {"GOSPA": [value.distance for value in values]}
+    parts |= {name: [getattr(value, name) ** 0.5 for value in values] for name in ("localisation", "missed", "false")}
     plot_metric(at, parts, name="GOSPA with cutoff 300 m", unit="m", ax=figure.subplots())
 
 
@@ -187,8 +187,8 @@ def overview(figure: Any) -> None:
     from assoc.plotting import plot_overview
 
     figure.set_size_inches(11, 9)
-    one = simulate("bearing-only", 0, targets=30, scans=1)
-    plot_overview(one, assoc.associate(one, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
+    scene = simulate("bearing-only", 0, targets=30, scans=1)
+    plot_overview(scene, assoc.associate(scene, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
 
 
 def surfaces(kind: str) -> Callable[[Any], None]:
@@ -277,11 +277,11 @@ def screenshot() -> bytes | None:
     from assoc.plotting.report import write_association_report
     from experiments.common.browser import opened, show
 
-    one, association = _radars()
+    scene, association = _radars()
     with tempfile.TemporaryDirectory() as folder, opened() as browser:
         page = Path(folder) / "report.html"
         words = ["scene.npz", "--solver", "aco", "--report", "report.html"]
-        write_association_report(page, association, one, ["scene.npz"] * len(association.scans), words=words)
+        write_association_report(page, association, scene, ["scene.npz"] * len(association.scans), words=words)
         show(browser, page, (1100, 950), fragment="#scan-50", scale=2)
         browser.execute_script("document.querySelector('#targets tr[data-row]').click()")
         browser.execute_script("window.scrollTo(0, 0)")

@@ -111,7 +111,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
             # compiled, and scipy imported, on a problem that is not measured
             measured(component_of(make(0)))
             found = [measured(component_of(make(FIRST_SEED + number))) for number in range(2 if quick else SEEDS)]
-            medians = {what: float(np.median([one[what] for one in found])) for what in COLUMNS}
+            medians = {what: float(np.median([run[what] for run in found])) for what in COLUMNS}
             claims += [Claim(f"{name}: {what}", "", None, value) for what, value in medians.items()]
     return claims
 

@@ -134,7 +134,7 @@ def sensors() -> list[Sensor]:
     """Return three radars around the region."""
     options = {"range_noise": 50.0, "angle_noise": 1e-3, "detection_probability": 0.9, "false_alarm_rate": 1.0}
     places = on_circle(REGION.mean(axis=1), 60e3, 3)
-    return [radar_over(REGION, place, name=f"radar {i}", **options) for i, place in enumerate(places)]  # type: ignore[arg-type]
+    return [radar_over(REGION, place, name=f"radar {i}", **options) for i, place in enumerate(places)]
 
 
 def positions(times: Array) -> Array:
@@ -168,17 +168,17 @@ def track(kind: str, steps: int, rng: np.random.Generator, looks: int = WATCHED)
         tracker.step(when, measurements)
         if not clock.add(number, time.process_time() - started):
             continue
-        for one in tracker.tracks:
-            scale = np.sqrt(np.diag(one.covariance))
-            unit = one.covariance / np.outer(scale, scale)
+        for track in tracker.tracks:
+            scale = np.sqrt(np.diag(track.covariance))
+            unit = track.covariance / np.outer(scale, scale)
             least = min(least, float(np.linalg.eigvalsh(unit).min()))
             asymmetry = max(asymmetry, float(np.abs(unit - unit.T).max()))
-        confirmed = [one for one in tracker.tracks if one.confirmed]
-        away = np.array([[np.linalg.norm(one.position - place) for one in confirmed] for place in targets])
+        confirmed = [track for track in tracker.tracks if track.confirmed]
+        away = np.array([[np.linalg.norm(track.position - place) for track in confirmed] for place in targets])
         errors.append(float(np.minimum(away.min(axis=1, initial=1_000.0), 1_000.0).mean()))
-        spread += [float(np.sqrt(np.trace(one.covariance[:3, :3]))) for one in confirmed]
+        spread += [float(np.sqrt(np.trace(track.covariance[:3, :3]))) for track in confirmed]
     half, part = len(spread) // 2, len(errors) // 2
-    last_id = max(one.track_id for one in tracker.tracks)
+    last_id = max(track.track_id for track in tracker.tracks)
     return [
         *watch.claims(kind),
         Claim(f"{kind}: least eigenvalue of a correlation matrix", "", None, least, None, (1e-12, None)),

@@ -107,7 +107,6 @@ def _long(problem: AssignmentProblem, like: Marginals) -> Array:
             answers = [assoc.assign(cluster, solver).tuples.tolist() for solver in ("exact", "greedy")]
             starts = [np.array([number[key] for key in map(tuple, answer) if key in number]) for answer in answers]
             share = estimates(columns, starts, Run(0), length=_LONG)
-            assert share is not None
             share = share.mean(axis=0, keepdims=True)
         of.update(zip(map(tuple, problem.tuples[which[columns.origin]].tolist()), share[0].tolist(), strict=True))
     # false alarms are as good as the tuples they exclude

@@ -82,9 +82,9 @@ def _walked(
         else:
             # two measurements of a sensor change places
             s = rng.integers(0, num_sensors)
-            one, other = rng.integers(first_row[s], first_row[s + 1]), rng.integers(first_row[s], first_row[s + 1])
-            possible = one != other
-            for r, to in ((one, other), (other, one)):
+            row, other = rng.integers(first_row[s], first_row[s + 1]), rng.integers(first_row[s], first_row[s + 1])
+            possible = row != other
+            for r, to in ((row, other), (other, row)):
                 if possible and owner[r] >= 0:
                     old[num_old] = owner[r]
                     num_old += 1

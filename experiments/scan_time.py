@@ -65,8 +65,8 @@ def parts_of(scene: Scene) -> dict[str, float]:
         "build_problem": median_ms(lambda _: assoc.build_problem(scene, 0)),
         "exact": median_ms(assoc.assign, lambda: assoc.build_problem(scene, 0)),
         "AssignmentProblem": median_ms(lambda _: fresh(problem)),
-        "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), lambda: fresh(problem)),
-        "HiGHS": median_ms(lambda one: run("highs", one, 60.0), lambda: fresh(problem)),
+        "greedy": median_ms(lambda given: assoc.assign(given, "greedy"), lambda: fresh(problem)),
+        "HiGHS": median_ms(lambda given: run("highs", given, 60.0), lambda: fresh(problem)),
     }
 
 
@@ -77,9 +77,9 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
         for name, kind in KINDS.items():
             seeds = rng.integers(2**31, size=2 if quick else _SCENES)
             found = [parts_of(kind.make(int(seed))) for seed in seeds]
-            medians = {part: float(np.median([one[part] for one in found])) for part in PARTS}
-            both = [one["build_problem"] + one["exact"] for one in found]
-            ratio = float(np.median([one["HiGHS"] / one["exact"] for one in found]))
+            medians = {part: float(np.median([times[part] for times in found])) for part in PARTS}
+            both = [times["build_problem"] + times["exact"] for times in found]
+            ratio = float(np.median([times["HiGHS"] / times["exact"] for times in found]))
             source = "" if kind.goal is None else "goal chosen by us"
             band = None if kind.goal is None else (None, kind.goal)
             claims += [

@@ -67,7 +67,8 @@ class Case:
 
     def changed(self, change: Callable[[Entry], Entry | None]) -> Self:
         """Return the same case with each entry changed, or left out where there is none then; equal ones once."""
-        return replace(self, entries=tuple(dict.fromkeys(one for one in map(change, self.entries) if one is not None)))
+        changed = [entry for entry in map(change, self.entries) if entry is not None]
+        return replace(self, entries=tuple(dict.fromkeys(changed)))
 
     def by_seed(self, most: int | None = None) -> list[Self]:
         """Return a case for each seed, of so many at the most."""

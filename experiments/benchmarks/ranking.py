@@ -103,9 +103,7 @@ def _exact(problem: AssignmentProblem, k: int) -> Callable[[AssignmentProblem], 
 
 
 def _murty_peer(problem: AssignmentProblem, k: int) -> Callable[[AssignmentProblem], list[float]]:
-    from pytcl.assignment_algorithms.two_dimensional.kbest import (  # type: ignore[import-untyped,unused-ignore]
-        murty,
-    )
+    from pytcl.assignment_algorithms.two_dimensional.kbest import murty
 
     found = murty(problem.to_dense(), k)
     return lambda original: np.asarray(found.costs).tolist()

@@ -108,6 +108,6 @@ def load(path: Path) -> list[Row]:
             values: dict[str, object] = {}
             for field in fields(Row):
                 text = record.get(field.name) or "0"
-                values[field.name] = text == "True" if field.type is bool else field.type(text)  # type: ignore[operator]
-            rows.append(Row(**values))  # type: ignore[arg-type]
+                values[field.name] = text == "True" if field.type is bool else field.type(text)
+            rows.append(Row(**values))
     return rows

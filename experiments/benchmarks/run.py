@@ -33,14 +33,14 @@ def run_all(
     processes: More than 1: so many seeds at once, each process on a core of its own.
     """
     units = [case.by_seed(seeds) for case in cases]
-    flat = [one for ones in units for one in ones]
+    flat = [unit for ones in units for unit in ones]
     with _running(flat, processes) as found:
         for ones in units:
             rows: list[Row] = []
-            for one in ones:
+            for unit in ones:
                 rows += (more := next(found))
                 told = ", ".join(f"{row.solver} {row.cost:.7g} {row.seconds:.3g}s" for row in more if row.item == 0)
-                log(f"{one.family} {one.size} seed {one.seeds[0]}: {told}")
+                log(f"{unit.family} {unit.size} seed {unit.seeds[0]}: {told}")
             yield rows
 
 
@@ -84,9 +84,9 @@ def run_case(case: Case, seeds: int | None = None) -> list[Row]:
     """Run everybody on every instance of a case, of so many seeds at the most."""
     return [
         row
-        for one in case.by_seed(seeds)
-        for item, instance in enumerate(case.make(one.seeds[0]))
-        for row in _run_instance(case, instance, one.seeds[0], item)
+        for unit in case.by_seed(seeds)
+        for item, instance in enumerate(case.make(unit.seeds[0]))
+        for row in _run_instance(case, instance, unit.seeds[0], item)
     ]
 
 
@@ -135,4 +135,4 @@ def timed(run: Callable[[], Row]) -> Row:
     if row.seconds >= SHORT:
         return row
     rows = [row, *(run() for _ in range(TIMES - 1))]
-    return replace(row, seconds=median(one.seconds for one in rows), cpu=median(one.cpu for one in rows))
+    return replace(row, seconds=median(each.seconds for each in rows), cpu=median(each.cpu for each in rows))

@@ -70,7 +70,7 @@ def in_time(condition: Callable[[], Any]) -> Any:
 
 def complaints(browser: Any) -> list[str]:
     """Return errors and warnings of the console since the page was opened."""
-    return [f"{one['level']}: {one['message']}" for one in browser.get_log("browser") if one["level"] != "INFO"]
+    return [f"{line['level']}: {line['message']}" for line in browser.get_log("browser") if line["level"] != "INFO"]
 
 
 def requests(browser: Any) -> list[str]:

@@ -117,7 +117,7 @@ def run(name: str, problem: AssignmentProblem, limit: float, told: Told | None =
         return Answer(math.inf, bound, seconds, problem.tuples[:0], cpu=cpu)
     tuples = problem.tuples[indices]
     cost = check_answer(problem, tuples)
-    if any(abs(cost - one) > 1e-7 * max(1.0, abs(cost)) for one in said):
+    if any(abs(cost - other) > 1e-7 * max(1.0, abs(cost)) for other in said):
         raise AssertionError(f"{name}: says {said[0]}, its tuples cost {cost}")
     return Answer(cost, bound, seconds, tuples, proven, cpu)
 
@@ -135,8 +135,8 @@ def warm_up(names: Collection[str]) -> None:
 
 def not_installed() -> list[str]:
     """Packages of peers that are not installed (extra ``peers``)."""
-    missing = {one for one in _PACKAGES.values() if importlib.util.find_spec(one) is None}
-    return sorted("nrl-tracker" if one == "pytcl" else one for one in missing)
+    missing = {package for package in _PACKAGES.values() if importlib.util.find_spec(package) is None}
+    return sorted("nrl-tracker" if package == "pytcl" else package for package in missing)
 
 
 def takes(name: str, problem: AssignmentProblem = _TINY) -> bool:

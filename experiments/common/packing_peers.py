@@ -94,7 +94,7 @@ def independent_set(kind: str, problem: AssignmentProblem, time_limit: float) ->
     # their threads are counted when they are loaded, and are theirs to take
     threads = os.environ.pop("OMP_NUM_THREADS", None)
     try:
-        from chszlablib import _chils, _kamis_mmwis, _kamis_wmis  # type: ignore[import-untyped,unused-ignore]
+        from chszlablib import _chils, _kamis_mmwis, _kamis_wmis
     finally:
         if threads is not None:
             os.environ["OMP_NUM_THREADS"] = threads
@@ -113,15 +113,15 @@ def independent_set(kind: str, problem: AssignmentProblem, time_limit: float) ->
 
 def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
     """Multiple Hungarian method on the costs of pairs, algorithm "Fm"; it takes no time limit."""
-    from kap import k_assignment  # type: ignore[import-untyped,unused-ignore]
+    from kap import k_assignment
 
     saved = savings(problem)
     count = (problem.tuples > 0).sum(axis=1)
     matrices = []
-    for one, two in itertools.combinations(range(problem.num_sensors), 2):
-        matrix = np.zeros((problem.sizes[one], problem.sizes[two]))
-        pairs = np.flatnonzero((count == 2) & (problem.tuples[:, one] > 0) & (problem.tuples[:, two] > 0))
-        np.minimum.at(matrix, (problem.tuples[pairs, one] - 1, problem.tuples[pairs, two] - 1), -saved[pairs])
+    for first, second in itertools.combinations(range(problem.num_sensors), 2):
+        matrix = np.zeros((problem.sizes[first], problem.sizes[second]))
+        pairs = np.flatnonzero((count == 2) & (problem.tuples[:, first] > 0) & (problem.tuples[:, second] > 0))
+        np.minimum.at(matrix, (problem.tuples[pairs, first] - 1, problem.tuples[pairs, second] - 1), -saved[pairs])
         matrices.append(matrix)
     listed = {tuple(row): place for place, row in enumerate(problem.tuples.tolist())}
     chosen = []

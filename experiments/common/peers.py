@@ -149,9 +149,7 @@ def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
     """The relaxation of ``nrl-tracker`` on a dense tensor; it takes no time limit."""
     if dense_elements(problem) > DENSE_LIMIT:
         raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
-    from pytcl.assignment_algorithms.nd_assignment import (  # type: ignore[import-untyped,unused-ignore]
-        relaxation_assignment_nd,
-    )
+    from pytcl.assignment_algorithms.nd_assignment import relaxation_assignment_nd
 
     large = 1e4 + float(np.abs(problem.costs).max(initial=0.0))
     sizes = problem.sizes.astype(np.int64)

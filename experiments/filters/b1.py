@@ -59,7 +59,7 @@ class Runs:
     def draw(cls, setting: Setting, count: int, rng: np.random.Generator) -> Self:
         """Draw independent runs, azimuths spread evenly unless the setting gives one."""
         s = setting
-        F, Q = (one[0] for one in s.motion.matrices(s.interval))
+        F, Q = (matrix[0] for matrix in s.motion.matrices(s.interval))
         factor = np.linalg.cholesky(Q + 1e-18 * np.eye(6))
         flat = s.distance * math.cos(s.elevation)
         position = (flat * math.cos(s.azimuth), flat * math.sin(s.azimuth), s.distance * math.sin(s.elevation))

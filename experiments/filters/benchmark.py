@@ -213,7 +213,7 @@ def _time_all(quick: bool) -> list[Claim]:
             }
             for _ in range(ROUNDS)
         ]
-        row = {name: float(np.min([one[name] for one in rounds])) for name in rounds[0]}
+        row = {name: float(np.min([times[name] for times in rounds])) for name in rounds[0]}
         table[kind] = row
         faster = min(row["filterpy"], row["Stone Soup"])
         claims += [Claim(f"{kind}: {name}", "us", None, value) for name, value in row.items()]

@@ -36,7 +36,7 @@ class Case:
 
 def linear_case(count: int, rng: np.random.Generator, steps: int = STEPS) -> Case:
     """Nearly constant velocity, positions measured, the start drawn from the prior: all assumptions hold."""
-    F, Q = (one[0] for one in ConstantVelocity(NOISE).matrices(1.0))
+    F, Q = (matrix[0] for matrix in ConstantVelocity(NOISE).matrices(1.0))
     P = np.diag([1e4, 1e4, 1e4, 100.0, 100.0, 100.0])
     mean = np.tile(np.array([5e3, 4e3, 1e3, -50.0, 20.0, 0.0]), (count, 1))
     states = [mean + rng.standard_normal((count, 6)) @ np.sqrt(P)]
@@ -85,7 +85,7 @@ def filters(noise: float, radar: bool, rng: np.random.Generator) -> dict[str, Fi
     inner = ModifiedEKF if radar else ExtendedKalmanFilter
     kinds = of_each_kind(noise, (100, 1000), rng, inner)
     others = ("Kalman",) if radar else ("modified EKF, simplified", "modified EKF")
-    return {name: one for name, one in kinds.items() if name not in others}
+    return {name: kind for name, kind in kinds.items() if name not in others}
 
 
 EXACT = ("Kalman", "EKF", "UKF")

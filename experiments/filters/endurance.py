@@ -26,7 +26,7 @@ PLACE_OF_TARGET = (30e3, 20e3, 5e3)
 def filters(rng: np.random.Generator) -> dict[str, Filter[Any]]:
     """Return one filter of each kind."""
     kinds = of_each_kind(2.0, (20,), rng, ExtendedKalmanFilter)
-    return {name: one for name, one in kinds.items() if "simplified" not in name}
+    return {name: kind for name, kind in kinds.items() if "simplified" not in name}
 
 
 def endure(filter_: Filter[Any], steps: int, rng: np.random.Generator) -> Array:

@@ -45,8 +45,8 @@ def from_steps(x: Array, positive: bool) -> list[float]:
 
 def fuzzy_vector(data: dict[str, Any]) -> Array:
     """Free vector of parameters of the fuzzy filter: centres of the inputs, of log10 q and of calm."""
-    inputs = [to_steps(np.array(one["inputs"]), True) for one in (data, *data["others"])]
-    outputs = [to_steps(np.array(one), False) for one in (*data["outputs"], data["calm"])]
+    inputs = [to_steps(np.array(rules["inputs"]), True) for rules in (data, *data["others"])]
+    outputs = [to_steps(np.array(centres), False) for centres in (*data["outputs"], data["calm"])]
     return np.concatenate([*inputs, *outputs])
 
 
@@ -55,9 +55,9 @@ def fuzzy_data(x: Array, like: dict[str, Any]) -> dict[str, Any]:
     count = len(like["inputs"])
     parts = list(x.reshape(-1, count))
     alarms = 1 + len(like["others"])
-    inputs = [from_steps(one, True) for one in parts[:alarms]]
-    outputs = [from_steps(one, False) for one in parts[alarms:]]
-    others = [{**one, "inputs": centres} for one, centres in zip(like["others"], inputs[1:], strict=True)]
+    inputs = [from_steps(steps, True) for steps in parts[:alarms]]
+    outputs = [from_steps(steps, False) for steps in parts[alarms:]]
+    others = [{**rules, "inputs": centres} for rules, centres in zip(like["others"], inputs[1:], strict=True)]
     return {**like, "inputs": inputs[0], "others": others, "outputs": outputs[:-1], "calm": outputs[-1]}
 
 
@@ -106,7 +106,7 @@ def search(name: str, objective: Callable[[Array], float], start: Array, evaluat
             print(f"{name}: {state.countevals} evaluations, {np.exp(state.best.f):.3f} m", flush=True)
     # the mean of the distribution has seen more noise averaged than its best sample
     candidates = [(begun, start), (state.best.f, state.best.x), (objective(state.mean), state.mean)]
-    value, best = min(candidates, key=lambda one: one[0])
+    value, best = min(candidates, key=lambda pair: pair[0])
     print(f"{name}: {np.exp(begun):.3f} m at the start, {np.exp(value):.3f} m after {state.countevals} evaluations")
     return best
 

@@ -39,12 +39,12 @@ def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]
     costs: list[dict[tuple[str, str], float]] = []
     try:
         for number in range(count):
-            one = problem(name, number)
+            made = problem(name, number)
             found = {}
             for part in chosen:
                 for solver in part.solvers:
                     with part.without():
-                        found[solver, part.words] = run(one, solver, seconds, number, **part.parameters)
+                        found[solver, part.words] = run(made, solver, seconds, number, **part.parameters)
             costs.append(found)
             log(f"{name}, {number + 1} of {count}:")
             log("\n".join(f"    {solver} {words}: {cost:.8g}" for (solver, words), cost in found.items()))
@@ -57,11 +57,11 @@ def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]
 def _warm_up(name: str, number: int, chosen: Sequence[parts.Part]) -> None:
     """Compile what all parts call, on a problem that is not measured."""
     assoc.warm_up({solver for part in chosen for solver in part.solvers})
-    one = problem(name, number)
+    made = problem(name, number)
     for part in chosen:
         for solver in part.solvers:
             with part.without():
-                run(one, solver, 0.3, 0, **part.parameters)
+                run(made, solver, 0.3, 0, **part.parameters)
 
 
 def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -> list[Claim]:
@@ -116,11 +116,11 @@ def program(arguments: Sequence[str] | None = None) -> int:
         named = [part for part in taken if part.words in chosen.parts]
         bases = {part.base for part in named} | {parts.WHOLE}
         solvers = {solver for part in named for solver in part.solvers}
-        chosen.solvers = [one for one in chosen.solvers if one in solvers]
+        chosen.solvers = [solver for solver in chosen.solvers if solver in solvers]
         if not chosen.solvers:
             parser.error(f"--solvers: none of them has a part of --parts; these have: {', '.join(sorted(solvers))}")
         taken = (*(part for part in taken if part.words in bases), *named)
-    taken = tuple(part._replace(solvers=tuple(one for one in part.solvers if one in chosen.solvers)) for part in taken)
+    taken = tuple(part._replace(solvers=tuple(s for s in part.solvers if s in chosen.solvers)) for part in taken)
     claims: list[Claim] = []
     for name in chosen.problems:
         _warm_up(name, chosen.count, taken)
@@ -128,7 +128,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
         found = claims_of(name, chosen.seconds, costs)
         if chosen.parts:
             # how good the whole and the bare metaheuristic are is told by a run of all parts
-            found = [one for one in found if any(f", {words}, above " in one.quantity for words in chosen.parts)]
+            found = [claim for claim in found if any(f", {words}, above " in claim.quantity for words in chosen.parts)]
         claims += found
     of = (lambda claim: claim.quantity) if chosen.parts else subject
     report(chosen, claims, NAME, __doc__, kept=partial(without_subjects, of))

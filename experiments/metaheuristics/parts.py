@@ -97,8 +97,8 @@ def _no_crossover() -> Iterator[None]:
     """A child has one parent."""
     child = Breeding._child
 
-    def of_one(self: Any, component: Any, one: int, two: int, rng: Any) -> Any:
-        return child(self, component, one, one, rng)
+    def of_one(self: Any, component: Any, first: int, second: int, rng: Any) -> Any:
+        return child(self, component, first, first, rng)
 
     with mock.patch.object(Breeding, "_child", of_one):
         yield

@@ -50,7 +50,7 @@ def run(
     budget = seconds * workers
     # what a limit gives them they use: by default they leave a part that has not become better for a while
     options = {"patience": UNLIMITED, "iterations": UNLIMITED} | parameters
-    one = fresh(problem)
+    copy = fresh(problem)
     with _by_processor_time(workers):
         wall, processor = time.perf_counter(), time.process_time()
         known: list[float] = []
@@ -59,7 +59,7 @@ def run(
             if not known or time.process_time() - processor <= 1.02 * budget:
                 known.append(point.cost)
 
-        solution = assign(one, solver, seed=seed, time_limit=seconds, callback=callback, **options)
+        solution = assign(copy, solver, seed=seed, time_limit=seconds, callback=callback, **options)
         spent = time.process_time() - processor
         _pace.saw(time.perf_counter() - wall, spent / workers)
     if not known or spent <= 1.02 * budget:

@@ -75,35 +75,35 @@ CASES = (
 def settings(grid: Grid = GRID) -> list[dict[str, Any]]:
     """All settings, in the order of the arrays."""
     made = [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
-    return [one | {"ants": int(one["ants"])} for one in made]
+    return [setting | {"ants": int(setting["ants"])} for setting in made]
 
 
-def _setting(how: str, one: dict[str, Any]) -> Setting:
+def _setting(how: str, values: dict[str, Any]) -> Setting:
     if how == "paper":
-        return Setting("aco", {"mode": "paper", "iterations": 150, **one})
+        return Setting("aco", {"mode": "paper", "iterations": 150, **values})
     refinement = how.removeprefix("mmas, ")
-    cycles = 3 if refinement == "full" else _WALKS // one["ants"]
+    cycles = 3 if refinement == "full" else _WALKS // values["ants"]
     more = {"refinement": refinement, "iterations": cycles, "patience": UNLIMITED}
-    return Setting("aco", {**one, **more})
+    return Setting("aco", {**values, **more})
 
 
 def excesses(case: Case, problems: Sequence[AssignmentProblem], optima: Floats, seed: int, grid: Grid = GRID) -> Floats:
     """Excess of every setting on every problem, percent."""
-    made = [_setting(case.how, one) for one in settings(grid)]
-    sources = [StudySource(one, f"{number:03d}") for number, one in enumerate(problems)]
+    made = [_setting(case.how, values) for values in settings(grid)]
+    sources = [StudySource(instance, f"{number:03d}") for number, instance in enumerate(problems)]
     # what an answer proves is not asked for: it would take longer than the ants
     without = mock.patch.object(search, "close", lambda component, run: None)
     with tempfile.TemporaryDirectory(prefix="assoc-") as folder, without:
         Study(sources, made, 1, seed).run(folder)
         frame = load(folder)
-    costs = frame.pivot(index="setting", columns="scene", values="cost").loc[[one.key for one in made]]
+    costs = frame.pivot(index="setting", columns="scene", values="cost").loc[[setting.key for setting in made]]
     return 100.0 * (costs.to_numpy(dtype=float) - optima) / np.abs(optima)
 
 
 def optima_of(problems: Sequence[AssignmentProblem]) -> tuple[Floats, int]:
     """Optimal costs, and how many of them are proven (else the best that a minute gives)."""
-    found = [assoc.assign(one, "exact", time_limit=60.0) for one in problems]
-    return np.array([one.cost for one in found]), sum(one.status == "optimal" for one in found)
+    found = [assoc.assign(instance, "exact", time_limit=60.0) for instance in problems]
+    return np.array([solution.cost for solution in found]), sum(solution.status == "optimal" for solution in found)
 
 
 def claims_of(case: Case, excess: Floats, grid: Grid = GRID) -> list[Claim]:
@@ -117,7 +117,7 @@ def claims_of(case: Case, excess: Floats, grid: Grid = GRID) -> list[Claim]:
     found = []
     for names in SURFACES:
         for values in itertools.product(*(grid[name] for name in names)):
-            chosen = [all(one[n] == v for n, v in zip(names, values, strict=True)) for one in every]
+            chosen = [all(setting[n] == v for n, v in zip(names, values, strict=True)) for setting in every]
             words = ", ".join(f"{name} {value:g}" for name, value in zip(names, values, strict=True))
             found.append(claim(words, excess[chosen].mean(axis=0)))
     train, test = excess[:, ::2], excess[:, 1::2]
@@ -142,7 +142,7 @@ def draw(figure: Any, shown: tuple[list[Case], dict[str, Claim]]) -> None:
     for row, case in zip(axes, cases, strict=True):
         for ax, (up, across) in zip(row, SURFACES, strict=True):
             found = [
-                [claims[f"{case.name}: {up} {one:g}, {across} {other:g}"] for other in GRID[across]] for one in GRID[up]
+                [claims[f"{case.name}: {up} {v:g}, {across} {other:g}"] for other in GRID[across]] for v in GRID[up]
             ]
             means = np.array([[claim.ours for claim in line] for line in found])
             # where all settings are alike there is still a scale, from 0 up
@@ -191,7 +191,7 @@ def program(arguments: Sequence[str] | None = None, *, cases: Sequence[Case] = C
             known[case.problems] = problems, optima
             log(f"{case.problems}: {proven} of {len(problems)} optima proven")
             claims.append(Claim(f"{case.problems}, problems: optima proven of {len(problems)}", "", None, proven))
-            greedy = [assoc.assign(one, "greedy").cost for one in problems]
+            greedy = [assoc.assign(instance, "greedy").cost for instance in problems]
             excess = 100.0 * (np.array(greedy) - optima) / np.abs(optima)
             interval = mean_interval(excess[:, None])
             claims.append(Claim(f"{case.problems}, greedy: excess", "%", None, float(excess.mean()), interval))

@@ -85,9 +85,9 @@ def _exact(rows: list[Row]) -> str:
 def _heuristics(solvers: list[list[Row]]) -> str:
     if not solvers:
         return "-"
-    rows = [row for one in solvers for row in one]
+    rows = [row for own in solvers for row in own]
     if all(row.hit for row in rows):
-        times = sorted(median(row.taken for row in one) for one in solvers)
+        times = sorted(median(row.taken for row in own) for own in solvers)
         return f"{as_time(times[0])} to {as_time(times[-1])}, optimal"
     excess = [row.excess for row in rows]
     return f"{rows[0].limit:g} s: {as_percent(median(excess))} %, at worst {as_percent(max(excess))} %"

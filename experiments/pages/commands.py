@@ -25,7 +25,7 @@ def commands() -> Counter[str]:
     """Commands of the coverage tables, and how many rows name each."""
     texts = [path.read_text(encoding="utf-8") for path in sorted(TABLES.glob("papers-*.md"))]
     last = [row.rsplit(" | ", 1)[-1] for text in texts for row in text.splitlines()]
-    return Counter(" ".join(one) for cell in last for one in re.findall(r"`(pytest|python -m) ([^`]+)`", cell))
+    return Counter(" ".join(words) for cell in last for words in re.findall(r"`(pytest|python -m) ([^`]+)`", cell))
 
 
 def small(command: str, folder: str | None, scratch: Path) -> list[str] | None:

@@ -109,7 +109,7 @@ def modified_ekf() -> str:
     )
     ends = [r[f"simulation 2: {axis} of the target after 100 steps"] for axis in "xyz"]
     # the interval is two standard deviations about the end that the model gives from the given start
-    given = [sum(one.interval or ()) / 2 for one in ends]
+    given = [sum(claim.interval or ()) / 2 for claim in ends]
     errors = [r[f"simulation 2: error of {axis} after 100 steps, EKF"] for axis in "xyz"]
     b1 = [c for c in r.starting("B1") if c.holds is not None]
     nees = [r[f"B1: NEES of the {name} (ideal 6)"] for name in ("EKF", "full modified EKF")]
@@ -147,7 +147,7 @@ def modified_ekf() -> str:
         f"{verdict(small, large)}: they are RMSE x 100 in metres, and table 4.3 has {number(small.ours)} and "
         f"{number(large.ours)}, the one of y in m, the other of Vx in m/s; the text's upper end, 0.0115598, is the "
         "EKF's Vz. Those of the EKF likewise",
-        f"{NOT} from the given start: the model ends at {', '.join(number(one, 4) for one in given)} m, with a "
+        f"{NOT} from the given start: the model ends at {', '.join(number(end, 4) for end in given)} m, with a "
         f"standard deviation of {number((STEPS * Q) ** 0.5, 2)} m by Q, against "
         f"{', '.join(number(c.paper or 0.0, 4) for c in ends)}. With the start drawn with P_0 it {verdict(*ends)}, "
         "within two standard deviations",
@@ -189,7 +189,7 @@ def fuzzy_ekf() -> str:
     )
     current = [once[f"{s}: the paper's rules, tuned sets, alpha with R_k / with R_0"].ours for s in scenarios]
     free, held, zero = (
-        " and ".join(f"{one} = {number(once[f'{sets}: {one} at alpha = {alpha}'].ours)}" for one in "qr")
+        " and ".join(f"{noise} = {number(once[f'{sets}: {noise} at alpha = {alpha}'].ours)}" for noise in "qr")
         for sets, alpha in (("tuned sets", 1), ("sets as named", 1), ("tuned sets", 0))
     )
     models = Results("papers.fuzzy_ekf.other_models")
@@ -202,7 +202,7 @@ def fuzzy_ekf() -> str:
     return filled("fuzzy-ekf", [
         f"{HOLDS}, but for S of equation 35 in alpha: with R_0, where the paper has R_k. With R_k, scaled by the r "
         "of the measurement before (r_k itself follows from alpha), and the tuned sets the errors are "
-        f"{', '.join(number(one) for one in current)} times as large in C to H",
+        f"{', '.join(number(ratio) for ratio in current)} times as large in C to H",
         f"{NOT} with sets tuned by us: alpha = 1 gives {free}, alpha = 0, which the rules call near zero, {zero}, so "
         "that no alpha lowers them: the tuning is not held to the names of the sets. Sets held to their names give "
         f"{held} at alpha = 1",
@@ -243,7 +243,7 @@ def dubins_enkf() -> str:
     high = r["RMS of height: measuring x / all"]
     speeds = [c for c in r.claims if "speed of all runs" in c.quantity]
     noises = R_SIGMA / Q_SIGMA
-    heights = " and ".join(number(r[f"{one} attack: least height of all runs"].ours) for one in ("fixed", "changing"))
+    heights = " and ".join(number(r[f"{kind} attack: least height of all runs"].ours) for kind in ("fixed", "changing"))
     lengths = {word: number(r[f"without obstacle: length of {word}"].ours, 4) for word in ("RSR", "LSR", "RSL", "LSL")}
 
     two_radii = {
@@ -257,7 +257,7 @@ def dubins_enkf() -> str:
 
     def along(what: str, label: str = "N 300") -> str:
         figures = ("figure 2, RSR", "figure 3, around the obstacle")
-        return " and ".join(number(path[f"{one}, {label}: RMS, {what}"].ours) for one in figures)
+        return " and ".join(number(path[f"{figure}, {label}: RMS, {what}"].ours) for figure in figures)
 
     shares = [claim.ours / noise for claim, noise in zip(fixed, R_SIGMA, strict=True)]
 

@@ -79,8 +79,8 @@ def clustering_time_window() -> str:
         return f"{next(c for c in t.starting(f'aircraft {identity}: {what}') if name in c.quantity).ours:.0f}"
 
     aircraft = (902, 2467, 903, 958, 2428)
-    known = [t.starting(f"aircraft {one}: plots of its")[0].quantity for one in aircraft]
-    every = ", ".join(re.findall(r"of its (\d+)", one)[0] for one in known)
+    known = [t.starting(f"aircraft {a}: plots of its")[0].quantity for a in aircraft]
+    every = ", ".join(re.findall(r"of its (\d+)", text)[0] for text in known)
     return filled("clustering-time-window", [
         f"{NOT} (6 rpm are called radians, too) for an antenna that turns in 9.5 s (the plots of table 2.1 give "
         f"{number(turn.ours)} s): "
@@ -96,8 +96,8 @@ def clustering_time_window() -> str:
         "0:13:16 and 0:13:20 and leaves others of 0:13:16 to table 4.6, those of 1332 at 47 nmi and of 1694 at 161 are "
         "in none, and each group has a row of zeros. Our irregular groups are stretches of time",
         f"{ABSENT} as a result of ours, without the recording; read again, the tracks hold "
-        f"{', '.join(held('track without the', one) for one in aircraft)} of the five aircraft's {every} plots, with "
-        f"{', '.join(held('track without the', one, 'other plots or repeats') for one in aircraft)} of others or "
+        f"{', '.join(held('track without the', a) for a in aircraft)} of the five aircraft's {every} plots, with "
+        f"{', '.join(held('track without the', a, 'other plots or repeats') for a in aircraft)} of others or "
         f"repeats; those of 2428 are in {places.ours:.0f} places, which the text counts. Our trackers on the same "
         f"plots, times chosen by us: Reid's at a constant step holds {by_misses('plots in our tracks')} of "
         f"{together('plots')} if tracks end after {', '.join(map(str, reid))} misses (times that a track ends and "
@@ -106,8 +106,8 @@ def clustering_time_window() -> str:
         f"{together('swaps of our tracks', oriented)}); the thesis "
         f"{together('plots in the tracks with the window')} with the window, "
         f"{together('plots in the tracks without the window')} without",
-        f"{ABSENT} likewise; the tracks hold {', '.join(held('track with the', one) for one in aircraft)}, with "
-        f"{', '.join(held('track with the', one, 'other plots or repeats') for one in aircraft)} of others or repeats. "
+        f"{ABSENT} likewise; the tracks hold {', '.join(held('track with the', a) for a in aircraft)}, with "
+        f"{', '.join(held('track with the', a, 'other plots or repeats') for a in aircraft)} of others or repeats. "
         "The text says all of 902's, and nearly all of 2467's, 903's and 2428's",
         f"{verdict(better)}: the window's track holds more in {better.ours:.0f} of the five. In the fifth, 958, the "
         f"other's {held('track without the', 958)} stand in a track with "

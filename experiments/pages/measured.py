@@ -35,7 +35,7 @@ def _judged(claim: Claim, digits: int = 3) -> str:
 
 def _grid(r: Results, kinds: Iterable[str], what: Sequence[str], digits: int = 3) -> list[list[str]]:
     """A row of judged figures for each kind; a cell is empty where nothing was measured."""
-    return [[kind, *(_judged(r[q], digits) if (q := f"{kind}: {one}") in r else "" for one in what)] for kind in kinds]
+    return [[kind, *(_judged(r[q], digits) if (q := f"{kind}: {w}") in r else "" for w in what)] for kind in kinds]
 
 
 def fuzzy() -> str:
@@ -76,7 +76,7 @@ def phases() -> str:
     """Tuned rules and IMM in straight flight and in turns."""
     r = Results("papers.fuzzy_ekf")
     rows = [
-        [phase, *(" / ".join(number(r[f"{s}: RMSE in {phase}, {one}"].ours) for one in ("tuned rules", "IMM"))
+        [phase, *(" / ".join(number(r[f"{s}: RMSE in {phase}, {way}"].ours) for way in ("tuned rules", "IMM"))
                   for s in SCENARIOS)]
         for phase in ("straight flight", "turns and 5 s after")
     ]  # fmt: skip
@@ -90,21 +90,18 @@ def paper_setting() -> str:
     rows = []
     for variable in ("x", "y", "z", "Vx", "Vy", "Vz"):
         for name in ("EKF", "modified"):
-            claims = [r[f"simulation 1, reading {one}: RMSE of {variable}, {name}"] for one in readings]
-            paper = claims[0].paper
-            assert paper is not None
-            rows.append([f"{variable}, {name}", number(paper), *(_judged(claim) for claim in claims)])
-    claims = [r[f"simulation 1, reading {one}: modified / EKF, RMSE of the position"] for one in readings]
-    paper = claims[0].paper
-    assert paper is not None
-    rows.append(["position, modified / EKF (below 0.99)", number(paper, 2), *(_judged(claim) for claim in claims)])
+            claims = [r[f"simulation 1, reading {reading}: RMSE of {variable}, {name}"] for reading in readings]
+            rows.append([f"{variable}, {name}", number(claims[0].paper), *(_judged(claim) for claim in claims)])
+    claims = [r[f"simulation 1, reading {reading}: modified / EKF, RMSE of the position"] for reading in readings]
+    ratio = number(claims[0].paper, 2)
+    rows.append(["position, modified / EKF (below 0.99)", ratio, *(_judged(claim) for claim in claims)])
     more = (
         ("beta", "beta"),
         ("r x prior variance of azimuth / sigma_range", "r * prior variance of azimuth / sigma_range, mean"),
     )
     for words, quantity in more:
-        rows.append([words, "", *(number(r[f"simulation 1, reading {one}: {quantity}"].ours, 2) for one in readings)])
-    return table(["", "paper", *(f'"{one}"' for one in readings)], rows)
+        rows.append([words, "", *(number(r[f"simulation 1, reading {x}: {quantity}"].ours, 2) for x in readings)])
+    return table(["", "paper", *(f'"{name}"' for name in readings)], rows)
 
 
 def consistency() -> str:
@@ -187,10 +184,10 @@ def ghost_rankings() -> str:
         proved = f"{claim.ours:.0f} of {r[f'{kind}: scenes'].ours:.0f}"
         proved = proved if claim.holds else f"**{proved}**"
         rows.append([
-            kind, proved, *(_judged(r[f"{kind}: {one}"]) for one in times),
+            kind, proved, *(_judged(r[f"{kind}: {time}"]) for time in times),
             number(r[f"{kind}: widest interval, median"].ours, 2),
         ])  # fmt: skip
-    return table(["", "proved", *(f"{one}, s" for one in times), "widest interval, median"], rows)
+    return table(["", "proved", *(f"{time}, s" for time in times), "widest interval, median"], rows)
 
 
 def probabilities() -> str:
@@ -204,9 +201,9 @@ def probabilities() -> str:
 def probabilities_beside() -> str:
     """Errors and times of ways to probabilities, beside exact sums."""
     r = Results("probabilities_beside")
-    kinds, ways = labels(r, ": problems summed exactly"), [one.split(", ", 1) for one in labels(r, ": mean error")]
+    kinds, ways = labels(r, ": problems summed exactly"), [text.split(", ", 1) for text in labels(r, ": mean error")]
     what = ("mean error", "largest error", "seconds")
-    rows = [[kind, way, *(number(r[f"{kind}, {way}: {one}"].ours, 2) for one in what)]
+    rows = [[kind, way, *(number(r[f"{kind}, {way}: {part}"].ours, 2) for part in what)]
             for kind in kinds for of, way in ways if of == kind]  # fmt: skip
     return table(["", "", *what], rows)
 
@@ -216,7 +213,7 @@ def linear_programs() -> str:
     r = Results("linear_programs")
     kinds = labels(r, ": rows")
     what = [c.quantity.split(": ")[1] for c in r.claims if c.quantity.startswith(f"{kinds[0]}: ")]
-    heads = [f"{one}, ms" if one.startswith("ours") else one for one in what]
+    heads = [f"{part}, ms" if part.startswith("ours") else part for part in what]
     return table(["", *heads], _grid(r, kinds, what))
 
 
@@ -235,11 +232,11 @@ def scale_scans() -> str:
     rows = []
     for kind in kinds:
         for size in _sizes(r, kind):
-            cells = [number(r[q].ours) if (q := f"{kind}, {size}: {one}") in r else "" for one in what]
+            cells = [number(r[q].ours) if (q := f"{kind}, {size}: {part}") in r else "" for part in what]
             rows.append([f"{kind.removeprefix('one scan, ')}, {int(size):,}", *cells])
-        powers = [number(r[q].ours) if (q := f"{kind}: exponent of {one}") in r else "" for one in what]
+        powers = [number(r[q].ours) if (q := f"{kind}: exponent of {part}") in r else "" for part in what]
         rows.append([f"{kind.removeprefix('one scan, ')}: grows with the power", *powers])
-    return table(["targets", *what[:2], *(f"`{one}`, s" for one in what[2:6]), "peak, MB"], rows)
+    return table(["targets", *what[:2], *(f"`{part}`, s" for part in what[2:6]), "peak, MB"], rows)
 
 
 def scale_trackers() -> str:
@@ -250,9 +247,9 @@ def scale_trackers() -> str:
     for kind in dict.fromkeys(named):
         for size in _sizes(r, kind):
             what = ("worst", "worst scan", "median", "peak", "tracked")
-            rows.append([f"`{kind}`, {int(size):,}", *(number(r[f"{kind}, {size}: {one}"].ours) for one in what)])
+            rows.append([f"`{kind}`, {int(size):,}", *(number(r[f"{kind}, {size}: {part}"].ours) for part in what)])
         if f"{kind}: exponent of worst" in r:
-            worst, median = (number(r[f"{kind}: exponent of {one}"].ours) for one in ("worst", "median"))
+            worst, median = (number(r[f"{kind}: exponent of {part}"].ours) for part in ("worst", "median"))
             rows.append([f"`{kind}`: grows with the power", worst, "", median, "", ""])
     return table(["tracker, targets", "worst scan, s", "which", "median, s", "peak, MB", "tracked, %"], rows)
 
@@ -276,9 +273,8 @@ def first_call(folder: Path = RESULTS) -> str:
         for way in ("fresh clone", "wheel", "again"):
             first = f"{label}: {way}, first scan, wall"
             cells.append(" / ".join(_judged(r[q], 2) for q in (first, f"{label}: {way}, wall") if q in r))
-        goal = r[f"{label}: fresh clone, wall"].band
-        assert goal is not None
-        rows.append([label, *cells, number(r[f"{label}: fresh clone, cpu"].ours, 2), f"{goal[1]:g}"])
+        goal = r[f"{label}: fresh clone, wall"].band[1]
+        rows.append([label, *cells, number(r[f"{label}: fresh clone, cpu"].ours, 2), f"{goal:g}"])
     return table(["first scan / all, s", "fresh clone", "wheel", "again", "clone, CPU time", "goal, clone"], rows)
 
 
@@ -293,7 +289,7 @@ def sizes(folder: Path = RESULTS) -> str:
 
     def row(name: str, use: str, of: list[str]) -> list[str]:
         kinds = ("installed", "without bytecode")
-        return [name, use, *(number(sum(r[f"{kind}, {one}"].ours for one in of)) for kind in kinds)]
+        return [name, use, *(number(sum(r[f"{kind}, {package}"].ours for package in of)) for kind in kinds)]
 
     rows = [row(name, _FOR[name.split()[0]], [name]) for name in named]
     others = [name for name in names if name not in named]

@@ -49,9 +49,9 @@ def workers() -> str:
     groups = _groups(r, words)
     rows = []
     for solver in parts.SOLVERS:
-        one = [r[f"{group}: {solver}, {parts.WHOLE}, above the best found"] for group in groups]
+        whole = [r[f"{group}: {solver}, {parts.WHOLE}, above the best found"] for group in groups]
         two = [r[f"{group}: {solver}, {words}, above {parts.WHOLE}"] for group in groups]
-        rows.append([f"`{solver}`, one worker: above the best found", *map(_cell, one)])
+        rows.append([f"`{solver}`, one worker: above the best found", *map(_cell, whole)])
         rows.append([f"`{solver}`, two workers less one", *map(_cell, two)])
     heads = [f"{group.removesuffix(WORKERS)}, {r[f'{group}: problems'].ours:.0f} problems" for group in groups]
     return table(["excess in %", *heads], rows)

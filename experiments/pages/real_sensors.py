@@ -50,10 +50,10 @@ def without() -> str:
     """Each part left out, alone."""
     r, shown = Results(_FILE), []
     for part, words in _PARTS.items():
-        for row in (label for label, one in ROWS.items() if part in one.without):
+        for row in (label for label, case in ROWS.items() if part in case.without):
             cells = [_cell(r, f"{row}, {name}") for name in ("oracle", ADAPTING, f"multi-sensor, without {part}")]
             ids = (f"{row}, {name}: ids" for name in (ADAPTING, f"multi-sensor, without {part}"))
-            shown.append([words, row, *cells, " / ".join(_count(r[one].ours) for one in ids if one in r)])
+            shown.append([words, row, *cells, " / ".join(_count(r[kind].ours) for kind in ids if kind in r)])
     heads = ["scenes", "oracle", "with it", "without", "ids with / without"]
     return table(["left out", *heads], shown, lambda column: column > 1)
 
@@ -62,7 +62,7 @@ def joint() -> str:
     """Targets side by side, and sites that send tracks."""
     r, shown = Results(_FILE), []
     names = (ADAPTING, "GNN", JOINT, f"{JOINT}, all permutations", SITES)
-    for row in (label for label, one in ROWS.items() if one.also):
+    for row in (label for label, case in ROWS.items() if case.also):
         cells = []
         for name in names:
             gap = f"{row}, {name}: gap of the tracks / true gap"
@@ -104,7 +104,7 @@ def air_traffic() -> str:
     """How far plots and reference trajectories are from the flights."""
     r = Results(_TRAFFIC)
     rows = [
-        [kind, *(mean(r[f"{kind}, {one}"]) for one in _ACCURACY)] for kind in labels(r, f", {next(iter(_ACCURACY))}")
+        [kind, *(mean(r[f"{kind}, {part}"]) for part in _ACCURACY)] for kind in labels(r, f", {next(iter(_ACCURACY))}")
     ]
     return with_size(r, table(["RMSE, m", *_ACCURACY.values()], rows))
 

@@ -59,7 +59,7 @@ def _hota(results: Results, start: str) -> str:
 def labels(results: Results, words: str) -> list[str]:
     """Kinds of scenes in the order of the file, by the claims that end so."""
     found = [c.quantity.removesuffix(words) for c in results.claims if c.quantity.endswith(words)]
-    return [one for one in found if not one.startswith("goal: ")]
+    return [kind for kind in found if not kind.startswith("goal: ")]
 
 
 def fusion_in_stone_soup() -> str:
@@ -69,7 +69,7 @@ def fusion_in_stone_soup() -> str:
     rows = []
     for way in ways:
         less, ratio = f"{way} less {ways[0]}: GOSPA", f"{ways[0]} / {way}: time"
-        cells = [mean(r[f"{way}: {part}"]) for part in ("GOSPA", *(f"GOSPA, {one}" for one in _PARTS))]
+        cells = [mean(r[f"{way}: {part}"]) for part in ("GOSPA", *(f"GOSPA, {loss}" for loss in _PARTS))]
         cells += ["" if words not in r else mean(r[words]) for words in (less, less + " from 18 s on")]
         rows.append([way, *cells, "1" if ratio not in r else number(1.0 / r[ratio].ours, 2)])
     head = ["GOSPA, m", "mean", *_PARTS, "less the first row's", "that from 18 s on", "time / first row's"]
@@ -215,7 +215,7 @@ def registration() -> str:
             start = f"{kind}, {size}"
             errors = [mean(r[f"{start}: RMS error of {what}"], 2) for what in ("range", "azimuth")]
             ways = [r[f"{start}, {way}: GOSPA / without biases"] for way in ("with biases", "registered", "online")]
-            rows.append([kind, size, *errors, number(ways[0].ours, 2), *(mean(one, 4) for one in ways[1:])])
+            rows.append([kind, size, *errors, number(ways[0].ours, 2), *(mean(claim, 4) for claim in ways[1:])])
     heads = ["error of range, m", "of azimuth, deg", "with biases", "registered", "online"]
     return with_size(r, table(["traffic", "biases", *heads], rows, lambda column: column > 1))
 
@@ -225,7 +225,6 @@ def goals(names: Sequence[str] = GOALS, folder: Path = RESULTS) -> str:
     rows = []
     for name in names:
         for claim in Results(f"trackers.{name}", folder).starting("goal: "):
-            assert claim.band is not None
             low, high = claim.band
             words = f"at least {low:.4g}" if low is not None else f"at most {high:.4g}"
             unit = f" {claim.unit}" if claim.unit else ""

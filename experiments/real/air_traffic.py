@@ -56,7 +56,6 @@ def recorded(file: str, duration: float) -> Traffic:
     # the scenario's own radar sees nothing
     silent = {"radars": 1, "detection_probability": 1e-6, "false_alarms": 1e-9, "interval": 1.0}
     scene = simulate("from-tracks", 0, file=file, scans=int(duration), **silent)
-    assert scene.truth is not None and scene.origin is not None
     number = np.repeat(np.arange(scene.num_scans), [len(ids) for ids in scene.truth.target_ids])
     ids, positions = np.concatenate(scene.truth.target_ids), np.concatenate(scene.truth.positions)
     paths = []
@@ -111,7 +110,6 @@ def observed(traffic: Traffic, primary: float, duration: float, seed: int) -> Ob
     sources: list[list[Array]] = [[] for _ in scene.times]
     parts = parts_of_radars(recordings, radars)
     for part in parts:
-        assert part.recording.sources is not None
         cut = np.searchsorted(part.recording.times, scene.times[:-1], side="right")
         for own_sources, rows in zip(sources, np.split(part.recording.sources, cut), strict=True):
             own_sources.append(rows)
@@ -161,7 +159,6 @@ def _plots(
 def plot_errors(observed: Observed, scene: Scene, traffic: Traffic) -> Array:
     """Horizontal RMSE (S,) of each radar's plots of aircraft, metres."""
     squared: dict[str, list[Array]] = {}
-    assert scene.measurement_times is not None
     for k, scan in enumerate(scene.measurements):
         for s, sensor in enumerate(scene.sensors):
             whose, z, when = observed.sources[k][s], scan[s], scene.measurement_times[k][s]
@@ -275,7 +272,6 @@ def by_distance(seen: Observed, scene: Scene, tracks: TrackTable | None) -> Arra
 def _flat(seen: Observed, scene: Scene) -> Array:
     """Time, x, y, z (NaN: unknown), code and address of all plots (n, 6), in the order of scans and sensors."""
     rows = []
-    assert scene.measurement_times is not None
     for k, scan in enumerate(scene.measurements):
         for s, sensor in enumerate(scene.sensors):
             z, known = scan[s], seen.identities[k][s]
@@ -346,7 +342,7 @@ def experiment(file: str | None, kinds: Sequence[str], quick: bool, seed: int, s
                 print(f"{kind}, {primary:.0%}: {shown}", flush=True)
             for name in rows[0]:
                 unit = UNITS.get(name.split(": ")[1], "")
-                values = np.array([one[name] for one in rows])
+                values = np.array([row[name] for row in rows])
                 claims.append(mean_claim(f"{kind} flights, {primary:.0%} primary only, {name}", unit, values))
     return claims
 

@@ -83,7 +83,6 @@ def pictures(name: str, scene: Scene) -> Pictures:
 
 def detections(scene: Scene) -> list[tuple[Array, Array]]:
     """The boats (as ids) that lidar or radar detected in each frame, and where."""
-    assert scene.truth is not None
     found = []
     for k in range(scene.num_scans):
         scan = scene.scan(k).aligned(scene.sensors)
@@ -108,12 +107,11 @@ def oracle(scene: Scene) -> Pictures:
 
 def judge(scene: Scene, shown: Pictures) -> Result:
     """Compare pictures with the boats."""
-    assert scene.truth is not None and scene.sectors is not None
     found = shown.moving
     radar = [sensor.name for sensor in scene.sensors].index("radar")
     frames = np.flatnonzero(scene.sectors[:, radar, 1] > scene.sectors[:, radar, 0])
     values = [gospa(scene.truth.positions[k][:, :2], found[k][1], CUTOFF) for k in frames]
-    share = np.array([[one.distance, one.false, one.missed] for one in values]).mean(axis=0)
+    share = np.array([[value.distance, value.false, value.missed] for value in values]).mean(axis=0)
     truth, tracks = (
         Trajectories(
             np.repeat(scene.times[frames], [len(ids) for ids, _ in rows]),
@@ -128,7 +126,7 @@ def judge(scene: Scene, shown: Pictures) -> Result:
     windows = ospa2(truth, tracks, CUTOFF)[1]
     return Result(
         float(share[0]), float(share[1]) / (CUTOFF**2 / 2), float(share[2]) / (CUTOFF**2 / 2),
-        float(np.mean([one.distance for one in windows])), identity(truth, tracks, CUTOFF).switches,
+        float(np.mean([window.distance for window in windows])), identity(truth, tracks, CUTOFF).switches,
         [_begun(scene, shown.every, boat) for boat in np.unique(np.concatenate(scene.truth.target_ids)).tolist()],
         shown.seconds,
     )  # fmt: skip
@@ -136,7 +134,6 @@ def judge(scene: Scene, shown: Pictures) -> Result:
 
 def _begun(scene: Scene, every: list[Array], boat: int) -> float:
     """Seconds from a boat's second detection to its first track."""
-    assert scene.truth is not None
     seen = [k for k, (ids, _) in enumerate(detections(scene)) if boat in ids]
     for k, places in enumerate(every):
         there = scene.truth.positions[k][scene.truth.target_ids[k] == boat][:, :2]
@@ -169,12 +166,12 @@ def experiment(folder: Path, quick: bool, names: Sequence[str], sets: Sequence[s
                 for number, scene in scenes.items()
             }
             label = f"{which}, {name}"
-            for number, one in results.items():
-                text = ", ".join(f"{seconds:.0f}" for seconds in one.begun)
-                what = f"{one.false:.2f} false, {one.missed:.2f} missed, {one.switches} new ids, begun after {text} s"
-                source = f"{what}, OSPA(2) {one.ospa2:.1f} m, CPU {one.seconds:.1f} s"
-                claims.append(Claim(f"{label}, scenario {number}: GOSPA", "m", ours=one.gospa, source=source))
-            mean = float(np.mean([one.gospa for one in results.values()]))
+            for number, j in results.items():
+                text = ", ".join(f"{seconds:.0f}" for seconds in j.begun)
+                what = f"{j.false:.2f} false, {j.missed:.2f} missed, {j.switches} new ids, begun after {text} s"
+                source = f"{what}, OSPA(2) {j.ospa2:.1f} m, CPU {j.seconds:.1f} s"
+                claims.append(Claim(f"{label}, scenario {number}: GOSPA", "m", ours=j.gospa, source=source))
+            mean = float(np.mean([j.gospa for j in results.values()]))
             band = (None, GOALS[which]) if name == "multi-sensor" else None
             claims.append(Claim(f"{label}, mean: GOSPA", "m", ours=mean, band=band, source="goal chosen by us"))
     return claims

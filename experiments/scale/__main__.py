@@ -64,7 +64,7 @@ def crowds(quick: bool) -> list[Claim]:
     claims = []
     for kind, sizes in TARGETS.items():
         sizes = sizes[:1] if quick else sizes
-        rows = [alone(trackers.measure, kind, one, 8 if one >= LONG else SCANS) for one in sizes]
+        rows = [alone(trackers.measure, kind, size, 8 if size >= LONG else SCANS) for size in sizes]
         for targets, row in zip(sizes, rows, strict=True):
             claims += _claims(f"{kind}, {targets}", row)
         claims += [] if quick else _exponents(kind, sizes, rows, ("worst", "median"))

@@ -40,7 +40,6 @@ def follow(kind: str, targets: int, seed: int, about: dict[str, Any]) -> tuple[l
         spent.append(processor_time(tracker.step, scene.times[k], scene.measurements[k])[1])
     places = np.array([track.position for track in tracker.tracks if track.confirmed]).reshape(-1, 3)
     truth = scene.scan(scene.num_scans - 1).truth_positions
-    assert truth is not None
     near = np.asarray(cKDTree(places).query(truth)[0]) < NEAR
     return spent, {"tracked": 100.0 * float(near.mean()), "confirmed": float(len(places))}
 

@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
         part.add_argument("--seconds", type=above_zero, default=60.0, help="limit for each instance (default 60)")
-        part.add_argument("--family", choices=sorted({one.family for one in every}), help="only this family")
+        part.add_argument("--family", choices=sorted({instance.family for instance in every}), help="only this family")
         part.add_argument("names", nargs="*", type=_name, metavar="NAME", help="only these instances")
     improve = parts.choices["solve"]
     improve.add_argument("--solver", default="exact", help="of ours (default exact, which alone proves)")
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.environ[recorded.PATH] = chosen.recording
         return _make(every, compare=chosen.compare)
     family = getattr(chosen, "family", None)
-    picked = [one for one in every if one.name in (chosen.names or [one.name]) and one.family == (family or one.family)]
+    picked = [i for i in every if i.name in (chosen.names or [i.name]) and i.family == (family or i.family)]
     if chosen.part == "solve":
         return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
@@ -89,53 +89,54 @@ def _solvers(text: str) -> list[str]:
 
 
 def _name(text: str) -> str:
-    if text not in {one.name for one in instances()}:
+    if text not in {instance.name for instance in instances()}:
         raise argparse.ArgumentTypeError(f"{text}: no instance of this name")
     return text
 
 
 def _make(known: Sequence[Instance], *, compare: bool) -> int:
     different = 0
-    every = [one for one in known if not one.kept and (recorded.PATH in os.environ or not one.recorded)]
-    for one in every:
-        path, made = store.instance_file(one.name), one.make()
+    every = [i for i in known if not i.kept and (recorded.PATH in os.environ or not i.recorded)]
+    for instance in every:
+        path, made = store.instance_file(instance.name), instance.make()
         if not compare:
             path.parent.mkdir(exist_ok=True)
             made.save(path)
-        elif not _alike(made, store.load(one.name)):
+        elif not _alike(made, store.load(instance.name)):
             different += 1
-            print(f"{one.name}: differs from what is stored", file=sys.stderr)
+            print(f"{instance.name}: differs from what is stored", file=sys.stderr)
     left = len(known) - len(every)
     without = f", {left} stay as they are" if left else ""
     print(f"{len(every)} instances{without}" + (f", {different} differ" if compare else ""))
     return 1 if different else 0
 
 
-def _alike(one: AssignmentProblem, other: AssignmentProblem) -> bool:
+def _alike(made: AssignmentProblem, other: AssignmentProblem) -> bool:
     """Whether problems are equal but for the last digit: logarithms are rounded differently by other processors."""
-    same = one.dummy == other.dummy and np.array_equal(one.sizes, other.sizes)
-    same = same and np.array_equal(one.tuples, other.tuples)
-    return same and np.allclose(one.costs, other.costs, rtol=0.0, atol=1.001e-6)
+    same = made.dummy == other.dummy and np.array_equal(made.sizes, other.sizes)
+    same = same and np.array_equal(made.tuples, other.tuples)
+    return same and np.allclose(made.costs, other.costs, rtol=0.0, atol=1.001e-6)
 
 
 def _solve(picked: list[Instance], solver: str, limit: float) -> int:
-    for one in picked:
+    for instance in picked:
         rows = store.table()
-        row = rows[one.name] = solve(one, rows.get(one.name), solver, limit, datetime.date.today().isoformat())
+        today = datetime.date.today().isoformat()
+        row = rows[instance.name] = solve(instance, rows.get(instance.name), solver, limit, today)
         store.write_table(rows)
-        words = f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
+        words = f"{instance.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
         print(words, flush=True)
     return 0
 
 
 def _check(picked: list[Instance]) -> int:
     rows, wrong, optimal = store.table(), 0, 0
-    for one in picked:
-        fault = check_row(one.name, rows[one.name]) if one.name in rows else "is not in the table"
-        optimal += fault is None and rows[one.name]["status"] == "optimal"
+    for instance in picked:
+        fault = check_row(instance.name, rows[instance.name]) if instance.name in rows else "is not in the table"
+        optimal += fault is None and rows[instance.name]["status"] == "optimal"
         if fault is not None:
             wrong += 1
-            print(f"{one.name}: {fault}", file=sys.stderr)
+            print(f"{instance.name}: {fault}", file=sys.stderr)
     print(f"{len(picked)} solutions checked, {optimal} proofs accepted, {wrong} faults")
     return 1 if wrong else 0
 
@@ -146,7 +147,7 @@ def _run(picked: list[Instance], chosen: argparse.Namespace, arguments: Sequence
         rows = read_rows(chosen.output, chosen.seconds) if chosen.resume else []
         done = {(row["instance"], row["solver"]) for row in rows}
         if chosen.command is not None:
-            left = [one for one in picked if (one.name, "command") not in done]
+            left = [instance for instance in picked if (instance.name, "command") not in done]
             found = run_command(left, chosen.command, chosen.seconds)
         else:
             found = contest(picked, chosen.solvers, chosen.seconds, done)

@@ -32,14 +32,14 @@ def run_command(picked: list[Instance], command: str, seconds: float) -> Iterato
     known = store.table()
     with tempfile.TemporaryDirectory() as folder:
         path, solution = Path(folder) / "instance.txt", Path(folder) / "solution.txt"
-        for one in picked:
-            path.write_bytes(lzma.open(store.instance_file(one.name)).read())
+        for instance in picked:
+            path.write_bytes(lzma.open(store.instance_file(instance.name)).read())
             solution.unlink(missing_ok=True)
             problem = check.read_problem(str(path))
             words = [word.format(instance=path, solution=solution) for word in shlex.split(command)]
-            row: dict[str, Any] = {"instance": one.name, "solver": "command"}
+            row: dict[str, Any] = {"instance": instance.name, "solver": "command"}
             row |= _watched(words, solution, seconds, problem)
-            best = known.get(one.name, {}).get("value")
+            best = known.get(instance.name, {}).get("value")
             row["excess"] = None if best is None or row["cost"] is None else float(row["cost"]) - float(best)
             yield row
 

@@ -93,7 +93,7 @@ def _within(measure: Measure) -> Callable[[Told, float], str]:
 def _quality(told: Told, seconds: float) -> str:
     """The mean excess after so many seconds, percent."""
     found = [excess(row, best, seconds) for row, best in told]
-    known = [one for one in found if one is not None]
+    known = [share for share in found if share is not None]
     if not found or len(known) < len(found):
         return f"none on {len(found) - len(known)}"
     return f"{100 * sum(known) / len(found):.3g} %"
@@ -131,7 +131,7 @@ def comparison_tables(path: Path = PUBLISHED) -> str:
         return table(["instance", *solvers], lines)
 
     wrong = [f"{row['solver']} on {row['instance']}" for row in rows if is_wrong(row, known[row["instance"]])]
-    proving = [name for name, own in told.items() if any(time_to_proof(*one) is not None for one in own)]
+    proving = [name for name, own in told.items() if any(time_to_proof(*row) is not None for row in own)]
     return "\n\n".join((
         f"`{content['command']}`, {content['date']}, {content['machine']}: {len(instances)} instances, "
         f"{len(told)} solvers, {limit:g} s of CPU time each.",

@@ -55,11 +55,11 @@ def representatives(every: list[Instance]) -> list[Instance]:
     """Of each family, in the order of tuples and names, the instances after a third and after two thirds of it."""
     rows = store.table()
     families: dict[str, list[Instance]] = {}
-    for one in every:
-        families.setdefault(one.family, []).append(one)
+    for instance in every:
+        families.setdefault(instance.family, []).append(instance)
     chosen = []
     for own in families.values():
-        ordered = sorted(own, key=lambda one: (rows[one.name]["tuples"], one.name))
+        ordered = sorted(own, key=lambda instance: (rows[instance.name]["tuples"], instance.name))
         chosen += [ordered[len(own) // 3], ordered[2 * len(own) // 3]]
     return chosen
 
@@ -74,13 +74,13 @@ def contest(
     # forked processes have the kernels that are compiled here; peers, which start threads, must not have run before
     warm_up({*present} & {*OURS})
     known = store.table()
-    for one in picked:
-        problem = store.load(one.name)
-        exact = check.read_problem(str(store.instance_file(one.name)))
-        for name in (name for name in present if (one.name, name) not in done):
-            row: Row = {"instance": one.name, "solver": name}
+    for instance in picked:
+        problem = store.load(instance.name)
+        exact = check.read_problem(str(store.instance_file(instance.name)))
+        for name in (name for name in present if (instance.name, name) not in done):
+            row: Row = {"instance": instance.name, "solver": name}
             if takes(name, problem):
-                found = _run(name, problem, seconds, float(known[one.name]["value"]))
+                found = _run(name, problem, seconds, float(known[instance.name]["value"]))
                 yield row | judged(found, exact, seconds)
             else:
                 yield row | {"fault": "cannot take it"}
@@ -197,7 +197,7 @@ def _started_anew(solver: str, problem: AssignmentProblem, seconds: float, log: 
     """A peer that tells of nothing before its end; its last answer, with the best tuples of all."""
     limited = solver not in _NO_LIMIT
     best = Answer(math.inf, None, 0.0, problem.tuples[:0])
-    for limit in (*(one for one in CHECKPOINTS if limited and one < seconds), seconds):
+    for limit in (*(mark for mark in CHECKPOINTS if limited and mark < seconds), seconds):
         _allow(limit)
         most = _wall(limit) if limited else limit
         answer = run(solver, problem, most)

@@ -134,7 +134,7 @@ def _problems(kind: str, scene: Scene) -> list[AssignmentProblem]:
 def _posed(kind: str, targets: int, seed: int) -> AssignmentProblem:
     """The largest of the last problems that a tracker poses."""
     scene = simulate("crowd", seed, targets=targets, scans=8, interval=4.0, detection_probability=0.8)
-    return max(_problems(kind, scene)[-4:], key=lambda one: one.num_tuples)
+    return max(_problems(kind, scene)[-4:], key=lambda problem: problem.num_tuples)
 
 
 def _from_trackers() -> list[Instance]:

@@ -17,16 +17,16 @@ from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 
 
-def solve(one: Instance, known: dict[str, Any] | None, solver: str, seconds: float, today: str) -> dict[str, Any]:
+def solve(instance: Instance, known: dict[str, Any] | None, solver: str, seconds: float, today: str) -> dict[str, Any]:
     """Solve an instance; return its row of the table, and write solution and proof where they are better."""
-    problem = store.load(one.name)
+    problem = store.load(instance.name)
     started = time.perf_counter()
     solution = assign(problem, solver, time_limit=seconds)
     taken = time.perf_counter() - started
     root = assign(problem, "lagrangian", time_limit=min(seconds, 10.0)).lower_bound
     row = {
-        "family": one.family,
-        "digest": store.digest(one.name),
+        "family": instance.family,
+        "digest": store.digest(instance.name),
         "sizes": problem.sizes.tolist(),
         "dummies": problem.dummy,
         "tuples": problem.num_tuples,
@@ -40,15 +40,15 @@ def solve(one: Instance, known: dict[str, Any] | None, solver: str, seconds: flo
         "seconds": round(taken, 2),
         **(known or {}),
     }
-    cost = store.exact_cost(check.read_problem(str(store.instance_file(one.name))), solution.tuples.tolist())
+    cost = store.exact_cost(check.read_problem(str(store.instance_file(instance.name))), solution.tuples.tolist())
     better = row["value"] is None or float(cost) < float(row["value"])
     if better:
         row.update(value=cost, who=f"assoc {solver}", when=today, seconds=round(taken, 2))
-        store.solution_file(one.name).parent.mkdir(exist_ok=True)
-        write_text(store.solution_file(one.name), store.solution_text(solution, cost))
+        store.solution_file(instance.name).parent.mkdir(exist_ok=True)
+        write_text(store.solution_file(instance.name), store.solution_text(solution, cost))
     row["bound"] = max(row["bound"], solution.lower_bound)
     if (better or row["status"] != "optimal") and solution.status == "optimal":
-        bound = _prove(one.name, problem, solution, seconds)
+        bound = _prove(instance.name, problem, solution, seconds)
         row["bound"] = max(row["bound"], bound)
         if bound >= float(cost):
             row.update(status="optimal", bound=bound, seconds=round(taken, 2))

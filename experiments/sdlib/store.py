@@ -44,7 +44,7 @@ def load(name: str) -> AssignmentProblem:
 
 def solution_text(solution: Solution, cost: str) -> str:
     """Write down a solution."""
-    lines = ["assoc-solution 1", f"cost {cost}", *(" ".join(map(str, one)) for one in solution.tuples.tolist())]
+    lines = ["assoc-solution 1", f"cost {cost}", *(" ".join(map(str, row)) for row in solution.tuples.tolist())]
     return "\n".join(lines) + "\n"
 
 
@@ -53,7 +53,7 @@ def exact_cost(problem: check.Problem, tuples: Iterable[Iterable[int]]) -> str:
 
     Raises check.RefusedError: They are no solution.
     """
-    cost = check.cost_of(problem, [tuple(one) for one in tuples])
+    cost = check.cost_of(problem, [tuple(row) for row in tuples])
     whole, rest = divmod(abs(cost), 10**check.DECIMALS)
     return ("-" if cost < 0 else "") + f"{whole}.{rest:0{check.DECIMALS}}".rstrip("0").rstrip(".")
 

@@ -129,12 +129,12 @@ def judge(name: str, case: Case, scene: Scene) -> Judged:
         tracker = make(name, scene, case.options)
     truth, tracks = Trajectories.from_scene(scene), through(tracker, scene).tracks
     if case.level:
-        truth, tracks = (Trajectories(one.times, one.ids, one.positions * [1, 1, 0]) for one in (truth, tracks))
+        truth, tracks = (Trajectories(paths.times, paths.ids, paths.positions * [1, 1, 0]) for paths in (truth, tracks))
     values, unit = gospa_over_time(truth, tracks, CUTOFF)[1], CUTOFF**2 / 2
     return Judged(
-        float(np.mean([one.distance for one in values])),
-        float(np.mean([one.false for one in values])) / unit,
-        float(np.mean([one.missed for one in values])) / unit,
+        float(np.mean([value.distance for value in values])),
+        float(np.mean([value.false for value in values])) / unit,
+        float(np.mean([value.missed for value in values])) / unit,
         identity(truth, tracks, CUTOFF).switches,
         len(np.unique(tracks.ids)),
         _gap(truth, tracks),
@@ -155,7 +155,7 @@ def claims_of(label: str, runs: Sequence[Judged], ids: bool = True) -> list[Clai
             what, values = f"{label}: {WHAT[field]}", values[np.isfinite(values)]
             # counts are small: their intervals say little
             claims.append(mean_claim(what, "m", values) if field == "gospa" else Claim(what, ours=float(values.mean())))
-    print(f"{label:60} {'  '.join(f'{one.ours:7.2f}' for one in claims)}", flush=True)
+    print(f"{label:60} {'  '.join(f'{claim.ours:7.2f}' for claim in claims)}", flush=True)
     return claims
 
 
@@ -166,11 +166,11 @@ def _goals(label: str, row: Row, runs: Mapping[str, Sequence[Judged]]) -> list[C
         name, _, field = which.rpartition(": ")
         name = name or ADAPTING
         if name in runs:
-            values = np.array([getattr(one, field) for one in runs[name]], dtype=np.float64)
+            values = np.array([getattr(run, field) for run in runs[name]], dtype=np.float64)
             what, unit = f"{label}, {name}: {WHAT[field]}", "m" if field == "gospa" else ""
             claims.append(goal(what, unit, values, most))
     if row.harmless and {"oracle", ADAPTING} <= set(runs):
-        ours, best = (np.array([one.gospa for one in runs[name]]) for name in (ADAPTING, "oracle"))
+        ours, best = (np.array([run.gospa for run in runs[name]]) for name in (ADAPTING, "oracle"))
         claims.append(goal(f"{label}, {ADAPTING}: GOSPA / the oracle's", "", ours / best, NEARLY))
     return claims
 
@@ -186,10 +186,11 @@ def experiment(rows: Sequence[str], names: Sequence[str], seed: int, seeds: int,
         row = ROWS[label]
         cases = [row.make(seed + k) for k in range(seeds if row.goals else min(seeds, others))]
         own = [*USUAL, *row.also, *(f"multi-sensor, without {part}" for part in row.without)]
-        runs = {name: [judge(name, one, one.declared) for one in cases] for name in own if name in names or not names}
-        if all(one.known for one in cases) and ADAPTING in runs:
+        taken = [name for name in own if name in names or not names]
+        runs = {name: [judge(name, case, case.declared) for case in cases] for name in taken}
+        if all(case.known for case in cases) and ADAPTING in runs:
             known = "multi-sensor if known"
-            runs[known] = [judge("multi-sensor", one, one.known) for one in cases if one.known is not None]
+            runs[known] = [judge("multi-sensor", case, case.known) for case in cases if case.known is not None]
         for name, found in runs.items():
             claims += claims_of(f"{label}, {name}", found, row.ids)
         claims += _goals(label, row, runs)

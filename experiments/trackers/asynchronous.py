@@ -55,7 +55,6 @@ def judge_own_times(name: str, scene: Scene) -> Judged:
 
 def arrivals(scene: Scene, rng: np.random.Generator) -> list[tuple[list[Array], list[Array]]]:
     """Measurements and their times by the scan in which they arrive; what comes after the last scan is lost."""
-    assert scene.measurement_times is not None
     count = len(scene.sensors)
     z: list[list[list[Array]]] = [[[] for _ in range(count)] for _ in range(scene.num_scans)]
     times: list[list[list[float]]] = [[[] for _ in range(count)] for _ in range(scene.num_scans)]
@@ -63,14 +62,14 @@ def arrivals(scene: Scene, rng: np.random.Generator) -> list[tuple[list[Array], 
         for s in range(count):
             late = rng.uniform(0.0, MOST_LATE, len(stamps[s])) * (rng.random(len(stamps[s])) < LATE_SHARE)
             arrive = np.searchsorted(scene.times, stamps[s] + late)
-            for k, one, when in zip(arrive.tolist(), scan[s], stamps[s].tolist(), strict=True):
+            for k, plot, when in zip(arrive.tolist(), scan[s], stamps[s].tolist(), strict=True):
                 if k < scene.num_scans:
-                    z[k][s].append(one)
+                    z[k][s].append(plot)
                     times[k][s].append(when)
     return [
         (
-            [np.reshape(np.array(rows), (-1, one.dim)) for rows, one in zip(z[k], scene.sensors, strict=True)],
-            [np.array(one, dtype=np.float64) for one in times[k]],
+            [np.reshape(np.array(rows), (-1, sensor.dim)) for rows, sensor in zip(z[k], scene.sensors, strict=True)],
+            [np.array(stamps, dtype=np.float64) for stamps in times[k]],
         )
         for k in range(scene.num_scans)
     ]
@@ -89,13 +88,13 @@ def late_plots(scene: Scene, rng: np.random.Generator) -> tuple[list[float], flo
     for k, (z, times) in enumerate(given):
         scan = scene.scan(k)
         seconds.append(processor_time(tracker.step, scan.time, z, times, scan.sectors)[1])
-        shown.add(one for one in tracker.tracks if one.confirmed)
+        shown.add(track for track in tracker.tracks if track.confirmed)
         if k >= behind - 1:
-            settled.add(one for one in tracker.past_tracks(-behind) if one.confirmed)
+            settled.add(track for track in tracker.past_tracks(-behind) if track.confirmed)
         strict.step(scan.time, z, times, scan.sectors)
-        refused.add(one for one in strict.tracks if one.confirmed)
-    tables = [Trajectories(*one.arrays()) for one in (settled, shown, refused)]
-    found = [float(distances(scene, one)[judged].mean()) for one in (ordered, *tables)]
+        refused.add(track for track in strict.tracks if track.confirmed)
+    tables = [Trajectories(*table.arrays()) for table in (settled, shown, refused)]
+    found = [float(distances(scene, tracks)[judged].mean()) for tracks in (ordered, *tables)]
     return found, 1e3 * float(np.median(seconds))
 
 
@@ -133,7 +132,7 @@ def experiment(
     ]
     ratio = values[:, 1] / values[:, 0]
     claims.append(goal("late plots, once all is there: GOSPA / in order", "", ratio, WITHIN_ORDER))
-    claims.append(Claim("late plots: CPU time of a scan", "ms", ours=float(np.median([one for _, one in late]))))
+    claims.append(Claim("late plots: CPU time of a scan", "ms", ours=float(np.median([time for _, time in late]))))
     return claims
 
 

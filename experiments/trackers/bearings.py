@@ -44,7 +44,6 @@ class Found(NamedTuple):
 def judge(name: str, scene: Scene) -> Found:
     """Run a tracker over a scene."""
     done = through(make(name, scene), scene)
-    assert scene.truth is not None
     false, tracked, had = [], [], set()
     for k in range(scene.num_scans):
         truth, places = scene.truth.positions[k][:, :2], done.confirmed[k][1][:, :2]
@@ -65,14 +64,14 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
     claims: list[Claim] = []
     for name in names:
         runs = [judge(name, scene) for scene in scenes]
-        late = np.array([float(one.late) for one in runs])
-        false = np.array([one.false[SETTLED:].mean() for one in runs])
-        tracked = np.array([100.0 * one.tracked[SETTLED:].mean() for one in runs])
+        late = np.array([float(run.late) for run in runs])
+        false = np.array([run.false[SETTLED:].mean() for run in runs])
+        tracked = np.array([100.0 * run.tracked[SETTLED:].mean() for run in runs])
         claims += [
             goal(f"{name}: targets without a track in {STARTED} scans", "", late, 0.0),
             goal(f"{name}: false tracks at a time after {SETTLED} scans", "", false, 0.0),
             mean_claim(f"{name}: targets with a track after {SETTLED} scans", "%", tracked),
-            Claim(f"{name}: CPU time of a scan", "ms", ours=float(np.median([one.milliseconds for one in runs]))),
+            Claim(f"{name}: CPU time of a scan", "ms", ours=float(np.median([run.milliseconds for run in runs]))),
         ]
     return claims
 

@@ -76,8 +76,8 @@ def against_peers(targets: int, clutter: float, scans: int, seeds: Sequence[int]
         }
         if labelled.AVAILABLE:
             runs["lmb"] = labelled.labelled(plane)
-        for name, one in runs.items():
-            found[name].append(judged(one, plane, share))
+        for name, run in runs.items():
+            found[name].append(judged(run, plane, share))
     label = f"{targets} targets, clutter {clutter:g} a target"
     claims = []
     for peer, ours in PEERS.items():
@@ -104,11 +104,11 @@ def against_peers(targets: int, clutter: float, scans: int, seeds: Sequence[int]
 
 
 def _median(results: list[Result]) -> float:
-    return float(np.median(np.concatenate([one.seconds for one in results])))
+    return float(np.median(np.concatenate([result.seconds for result in results])))
 
 
 def _mean(results: list[Result]) -> float:
-    return float(np.mean(np.concatenate([one.gospa for one in results])))
+    return float(np.mean(np.concatenate([result.gospa for result in results])))
 
 
 def _paired(ours: list[Result], peer: list[Result]) -> tuple[float, tuple[float, tuple[float, float] | None], int]:
@@ -116,7 +116,7 @@ def _paired(ours: list[Result], peer: list[Result]) -> tuple[float, tuple[float,
     mine = [Result(a.seconds[: len(b.seconds)], a.gospa[: len(b.gospa)]) for a, b in zip(ours, peer, strict=True)]
     differences = np.array([a.gospa.mean() - b.gospa.mean() for a, b in zip(mine, peer, strict=True)])
     interval = mean_interval(differences) if len(differences) > 1 else None
-    scans = sum(len(one.seconds) for one in peer)
+    scans = sum(len(result.seconds) for result in peer)
     return _median(peer) / _median(mine), (float(differences.mean()), interval), scans
 
 

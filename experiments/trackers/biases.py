@@ -55,7 +55,7 @@ def biased(scene: Scene, size: tuple[float, float], seed: int) -> tuple[Scene, A
     """The scene with biases of this size and random signs, and the biases (S, 2), metres and degrees."""
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], (len(scene.sensors), 2))
     wrong = signs * np.array(size)
-    return with_biases(scene, [{"range": one[0], "azimuth": np.radians(one[1])} for one in wrong]), wrong
+    return with_biases(scene, [{"range": bias[0], "azimuth": np.radians(bias[1])} for bias in wrong]), wrong
 
 
 def first_plots(scene: Scene, count: int) -> Scene:
@@ -69,7 +69,7 @@ def errors(scene: Scene, wrong: Array) -> Array:
     """Errors of the biases found in a scene, (S, 2), metres and degrees."""
     found = register(scene)
     own = [found.of(s) for s in range(len(scene.sensors))]
-    return np.array([[one["range"], np.degrees(one["azimuth"])] for one in own]) - wrong
+    return np.array([[bias["range"], np.degrees(bias["azimuth"])] for bias in own]) - wrong
 
 
 def gospa(scene: Scene, truth: Scene, registration: str | None = None) -> float:
@@ -127,7 +127,7 @@ def experiment(file: str | None, quick: bool, seed: int, count: int = SEEDS) -> 
     """Simulated flights, and the file's."""
     kinds: dict[str, Simulate] = {"simulated": flights}
     if file is not None:
-        kinds["recorded"] = lambda one: simulation.simulate("from-tracks", one, file=file, scans=SCANS)
+        kinds["recorded"] = lambda seed: simulation.simulate("from-tracks", seed, file=file, scans=SCANS)
     claims = []
     for label, simulate in kinds.items():
         scenes = count if label == "simulated" else count // 2

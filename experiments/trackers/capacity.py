@@ -28,19 +28,19 @@ def long_runs(quick: bool, seed: int) -> list[Claim]:
     """Three radars, many seeds; and a thousand scans."""
     seeds, scans = (6, 30) if quick else (100, 100)
     found = [three_radar(seed + k, scans, single=k < (2 if quick else 20)) for k in range(seeds)]
-    alone = [one for one in found if np.isfinite(one.best)]
-    gain = float(np.sqrt(np.mean([one.best for one in alone]) / np.mean([one.multi for one in alone])))
-    lost = 100.0 * sum(one.lost for one in found) / sum(one.instants for one in found)
+    alone = [run for run in found if np.isfinite(run.best)]
+    gain = float(np.sqrt(np.mean([run.best for run in alone]) / np.mean([run.multi for run in alone])))
+    lost = 100.0 * sum(run.lost for run in found) / sum(run.instants for run in found)
     least = float(np.sqrt(2))
     length = 40 if quick else 1_000
     seconds, counts, _ = crowd(MultiSensorTracker, 60, length, seed)
     first, last = seconds[length // 10 : length // 2], seconds[length // 2 :]
     slower = float(np.median(last) / np.median(first))
     return [
-        _most("three radars: targets not tracked from their second scan", "", sum(one.late for one in found), 0.0),
+        _most("three radars: targets not tracked from their second scan", "", sum(run.late for run in found), 0.0),
         Claim("three radars: instants without a track", "%", ours=lost),
-        _most("three radars: false confirmed tracks", "", sum(one.false for one in found), 0.0),
-        Claim("three radars: position RMSE", "m", ours=float(np.sqrt(np.mean([one.multi for one in found])))),
+        _most("three radars: false confirmed tracks", "", sum(run.false for run in found), 0.0),
+        Claim("three radars: position RMSE", "m", ours=float(np.sqrt(np.mean([run.multi for run in found])))),
         Claim(
             "goal: three radars: RMSE of the best radar alone / ours", "", ours=gain, band=(least, None), source=GOAL
         ),
@@ -64,7 +64,6 @@ def crowds(quick: bool, seed: int) -> list[Claim]:
     scene = flights(seed, 100 // share, 12)
     done = through(HypothesisOrientedMHT.for_scene(scene), scene)
     confirmed, truth = done.confirmed[WITHIN - 1][1], scene.scan(WITHIN - 1).truth_positions
-    assert truth is not None
     near = np.linalg.norm(truth[:, None] - confirmed[None], axis=2).min(axis=1, initial=np.inf) <= NEAR
     many, some, hundred = 1_000 // share, 300 // share, 100 // share
     return [

@@ -65,34 +65,18 @@ def simulate(setting: Setting, seed: int, scans: int = SCANS, sensors: Sequence[
 
 def radars(setting: Setting) -> list[Sensor]:
     """The radars of a kind of scene, then its bearing sensors."""
-    count = len(setting.noise) + setting.bearings
+    each = {"detection_probability": setting.detection_probability, "false_alarm_rate": setting.false_alarms}
+    radars = len(setting.noise)
     sensors: list[Sensor] = []
-    for number, place in enumerate(on_circle(np.zeros(3), _AROUND, count)):
-        if number < len(setting.noise):
-            noise = setting.noise[number]
-            sensors.append(
-                radar_over(
-                    REGION,
-                    place,
-                    range_noise=noise,
-                    angle_noise=noise / REFERENCE_RANGE,
-                    detection_probability=setting.detection_probability,
-                    false_alarm_rate=setting.false_alarms,
-                    name=f"radar {number + 1}",
-                )  # fmt: skip
-            )
+    for number, place in enumerate(on_circle(np.zeros(3), _AROUND, radars + setting.bearings), 1):
+        if number <= radars:
+            noise = setting.noise[number - 1]
+            errors = {"range_noise": noise, "angle_noise": noise / REFERENCE_RANGE}
+            sensors.append(radar_over(REGION, place, name=f"radar {number}", **errors, **each))
         else:
-            view = padded_azimuth(azimuth_interval(place, REGION), 2e-3)
-            sensors.append(
-                BearingSensor(
-                    position=place,
-                    noise=np.array([2e-3]),
-                    detection_probability=setting.detection_probability,
-                    false_alarm_rate=setting.false_alarms,
-                    field_of_view=np.array([view]),
-                    name=f"bearing sensor {number + 1}",
-                )  # fmt: skip
-            )
+            view = np.array([padded_azimuth(azimuth_interval(place, REGION), 2e-3)])
+            name = f"bearing sensor {number}"
+            sensors.append(BearingSensor(position=place, noise=[2e-3], field_of_view=view, name=name, **each))
     return sensors
 
 

@@ -29,7 +29,7 @@ def compare(label: str, scenes: list[Scene], names: Sequence[str]) -> list[Claim
     for name, runs in found.items():
         claims += claims_of(label, name, runs)
         claims += [
-            Claim(f"{label}, {name}: {part}", "m", ours=float(np.mean([one.parts[part] for one in runs])))
+            Claim(f"{label}, {name}: {part}", "m", ours=float(np.mean([run.parts[part] for run in runs])))
             for part in ("localisation", "missed", "false")
         ]
     others = {"multi-sensor": "nearest-neighbour", "mht": "nearest-neighbour", "static": "multi-sensor"}

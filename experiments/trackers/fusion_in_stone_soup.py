@@ -79,7 +79,7 @@ class Size:
 USUAL = Size()
 
 
-class MissingRadar(RadarBearingRange):  # type: ignore[misc]
+class MissingRadar(RadarBearingRange):
     """Stone Soup's radar sees all within its range; this one misses some."""
 
     probability: float = Property(default=P_D, doc="Detection probability.")
@@ -179,7 +179,7 @@ def gospa(tracks: set[Any], paths: set[Any]) -> Array:
     manager = MultiManager([generator])
     manager.add_data({"tracks": tracks, "groundtruth_paths": paths})
     metric = manager.generate_metrics()["gospa_generator"]["GOSPA Metrics"]
-    rows = np.array([[one.value[part] for part in PARTS] for one in metric.value], dtype=float)
+    rows = np.array([[value.value[part] for part in PARTS] for value in metric.value], dtype=float)
     rows[:, 1:] = np.sqrt(rows[:, 1:])  # the parts are sums of squares
     return rows
 

@@ -40,7 +40,6 @@ def three_radar(seed: int, scans: int, single: bool) -> ThreeRadar:
     for k in range(scene.num_scans):
         ids, places = run.confirmed[k]
         truth = scene.scan(k).truth_positions
-        assert truth is not None
         away = np.linalg.norm(truth[:, None] - places[None], axis=2)
         near = away.min(axis=1, initial=np.inf)
         if k >= 1:
@@ -60,17 +59,16 @@ def three_radar(seed: int, scans: int, single: bool) -> ThreeRadar:
 def _alone(scene: Scene, s: int) -> float:
     """Mean squared position error with one radar, where it has a track of the target."""
     truth = scene.truth
-    assert truth is not None and truth.sources is not None
-    one = Scene(
+    seen = Scene(
         sensors=[scene.sensors[s]],
         times=scene.times,
         measurements=[[scan[s]] for scan in scene.measurements],
         region=scene.region,
         truth=Truth(truth.target_ids, truth.positions, [[scan[s]] for scan in truth.sources]),
     )
-    run = through(MultiSensorTracker.for_scene(one), one)
+    run = through(MultiSensorTracker.for_scene(seen), seen)
     errors = []
-    for k in range(1, one.num_scans):
+    for k in range(1, seen.num_scans):
         away = np.linalg.norm(truth.positions[k][:, None] - run.confirmed[k][1][None], axis=2)
         near = away.min(axis=1, initial=np.inf)
         errors.append(near[near <= 2 * NEAR])
@@ -84,7 +82,6 @@ def crowd(kind: type[Tracker], targets: int, scans: int, seed: int) -> tuple[Arr
     )
     run = through(kind.for_scene(scene), scene)
     truth = scene.scan(scans - 1).truth_positions
-    assert truth is not None
     away = np.linalg.norm(truth[:, None] - run.confirmed[-1][1][None], axis=2)
     counts = np.array([len(ids) for ids, _ in run.confirmed])
     return run.seconds, counts, int((away.min(axis=1, initial=np.inf) < 3 * 100.0).sum())

@@ -53,7 +53,7 @@ def judge(name: str, scene: Scene) -> Judged:
     return Judged(
         distances(scene, done.tracks),
         mean_gospa(gospa_over_time(truth, done.tracks, CUTOFF)[1]),
-        float(np.mean([one.distance for one in windows])) if windows else 0.0,
+        float(np.mean([window.distance for window in windows])) if windows else 0.0,
         hota(truth, done.tracks, CUTOFF).hota,
         identity(truth, done.tracks, CUTOFF).switches,
         1e3 * float(np.median(done.seconds[1:])),
@@ -69,18 +69,18 @@ def distances(scene: Scene, tracks: Trajectories, cutoff: float = CUTOFF) -> Arr
 
 def means(runs: Sequence[Judged]) -> Array:
     """Mean GOSPA of each run, metres."""
-    return np.array([one.distances.mean() for one in runs])
+    return np.array([run.distances.mean() for run in runs])
 
 
 def claims_of(label: str, name: str, runs: Sequence[Judged]) -> list[Claim]:
     """What a tracker did on the scenes of one kind."""
-    gospa, switches = means(runs), np.array([float(one.switches) for one in runs])
+    gospa, switches = means(runs), np.array([float(run.switches) for run in runs])
     return [
         mean_claim(f"{label}, {name}: GOSPA", "m", gospa),
-        mean_claim(f"{label}, {name}: OSPA(2)", "m", np.array([one.ospa2 for one in runs])),
-        mean_claim(f"{label}, {name}: HOTA", "", np.array([one.hota for one in runs])),
+        mean_claim(f"{label}, {name}: OSPA(2)", "m", np.array([run.ospa2 for run in runs])),
+        mean_claim(f"{label}, {name}: HOTA", "", np.array([run.hota for run in runs])),
         mean_claim(f"{label}, {name}: switches", "", switches),
-        Claim(f"{label}, {name}: CPU time of a scan", "ms", ours=float(np.median([one.milliseconds for one in runs]))),
+        Claim(f"{label}, {name}: CPU time of a scan", "ms", ours=float(np.median([run.milliseconds for run in runs]))),
     ]
 
 

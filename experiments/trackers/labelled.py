@@ -50,4 +50,4 @@ def labelled(plane: Plane) -> Iterator[tuple[float, Array]]:
     for k, measured in enumerate(plane.measurements, start=1):
         detections = [np.ascontiguousarray(z) for z in measured]
         found, elapsed = processor_time(filter.step, detections, k)
-        yield elapsed, np.array([one.mean[:2] for one in found.tracks]).reshape(-1, 2)
+        yield elapsed, np.array([track.mean[:2] for track in found.tracks]).reshape(-1, 2)

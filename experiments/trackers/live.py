@@ -28,7 +28,7 @@ GOAL_MS = 100.0
 
 def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
     """CPU and wall seconds of each step (n, 2), and how many confirmed tracks there are at the end."""
-    turns = ",".join(f"{one:g}" for one in TURNS)
+    turns = ",".join(f"{turn:g}" for turn in TURNS)
     scene = simulation.simulate("rotating-radars", seed, aircraft=aircraft, turns=turns, duration=duration)
 
     def make() -> MultiSensorTracker:

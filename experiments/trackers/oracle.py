@@ -82,7 +82,6 @@ class OracleTracker(Tracker):
     method = Oracle
 
     def __init__(self, scene: Scene, **options: Any) -> None:
-        assert scene.truth is not None and scene.truth.sources is not None
         noise = manoeuvre_noise(pace_of(scene.times))
         filter = two_speeds(noise, unscented=open_heights(scene.sensors))
         options = {"filter": filter, "region": scene.region} | options

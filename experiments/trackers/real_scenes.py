@@ -13,7 +13,7 @@ from assoc._types import Array
 from assoc.costs.views import BANDS
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.registration import register
-from assoc.scene import Scene, Truth
+from assoc.scene import Scene
 from assoc.sensors import Platform, PositionSensor, Radar2D, Radar3D, Sensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
@@ -49,15 +49,13 @@ Make = Callable[[int], Case]
 
 def short_radars(seed: int, detection_probability: float = 0.9) -> Case:
     """Six radars that reach 17 km each; all know it."""
-    sensors = [_short(one, 17e3, detection_probability) for one in on_circle(np.zeros(3), 16e3, 6)]
-    return Case(simulate(SEPARATE, seed, sensors=sensors))
+    return Case(simulate(SEPARATE, seed, sensors=_short(17e3, detection_probability)))
 
 
 def farther_seen_less(seed: int) -> Case:
     """Six radars that detect 95 % of what is near, half at 17 km; they are said to detect 90 % up to 40 km."""
-    told = [_short(one, 40e3, 0.9) for one in on_circle(np.zeros(3), 16e3, 6)]
-    full = simulate(SEPARATE, seed, sensors=[replace(one, detection_probability=_NEAR) for one in told])
-    assert full.truth is not None and full.truth.sources is not None
+    told = _short(40e3, 0.9)
+    full = simulate(SEPARATE, seed, sensors=[replace(radar, detection_probability=_NEAR) for radar in told])
     rng, middles = np.random.default_rng([seed, 1]), (np.arange(BANDS) + 0.5) * 40e3 / BANDS
     kept = [
         [(who < 0) | (rng.random(len(z)) * _NEAR < _at_range(z[:, 0])) for z, who in zip(*scan, strict=True)]
@@ -75,41 +73,45 @@ def _at_range(away: Array) -> Array:
     return np.asarray(_NEAR / (1.0 + np.exp((away - 17e3) / 2e3)))
 
 
-def _short(place: Array, reach: float, detection_probability: float) -> Sensor:
-    full = radar_over(
-        REGION, place, range_noise=50.0, angle_noise=1e-3, detection_probability=detection_probability,
-        false_alarm_rate=10.0, name=f"radar at {place[0] / 1e3:.0f}, {place[1] / 1e3:.0f} km",
-    )  # fmt: skip
-    return replace(full, field_of_view=np.concatenate([[[0.0, reach]], full.field_of_view[1:]]))
+def _short(reach: float, detection_probability: float) -> list[Sensor]:
+    """Six radars that reach so far."""
+    noise = {"range_noise": 50.0, "angle_noise": 1e-3}
+    found: list[Sensor] = []
+    for place in on_circle(np.zeros(3), 16e3, 6):
+        name = f"radar at {place[0] / 1e3:.0f}, {place[1] / 1e3:.0f} km"
+        full = _radar(place, name, detection_probability=detection_probability, **noise)
+        found.append(replace(full, field_of_view=np.concatenate([[[0.0, reach]], full.field_of_view[1:]])))
+    return found
+
+
+def _radar(place: Array, name: str, **more: Any) -> Radar3D:
+    """The usual radar at a place, but for what is given."""
+    usual = {"range_noise": 80.0, "angle_noise": 1.6e-3, "detection_probability": 0.9, "false_alarm_rate": 10.0}
+    return radar_over(REGION, place, name=name, **usual | more)
 
 
 def dark_band(seed: int) -> Case:
     """Nothing is detected within 2 km of the plane x = 0, and nobody knows."""
     scene = simulate(SEPARATE, seed)
-    assert scene.truth is not None
-    hidden = [
-        ids[np.abs(at[:, 0]) < 2e3] for ids, at in zip(scene.truth.target_ids, scene.truth.positions, strict=True)
-    ]
-    return Case(_without(scene, hidden))
-
-
-def _without(scene: Scene, hidden: Sequence[Array]) -> Scene:
-    """The scene without measurements of these targets, scan by scan."""
-    assert scene.truth is not None and scene.truth.sources is not None
-    return _left(
-        scene, [[~np.isin(one, gone) for one in scan] for scan, gone in zip(scene.truth.sources, hidden, strict=True)]
-    )
+    kept = []
+    for ids, at, scan in zip(scene.truth.target_ids, scene.truth.positions, scene.truth.sources, strict=True):
+        hidden = ids[np.abs(at[:, 0]) < 2e3]
+        kept.append([~np.isin(sources, hidden) for sources in scan])
+    return Case(_left(scene, kept))
 
 
 def _left(scene: Scene, kept: Sequence[Sequence[Array]]) -> Scene:
     """The scene with these measurements alone, bool (n_s,) each."""
-    assert scene.truth is not None and scene.truth.sources is not None
 
     def left(arrays: Any) -> list[list[Array]]:
         return [[a[k] for a, k in zip(scan, keep, strict=True)] for scan, keep in zip(arrays, kept, strict=True)]
 
-    truth = Truth(scene.truth.target_ids, scene.truth.positions, left(scene.truth.sources))
-    return Scene(scene.sensors, scene.times, left(scene.measurements), scene.region, truth)
+    return _with(scene, left(scene.measurements), left(scene.truth.sources))
+
+
+def _with(scene: Scene, measurements: Any, sources: Any) -> Scene:
+    """The scene with these measurements, each of one of these targets."""
+    return replace(scene, measurements=measurements, truth=replace(scene.truth, sources=sources))
 
 
 def splitting(seed: int) -> Case:
@@ -128,10 +130,15 @@ def splitting(seed: int) -> Case:
     return Case(observe(radars(SEPARATE), TIMES, ids, paths, rng, region=REGION))
 
 
+def _all_seen(paths: Array, rng: np.random.Generator, interval: float = INTERVAL) -> Case:
+    """Targets that are there all the time (K, T, 3), seen by the usual radars."""
+    times, ids = interval * np.arange(SCANS), [np.arange(paths.shape[1])] * SCANS
+    return Case(observe(radars(SEPARATE), times, ids, list(paths), rng, region=REGION))
+
+
 def wind_farm(seed: int) -> Case:
     """Each radar has ten returns a scan from a patch of 3 x 3 km, 200 m high."""
     rng, scene = np.random.default_rng([seed, 1]), simulate(SEPARATE, seed)
-    assert scene.truth is not None and scene.truth.sources is not None
     low = np.append(rng.uniform(-15e3, 12e3, 2), 0.0)
     measurements, sources = [], []
     for scan, source in zip(scene.measurements, scene.truth.sources, strict=True):
@@ -141,9 +148,8 @@ def wind_farm(seed: int) -> Case:
             for sensor in scene.sensors
         ]
         measurements.append([np.concatenate(both) for both in zip(scan, more, strict=True)])
-        sources.append([np.append(one, np.full(10, -1)) for one in source])
-    truth = Truth(scene.truth.target_ids, scene.truth.positions, sources)
-    return Case(Scene(scene.sensors, scene.times, measurements, scene.region, truth))
+        sources.append([np.append(own, np.full(10, -1)) for own in source])
+    return Case(_with(scene, measurements, sources))
 
 
 def ships(seed: int, reports: bool = True) -> Case:
@@ -171,22 +177,13 @@ def ships(seed: int, reports: bool = True) -> Case:
     phase = rng.uniform(0.0, 10.0, TARGETS)
     turn = np.floor((TIMES[:, None] + phase) / 10.0)
     due = np.diff(turn, axis=0, prepend=turn[:1] - (phase < INTERVAL)) > 0
-    scene = _at_times(scene, 1, due)
+    kept = [
+        [np.full(len(seen), True), np.append(row, True)[told]]
+        for (seen, told), row in zip(scene.truth.sources, due, strict=True)
+    ]
     everywhere, nowhere = (-np.pi, np.pi), (0.0, 0.0)
     sectors = np.array([[everywhere, nowhere]] * SCANS)
-    return Case(replace(scene, sectors=sectors), options=options)
-
-
-def _at_times(scene: Scene, s: int, due: Array) -> Scene:
-    """The scene in which sensor `s` has measurements of a target only when they are due, bool (K, T)."""
-    assert scene.truth is not None and scene.truth.sources is not None
-    measurements = [list(scan) for scan in scene.measurements]
-    sources = [list(scan) for scan in scene.truth.sources]
-    for k, row in enumerate(due):
-        kept = np.append(row, True)[sources[k][s]]
-        measurements[k][s], sources[k][s] = measurements[k][s][kept], sources[k][s][kept]
-    truth = Truth(scene.truth.target_ids, scene.truth.positions, sources)
-    return Scene(scene.sensors, scene.times, measurements, scene.region, truth)
+    return Case(replace(_left(scene, kept), sectors=sectors), options=options)
 
 
 def misdeclared(declared: Setting, true: Setting) -> Make:
@@ -216,15 +213,12 @@ def agile(seed: int, interval: float = INTERVAL) -> Case:
     path = np.cumsum(velocity, axis=0) * fine
     middle = rng.uniform([-12e3, -12e3, 0.0], [12e3, 12e3, 1.0], (TARGETS, 3))
     middle[:, 2] = rng.permutation(np.linspace(1e3, 11e3, TARGETS))
-    path = (path - path.mean(axis=0) + middle)[:: round(interval / fine)]
-    times, ids = interval * np.arange(SCANS), [np.arange(TARGETS)] * SCANS
-    return Case(observe(radars(SEPARATE), times, ids, list(path), rng, region=REGION))
+    return _all_seen((path - path.mean(axis=0) + middle)[:: round(interval / fine)], rng, interval)
 
 
 def one_planar(seed: int, declared: float = 100.0) -> Case:
     """Low targets under one radar without heights, 100 false alarms a scan, of which so many are declared."""
     scene, region = simulate(SEPARATE, seed), np.array([*REGION[:2], [0.0, 2e3]])
-    assert scene.truth is not None
     radar = replace(_planar(scene.sensors[0]), false_alarm_rate=100.0, name="radar")
     rng = np.random.default_rng([seed, 1])
     paths = [_at_height(at, 1e3) for at in scene.truth.positions]
@@ -250,7 +244,6 @@ def flat_radars(seed: int, height: float | None = None) -> Case:
     """Three radars without elevations, and the filter of the programs; with a height, all targets fly there."""
     sensors: list[Sensor] = [_planar(radar) for radar in radars(SEPARATE)]
     scene = simulate(SEPARATE, seed, sensors=sensors)
-    assert scene.truth is not None
     if height is not None:
         paths = [_at_height(at, height) for at in scene.truth.positions]
         rng = np.random.default_rng(seed)
@@ -266,20 +259,14 @@ def abreast(seed: int, gap: float) -> Case:
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
     side = np.array([[-0.5], [0.5]]) * gap * np.array([-ahead[1], ahead[0], 0.0])
     paths = [0.0, 0.0, 6e3] + side + (200.0 * (TIMES - TIMES.mean()))[:, None, None] * ahead
-    return Case(observe(radars(SEPARATE), TIMES, [np.arange(2)] * SCANS, list(paths), rng, region=REGION))
+    return _all_seen(paths, rng)
 
 
 def landing(seed: int) -> Case:
     """Aircraft at 75 m/s on glide paths of 3 degrees, 5 km apart, to three runways 5 km before each radar."""
     rng = np.random.default_rng(seed)
     places = on_circle(np.zeros(3), 20e3, 3)
-    sensors = [
-        radar_over(
-            REGION, place, range_noise=80.0, angle_noise=1.6e-3, detection_probability=0.9, false_alarm_rate=10.0,
-            name=f"radar {number}",
-        )
-        for number, place in enumerate(places, 1)
-    ]  # fmt: skip
+    sensors = [_radar(place, f"radar {number}") for number, place in enumerate(places, 1)]
     ids, paths = [], []
     first = rng.uniform(3e3, 8e3, 3)
     for t in TIMES.tolist():
@@ -304,11 +291,6 @@ def crossing(seed: int) -> Case:
     return _all_seen(paths, rng)
 
 
-def _all_seen(paths: Array, rng: np.random.Generator) -> Case:
-    """Targets that are there all the time, seen by the usual radars."""
-    return Case(observe(radars(SEPARATE), TIMES, [np.arange(TARGETS)] * SCANS, list(paths), rng, region=REGION))
-
-
 def hovering(seed: int) -> Case:
     """Drones that stand for half of the time, then fly at 5 to 15 m/s."""
     rng = np.random.default_rng(seed)
@@ -321,15 +303,13 @@ def late_clock(seed: int) -> Case:
     """The stamps of the second radar are late by 0.5 s, and found by registration; the first has the right time."""
     scene = simulate(SEPARATE, seed)
     truth = scene.truth
-    assert truth is not None and truth.sources is not None
     velocity = (truth.positions[1] - truth.positions[0]) / INTERVAL
     before = [at - 0.5 * velocity for at in truth.positions]
     rng = np.random.default_rng([seed, 1])
     late = observe(scene.sensors[1:2], scene.times, truth.target_ids, before, rng, region=REGION)
-    assert late.truth is not None and late.truth.sources is not None
     measurements = [[a, b, c] for (a, _, c), (b,) in zip(scene.measurements, late.measurements, strict=True)]
     sources = [[a, b, c] for (a, _, c), (b,) in zip(truth.sources, late.truth.sources, strict=True)]
-    scene = replace(scene, measurements=measurements, truth=replace(truth, sources=sources))
+    scene = _with(scene, measurements, sources)
     found = register(scene, components=("time",), reference=(scene.sensors[0].name,))
     return Case(found.correct(scene))
 
@@ -352,13 +332,8 @@ def under_way(seed: int) -> Case:
 
 def range_rates(seed: int) -> Case:
     """Formations under radars that measure range rates, too (1 m/s)."""
-    sensors = [
-        radar_over(
-            REGION, one.position, range_noise=80.0, angle_noise=1.6e-3, detection_probability=0.9,
-            false_alarm_rate=10.0, name=one.name, range_rate_noise=1.0, fastest=300.0,
-        )
-        for one in radars(SETTINGS["formations"])
-    ]  # fmt: skip
+    more = {"range_rate_noise": 1.0, "fastest": 300.0}
+    sensors = [_radar(radar.position, radar.name, **more) for radar in radars(SETTINGS["formations"])]
     return Case(simulate(SETTINGS["formations"], seed, sensors=sensors))
 
 
@@ -366,11 +341,11 @@ def untold_views(scene: Scene) -> Scene:
     """The scene with sensors that are said to see everything, with the same density of false alarms."""
     across = float(np.linalg.norm(np.diff(REGION, axis=1)))
     sensors = []
-    for one in scene.sensors:
-        view = np.array(one.field_of_view)
-        view[[name == "range" for name in one.components[: one.dim]], 1] = across
-        full = replace(one, field_of_view=view)
-        sensors.append(replace(full, false_alarm_rate=one.false_alarm_rate * full.volume / one.volume))
+    for sensor in scene.sensors:
+        view = np.array(sensor.field_of_view)
+        view[[name == "range" for name in sensor.components[: sensor.dim]], 1] = across
+        full = replace(sensor, field_of_view=view)
+        sensors.append(replace(full, false_alarm_rate=sensor.false_alarm_rate * full.volume / sensor.volume))
     return replace(scene, sensors=sensors, sectors=None)
 
 

@@ -15,7 +15,7 @@ class Sites:
     def __init__(self, scene: Scene, **options: Any) -> None:
         noise = manoeuvre_noise(pace_of(scene.times))
         options = {"filter": two_speeds(noise, unscented=open_heights(scene.sensors))} | options
-        self.sites = [MultiSensorTracker([one], region=scene.region, **options) for one in scene.sensors]
+        self.sites = [MultiSensorTracker([sensor], region=scene.region, **options) for sensor in scene.sensors]
         self.fusion, self.filter = TrackFusion(len(self.sites)), options["filter"]
         self.tracks: list[Track] = []
 
@@ -25,5 +25,5 @@ class Sites:
         for s, site in enumerate(self.sites):
             own = None if times is None else [times[s]]
             site.step(time, [measurements[s]], own, None if sectors is None else sectors[s : s + 1])
-            found.append(SystemTracks.of([one for one in site.tracks if one.reported], site.filter.motion))
+            found.append(SystemTracks.of([track for track in site.tracks if track.reported], site.filter.motion))
         self.tracks = self.fusion.step(time, found).tracks

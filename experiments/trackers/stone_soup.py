@@ -72,18 +72,18 @@ def multi_frame(plane: Plane, window: int, gate: float) -> Iterator[tuple[float,
             warnings.filterwarnings("ignore", "Infeasible primal problem")
             found = associator.associate(tracks, detections, when)
         for track, hypotheses in found.items():
-            components = [updater.update(one) if one else one.prediction for one in hypotheses]
+            components = [updater.update(h) if h else h.prediction for h in hypotheses]
             track.append(GaussianMixture(components))
         elapsed = time.process_time() - started
-        best = [max(track.state.components, key=lambda one: float(one.weight)) for track in tracks]
-        yield elapsed, np.array([np.asarray(one.mean, dtype=float)[[0, 2], 0] for one in best]).reshape(-1, 2)
+        best = [max(track.state.components, key=lambda part: float(part.weight)) for track in tracks]
+        yield elapsed, np.array([np.asarray(part.mean, dtype=float)[[0, 2], 0] for part in best]).reshape(-1, 2)
 
 
 def nearest(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
     """Global nearest neighbour by 2-D assignment of likelihoods: seconds and positions of each scan."""
 
-    def corrected(updater: Any, one: Any, when: datetime) -> Any:
-        return updater.update(one) if one else one.prediction
+    def corrected(updater: Any, found: Any, when: datetime) -> Any:
+        return updater.update(found) if found else found.prediction
 
     return _one_state(plane, gate, GNNWith2DAssignment, corrected)
 
@@ -92,10 +92,10 @@ def probabilistic(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
     """JPDA: each track's mixture of all its measurements as one Gaussian; seconds and positions of each scan."""
 
     def corrected(updater: Any, many: Any, when: datetime) -> Any:
-        after = [updater.update(one) if one else one.prediction for one in many]
-        weights = np.array([float(one.probability) for one in many])
-        means = np.concatenate([np.asarray(one.mean, dtype=float) for one in after], axis=1)
-        covariances = np.stack([np.asarray(one.covar, dtype=float) for one in after], axis=2)
+        after = [updater.update(h) if h else h.prediction for h in many]
+        weights = np.array([float(h.probability) for h in many])
+        means = np.concatenate([np.asarray(state.mean, dtype=float) for state in after], axis=1)
+        covariances = np.stack([np.asarray(state.covar, dtype=float) for state in after], axis=2)
         mean, covar = gm_reduce_single(means, covariances, weights / weights.sum())
         return GaussianStateUpdate(mean, covar, many, when)
 

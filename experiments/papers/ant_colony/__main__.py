@@ -155,19 +155,19 @@ def claims(measured: dict[str, Measured], cut_off: int = 0) -> list[Claim]:
         cycles = measured["paper"].cycles[i]
         name = f"setting {words}, mode paper: mean cycles to convergence"
         found.append(Claim(name, "cycles", paper, cycles.mean(), _interval(cycles), band, source=BAND))
-        for mode, one in measured.items():
+        for mode, runs in measured.items():
             if mode != "paper":
                 name = f"setting {words}, mode {mode}: mean cycles"
-                found.append(Claim(name, "cycles", None, one.cycles[i].mean(), _interval(one.cycles[i])))
-            rate = 100 * one.optimal[i]
+                found.append(Claim(name, "cycles", None, runs.cycles[i].mean(), _interval(runs.cycles[i])))
+            rate = 100 * runs.optimal[i]
             name = f"setting {words}, mode {mode}: scans certified optimal"
             found.append(Claim(name, "%", None, rate.mean(), _interval(rate)))
             name = f"setting {words}, mode {mode}: mean time"
-            found.append(Claim(name, "ms", None, 1e3 * one.seconds[i].mean(), _interval(1e3 * one.seconds[i])))
+            found.append(Claim(name, "ms", None, 1e3 * runs.seconds[i].mean(), _interval(1e3 * runs.seconds[i])))
     return found
 
 
-def _conclusions(one: Measured, mode: str, paper: Any) -> list[Claim]:
+def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
     from assoc.sweeps.bootstrap import resampled_means
 
     settings = list(PAPER)
@@ -192,7 +192,7 @@ def _conclusions(one: Measured, mode: str, paper: Any) -> list[Claim]:
     def compared(words: str, unit: str, values: Any, measure: Any, **how: Any) -> Claim:
         # rounded, so that equal means tie
         interval = _ends(measure(resampled_means(values).round(9)))
-        known = None if paper is None or values is not one.cycles else float(measure(paper))
+        known = None if paper is None or values is not runs.cycles else float(measure(paper))
         # a difference holds if its whole interval is on the right side of zero
         certain = how.pop("certain", None)
         if certain is not None:
@@ -202,14 +202,14 @@ def _conclusions(one: Measured, mode: str, paper: Any) -> list[Claim]:
         source = {"source": "section Simulasi and conclusion, in words"} | how
         return Claim(f"mode {mode}: {words}", unit, known, value, interval, **source)
 
-    rate, seconds = 100 * one.optimal, 1e3 * one.seconds
+    rate, seconds = 100 * runs.optimal, 1e3 * runs.seconds
     found = []
     if paper is not None:
         found.append(
             compared(
                 "mean cycles over all settings",
                 "cycles",
-                one.cycles,
+                runs.cycles,
                 lambda m: m.mean(axis=-1),
                 band=((1 - TOLERANCE) * float(paper.mean()), (1 + TOLERANCE) * float(paper.mean())),
                 source="mean of table 1; band of 10 % chosen by us",
@@ -219,23 +219,23 @@ def _conclusions(one: Measured, mode: str, paper: Any) -> list[Claim]:
         compared(
             "largest less smallest mean cycles of a setting",
             "cycles",
-            one.cycles,
+            runs.cycles,
             spread,
             band=(0, 0.1),
             source="table 1; 0.1 chosen by us",
         ),
         compared(
-            "cycles, alpha > beta less the others", "cycles", one.cycles, contrast, band=(None, 0), certain="below"
+            "cycles, alpha > beta less the others", "cycles", runs.cycles, contrast, band=(None, 0), certain="below"
         ),
         compared(
             "certified optimal, alpha > beta less the others", "%", rate, contrast, band=(0, None), certain="above"
         ),
         compared("time, alpha > beta less the others", "ms", seconds, contrast, band=(None, 0), certain="below"),
-        compared("rank in cycles of alpha 2 beta 1 rho 0.3 of 24", "", one.cycles, rank, band=(1, 1)),
+        compared("rank in cycles of alpha 2 beta 1 rho 0.3 of 24", "", runs.cycles, rank, band=(1, 1)),
         compared(
             "cycles, alpha 2 beta 1 rho 0.3 less the best other",
             "cycles",
-            one.cycles,
+            runs.cycles,
             lead,
             band=(None, 0),
             certain="below",

@@ -65,8 +65,8 @@ def nodes_of(scene: assoc.Scene, scan: int, kind: str) -> tuple[Array, Array]:
     if kind == "candidates":
         # a measurement in no candidate is a false alarm in every tour, and takes no part
         used = [set(column[~single].tolist()) for column in tuples.T]
-        kept = np.array([not one or all(i == 0 or i in used[s] for s, i in enumerate(row))
-                         for one, row in zip(single.tolist(), tuples.tolist(), strict=True)], dtype=bool)  # fmt: skip
+        kept = np.array([not alone or all(i == 0 or i in used[s] for s, i in enumerate(row))
+                         for alone, row in zip(single.tolist(), tuples.tolist(), strict=True)], dtype=bool)  # fmt: skip
         return tuples[kept], costs[kept]
     if kind == "priced grid":
         for k in np.flatnonzero(single):
@@ -74,7 +74,7 @@ def nodes_of(scene: assoc.Scene, scan: int, kind: str) -> tuple[Array, Array]:
             sensor = scene.sensors[s]
             # equation 5 with the residual 0 of a single measurement
             gain = np.log(sensor.detection_probability * sensor.volume / sensor.false_alarm_rate)
-            missed = sum(np.log(1 - one.detection_probability) for i, one in enumerate(scene.sensors) if i != s)
+            missed = sum(np.log(1 - sensor.detection_probability) for i, sensor in enumerate(scene.sensors) if i != s)
             costs[k] = 0.5 * np.linalg.slogdet(2 * np.pi * sensor.covariance)[1] - gain - missed
     return tuples, costs
 

@@ -19,7 +19,6 @@ def shares(scene: assoc.Scene, association: assoc.Association) -> dict[str, tupl
     found |= {f"targets seen by {n} radars, found with just these": [0, 0] for n in (3, 2)}
     for k, solution in enumerate(association.solutions):
         sources = scene.scan(k).sources
-        assert sources is not None
         members = [
             [int(sources[s][i - 1]) for s, i in enumerate(row) if i > 0] for row in np.asarray(solution.tuples).tolist()
         ]
@@ -50,14 +49,14 @@ def judge(scans: int, seed: int) -> tuple[list[Claim], Any]:
         "greedy": assoc.associate(scene, "greedy", seed=seed),
         "optimum": assoc.associate(scene, "exact", seed=seed),
     }
-    best = np.array([one.cost for one in by_name["optimum"].solutions])
+    best = np.array([solution.cost for solution in by_name["optimum"].solutions])
     for name, association in by_name.items():
         for what, (good, every) in shares(scene, association).items():
             claims.append(
                 Claim(f"truth, {name}: {what}, of {every}", "%", None, 100.0 * good / every, None, (LEAST, None),
                       source=f"figure 3 and conclusion, in words; {LEAST:g} % chosen by us")
             )  # fmt: skip
-        costs = np.array([one.cost for one in association.solutions])
+        costs = np.array([solution.cost for solution in association.solutions])
         solved = int((costs <= best + 1e-6 * np.maximum(1.0, np.abs(best))).sum())
         claims.append(Claim(f"truth, {name}: scans of {scans} solved to the optimum", "", None, solved, None,
                             (scans, scans), source="chosen by us"))  # fmt: skip

@@ -38,10 +38,8 @@ def with_false_start(recording: Recording, offset: tuple[float, float] | None, r
     recording: Of one aircraft.
     offset: Least and largest distance of the false plot from the aircraft's first, nautical miles; None: no false plot.
     """
-    assert recording.sources is not None
     hidden = (recording.sources >= 0) & (recording.times < 2 * ROTATION)
     kept = recording.take(~hidden)
-    assert kept.sources is not None
     first = int(np.argmax(kept.sources >= 0))
     if offset is None:
         return kept
@@ -138,7 +136,6 @@ def beginning(recording: Recording, taken: Taken) -> tuple[float, float, float]:
     first: 100 if its first plot is the aircraft's, else 0.
     identity: 100 if its identity is the aircraft's when the aircraft's 12th plot has come, else 0.
     """
-    assert recording.sources is not None
     sources = recording.sources[taken.rows]
     given = np.where(np.isin(taken.tracks, taken.tracks[taken.confirmed]), taken.tracks, -1)
     names, counts = np.unique(given[(sources >= 0) & (given >= 0)], return_counts=True)

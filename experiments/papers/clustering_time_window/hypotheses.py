@@ -63,12 +63,12 @@ class HypothesisTracker:
 
     def decided(self) -> Taken:
         """What the tracker has decided for good about every window, with the depth's delay."""
-        final = sorted([*self.final, *self.tracker.flush()], key=lambda one: one.scan)
+        final = sorted([*self.final, *self.tracker.flush()], key=lambda decision: decision.scan)
         return Taken(
-            np.repeat([one.scan for one in final], [len(one.assigned[0]) for one in final]),
-            np.concatenate([self.rows[one.scan] for one in final]),
-            np.concatenate([_tracks(one) for one in final]),
-            np.concatenate([one.confirmed[0] for one in final]),
+            np.repeat([decision.scan for decision in final], [len(decision.assigned[0]) for decision in final]),
+            np.concatenate([self.rows[decision.scan] for decision in final]),
+            np.concatenate([_tracks(decision) for decision in final]),
+            np.concatenate([decision.confirmed[0] for decision in final]),
         )
 
 

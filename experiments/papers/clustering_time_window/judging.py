@@ -34,7 +34,6 @@ class Taken:
 
     def rates(self, recording: Recording) -> CtMtIt:
         """CT, MT and IT with the sources that the simulation knows."""
-        assert recording.sources is not None
         return ct_mt_it(self.windows, recording.sources[self.rows], self.tracks, self.confirmed)
 
 

@@ -39,7 +39,6 @@ MISSES = (3, 5, 8)
 
 def wrong(recording: Recording, taken: Taken) -> tuple[float, float, int, int]:
     """Return IT and IT among tracks ever confirmed, percent, false plots in such tracks, and all false plots."""
-    assert recording.sources is not None
     sources = recording.sources[taken.rows]
     ever = np.isin(taken.tracks, taken.tracks[taken.confirmed])
     later = replace(taken, tracks=np.where(ever, taken.tracks, -1))
@@ -88,7 +87,7 @@ def of_pairs(runs: int, rng: np.random.Generator) -> list[Claim]:
                 taken = traffic.decided_by_reid(recording, windows, clock, misses)
                 kept[way].append((pairs.switches(recording, taken) == 0, pairs.swaps(recording, taken) > 0))
         for way, rows in kept.items():
-            without, swapped = ([one[axis] for one in rows] for axis in (0, 1))
+            without, swapped = ([row[axis] for row in rows] for axis in (0, 1))
             for what, some in (("without a switch", without), ("with a swap", swapped)):
                 claims.append(Claim(f"{kind}: pairs {what}, Reid's MHT, {way}", "%", None, 100.0 * float(np.mean(some)),
                                     pairs.wilson(some), source=CHOSEN))  # fmt: skip
@@ -122,7 +121,6 @@ def of_clocks(recordings: Iterable[Recording]) -> list[Claim]:
         for name, (whole, turn, by) in CLOCKS.items():
             recording = replace(exact, times=np.floor(exact.times)) if whole else exact
             windows = clustering_time_window(recording, turn, by=by)
-            assert recording.sources is not None
             twice = sum(_repeats(recording.sources[window.rows]) for window in windows)
             found.setdefault((name, "plots of aircraft that the window has already"), []).append(
                 100.0 * twice / float((recording.sources >= 0).sum())
@@ -150,7 +148,6 @@ def of_straightness(runs: int, rng: np.random.Generator, duration: float) -> lis
     for _ in range(runs):
         simulated = simulate_recording("rotating-radar", int(rng.integers(2**31)), duration=duration)
         recording, truth, sources = simulated.recording, simulated.truth, simulated.recording.sources
-        assert sources is not None
         windows = clustering_time_window(recording)
         follow = partial(track_plots, recording=recording, windows=windows)
         filtered, later = (follow(_tracker(recording), smooth=smooth) for smooth in (False, True))
@@ -161,8 +158,8 @@ def of_straightness(runs: int, rng: np.random.Generator, duration: float) -> lis
             aircraft = np.bincount(sources[own] + 1).argmax() - 1
             if len(own) < PLOTS or aircraft < 0:
                 continue
-            one = truth.ids == aircraft
-            path = np.stack([np.interp(recording.times[own], truth.times[one], truth.positions[one, axis])
+            flown = truth.ids == aircraft
+            path = np.stack([np.interp(recording.times[own], truth.times[flown], truth.positions[flown, axis])
                              for axis in (0, 1)], axis=1)  # fmt: skip
             for name, places in (("plots", recording.positions[own]), ("the aircraft itself", path)):
                 found.setdefault(name, []).append(bends(recording.times[own], places))
@@ -198,11 +195,11 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
             ).recording
             for _ in range(2 if quick else 3)
         ]
-        claims += false_plots(rate, ((one, clustering_time_window(one)) for one in more))
+        claims += false_plots(rate, ((recording, clustering_time_window(recording)) for recording in more))
     method = traffic.METHODS["Reid's MHT, irregular groups"][1]
-    rows = [run(method(one), groups["irregular"]).rates(one) for one, groups in first]
+    rows = [run(method(recording), groups["irregular"]).rates(recording) for recording, groups in first]
     # as in table 4.25; a shorter recording has fewer rows
-    length = min(len(published.WITHOUT_WINDOW), 1 + max(len(one.windows) for one in rows) // 10)
+    length = min(len(published.WITHOUT_WINDOW), 1 + max(len(row.windows) for row in rows) // 10)
     changes = traffic.change_of_mt(traffic.tens(rows, length))
     for number, change in enumerate(changes, 1):
         what = f"recording {number}: MT of the last three rows less that of the first three"

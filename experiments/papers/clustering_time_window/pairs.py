@@ -56,7 +56,6 @@ def judge(
 
 
 def _sources(recording: Recording, taken: Taken) -> Array:
-    assert recording.sources is not None
     return recording.sources[taken.rows]
 
 

@@ -43,8 +43,8 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """CT, MT and IT, then pairs."""
     found = []
     for recording, groups in traffic.recordings(2 if quick else 6, rng, 300.0 if quick else traffic.DURATION):
-        one = clusters(recording, groups["window"]).rates(recording)
-        found.append((one.ct, one.mt, one.it))
+        rates = clusters(recording, groups["window"]).rates(recording)
+        found.append((rates.ct, rates.mt, rates.it))
     claims = [
         Claim(f"{rate}, spanning tree, CTW", "%", None, float(values.mean()), mean_interval(values),
               source=NAMED)
@@ -57,7 +57,6 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
                 "rotating-radar", int(rng.integers(2**31)), traffic=kind, duration=pairs.DURATION
             ).recording
             taken = clusters(recording, clustering_time_window(recording, traffic.ROTATION))
-            assert recording.sources is not None
             own = [np.unique(taken.tracks[(recording.sources[taken.rows] == k) & taken.confirmed]) for k in (0, 1)]
             good.append(not np.isin(*own).any())
         what, share = f"{kind}: pairs whose plots share no track, spanning tree", 100.0 * float(np.mean(good))

@@ -72,7 +72,7 @@ def held(truth: Array, track: Array) -> tuple[int, int]:
     left = [tuple(np.round(place, 2)) for place in track.tolist()]
     count = 0
     for place in truth.tolist():
-        near = [one for one in left if math.dist(one, place) < 0.02]
+        near = [point for point in left if math.dist(point, place) < 0.02]
         if near:
             left.remove(near[0])
             count += 1
@@ -90,7 +90,7 @@ def as_recording(tables: dict[int, list[dict[str, float]]]) -> Recording:
             time = (float(turn) + bearing / 360.0) * ROTATION
             columns.append((time, distance, bearing, identity, row["altitude_fl"]))
     columns.sort()
-    times, ranges, bearings, names, levels = (np.array(one) for one in zip(*columns, strict=True))
+    times, ranges, bearings, names, levels = (np.array(column) for column in zip(*columns, strict=True))
     return Recording(
         times, NAUTICAL_MILE * ranges, math.pi / 2 - np.radians(bearings), identities=names.astype(int),
         altitudes=30.48 * levels, sources=names.astype(int),
@@ -149,13 +149,13 @@ def judge(folder: Path) -> list[Claim]:
         parts = {"truth": truth, "without": plane(read(folder, numbers[1])), "with": plane(read(folder, numbers[2]))}
         if identity == 2428:
             places = len(np.unique(np.round(parts["without"], 2), axis=0))
-        for one in parts.values():
-            distance, bearing = polar(one).T
+        for part in parts.values():
+            distance, bearing = polar(part).T
             steps = bearing / BEARING_STEP
             on_grid += int(
                 ((np.abs(distance - np.round(distance)) < 0.01) & (np.abs(steps - np.round(steps)) < 0.02)).sum()
             )
-            total += len(one)
+            total += len(part)
         printed = np.array([row["heading_deg"] for row in tables[identity]])[1:]
         off = np.abs((headings(truth) - printed + 180.0) % 360.0 - 180.0)
         right, turned = right + int((off[printed > 0] < 1.0).sum()), turned + int((printed > 0).sum())

@@ -107,7 +107,7 @@ def judge(runs: int, slow_runs: int, rng: np.random.Generator, duration: float =
 
 def overall(results: dict[str, list[CtMtIt]]) -> dict[str, Array]:
     """CT, MT, IT of every run, (runs, 3), by method."""
-    return {name: np.array([(one.ct, one.mt, one.it) for one in every]) for name, every in results.items()}
+    return {name: np.array([(rates.ct, rates.mt, rates.it) for rates in every]) for name, every in results.items()}
 
 
 def claims(results: dict[str, list[CtMtIt]]) -> list[Claim]:
@@ -170,7 +170,7 @@ def change_of_mt(rows: Array) -> Array:
 
 def tens(every: list[CtMtIt], length: int) -> Array:
     """Means of ten windows each, (runs, length, 3)."""
-    return np.array([by_tens(one.per_window, length) for one in every])
+    return np.array([by_tens(rates.per_window, length) for rates in every])
 
 
 def _claim(

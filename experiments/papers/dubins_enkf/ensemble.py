@@ -49,17 +49,17 @@ class Simulation:
         self.truth = np.stack(truth)
         self.seen = self.truth + rng.standard_normal(self.truth.shape) * R_SIGMA
 
-    def follow(self, one: Filter[Any], measured: str = "all") -> Array:
+    def follow(self, filter: Filter[Any], measured: str = "all") -> Array:
         """Estimates (STEPS + 1, count, 4) of a filter on this simulation's motion."""
         index = list(MEASURED[measured])
         sensor = LinearMeasurement(np.eye(4)[index], np.diag(R_SIGMA[index] ** 2))
-        state = one.start(Gaussian(self.truth[0], np.diag(self.q**2)))
+        state = filter.start(Gaussian(self.truth[0], np.diag(self.q**2)))
         means = [self.truth[0]]
         for k, angle in enumerate(self.attack, start=1):
             # the control of this step, which the filter knows (equation 10)
             self.motion.attack = float(angle)
-            state = one.predict(state, DT)
-            state = one.update(state, np.ascontiguousarray(self.seen[k][:, index]), sensor).state
+            state = filter.predict(state, DT)
+            state = filter.update(state, np.ascontiguousarray(self.seen[k][:, index]), sensor).state
             means.append(state.mean)
         return np.array(means)
 
@@ -150,17 +150,17 @@ def _measured(fixed: Simulation, rng: np.random.Generator) -> list[Claim]:
 
 def _limits(*simulations: Simulation) -> list[Claim]:
     claims = []
-    for label, one in zip(("fixed attack", "changing attack"), simulations, strict=True):
-        speeds, k = one.truth[..., 1], one.motion.aerodynamics
-        lift = 0.5 * np.polyval(k.density, one.truth[:-1, :, 3]) * speeds[:-1] ** 2 * k.area
-        load = lift * np.polyval(k.lift, one.attack)[:, None] / (k.mass * k.gravity)
+    for label, simulation in zip(("fixed attack", "changing attack"), simulations, strict=True):
+        speeds, k = simulation.truth[..., 1], simulation.motion.aerodynamics
+        lift = 0.5 * np.polyval(k.density, simulation.truth[:-1, :, 3]) * speeds[:-1] ** 2 * k.area
+        load = lift * np.polyval(k.lift, simulation.attack)[:, None] / (k.mass * k.gravity)
         for what, value in (("least", speeds.min()), ("largest", speeds.max())):
             claims.append(Claim(f"{label}: {what} speed of all runs", "m/s", None, float(value), None,
                                 LIMITS["speed"], source="equation 4; limits chosen by us"))  # fmt: skip
         for what, value in (("least", load.min()), ("largest", load.max())):
             claims.append(Claim(f"{label}: {what} L / (m g) of all runs", "", None, float(value),
                                 source="equation 4; the paper gives no limit"))  # fmt: skip
-        heights = one.truth[..., 3]
+        heights = simulation.truth[..., 3]
         for what, value in (("least", heights.min()), ("largest", heights.max())):
             claims.append(Claim(f"{label}: {what} height of all runs", "m", None, float(value),
                                 source="equation 4; the paper gives no limit"))  # fmt: skip

@@ -67,11 +67,11 @@ def _angle(vector: Array) -> float:
 
 def judge() -> tuple[list[Claim], dict[str, Any]]:
     """Compare our paths with what the paper prints and shows."""
-    chosen, by_word = "chosen by us", {one.word: one for one in paths(FIRST, LAST, RADIUS)}
+    chosen, by_word = "chosen by us", {path.word: path for path in paths(FIRST, LAST, RADIUS)}
     best = shortest(FIRST, LAST, RADIUS)
     claims = [
-        Claim(f"without obstacle: length of {word}", "m", None, one.length, source="the paper prints no length")
-        for word, one in by_word.items()
+        Claim(f"without obstacle: length of {word}", "m", None, path.length, source="the paper prints no length")
+        for word, path in by_word.items()
     ]
     claims.append(
         Claim("without obstacle: shortest of the paper's four words, less RSR", "m", None,
@@ -86,7 +86,6 @@ def judge() -> tuple[list[Claim], dict[str, Any]]:
     ]  # fmt: skip
     # where the printed points come from: tangent points of another goal, found by the reading of heading and radius
     second = path(FIRST, Pose(0.0, 100.0 + 100.0 * math.tan(math.radians(15.0)), 0.0), RADIUS, "RSL")
-    assert second is not None
     for pose, printed, where in (
         (second.segments[1].start, PRINTED[0], "start"),
         (second.segments[1].end, PRINTED[1], "end"),
@@ -135,8 +134,8 @@ def judge() -> tuple[list[Claim], dict[str, Any]]:
     return claims, {"best": best, "free": free, "wide": wide, "srs": (start, first, last, goal)}
 
 
-def _tightest(one: Path) -> float:
-    return 1 / max(abs(segment.curvature) for segment in one.segments)
+def _tightest(path: Path) -> float:
+    return 1 / max(abs(segment.curvature) for segment in path.segments)
 
 
 def draw(figure: Any, shown: dict[str, Any]) -> None:
@@ -150,9 +149,9 @@ def draw(figure: Any, shown: dict[str, Any]) -> None:
         )  # fmt: skip
         panel.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
     for name, label, style in (("best", "shortest, as figure 2", "--"), ("wide", "around the obstacle", "-")):
-        one = shown[name]
-        points = one.sample(20.0, 0.05)[1]
-        left.plot(points[:, 0], points[:, 1], style, label=f"{label}: {one.word}, {one.length:.1f} m")
+        path = shown[name]
+        points = path.sample(20.0, 0.05)[1]
+        left.plot(points[:, 0], points[:, 1], style, label=f"{label}: {path.word}, {path.length:.1f} m")
     start, first, last, goal = shown["srs"]
     corners = np.array([(start.x, start.y), first, last, (goal.x, goal.y)])
     centre = np.array(OBSTACLE[:2])

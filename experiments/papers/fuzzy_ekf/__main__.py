@@ -86,7 +86,7 @@ def judge(name: str, flight: Flight, batch: Batch, rng: np.random.Generator) -> 
     tried = {label: errors(ExtendedKalmanFilter(m), batch) for turns in (False, True) for label, m in fixed(turns)}
 
     def best(*kinds: str) -> str:
-        return min((one for one in tried if one.startswith(kinds)), key=lambda one: tried[one].mean())
+        return min((name for name in tried if name.startswith(kinds)), key=lambda name: tried[name].mean())
 
     label, constant, turn_label = best("velocity", "acceleration"), best("acceleration"), best("turn")
     plain, turning = tried[label], tried[turn_label]

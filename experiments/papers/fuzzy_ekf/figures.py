@@ -19,16 +19,16 @@ def follow(batch: Batch) -> dict[str, Array]:
         "rules": published.published_filter(data),
     }
     found: dict[str, Array] = {}
-    for name, one in filters.items():
-        state: Any = one.start(batch.start(9)[:1])
+    for name, filter in filters.items():
+        state: Any = filter.start(batch.start(9)[:1])
         places, q, r = [], [], []
         for k in range(2, len(batch.truth)):
-            state = one.update(one.predict(state, 1.0), batch.measured[k, :1], batch.radar).state
+            state = filter.update(filter.predict(state, 1.0), batch.measured[k, :1], batch.radar).state
             places.append(state.mean[0, :3])
             if name == "rules":
                 alpha = (state.innovations[:, -1] ** 2).mean(axis=1)
                 q.append(float(state.process_scale[0, 0]))
-                r.append(float(filters["rules"].measurement(alpha)[0]))  # type: ignore[union-attr]
+                r.append(float(filters["rules"].measurement(alpha)[0]))
         found[name] = np.array(places)
         if name == "rules":
             found["q"], found["r"] = np.array(q), np.array(r)
@@ -62,7 +62,6 @@ def draw_published(figure: Any, batch: Batch) -> None:
         panel.plot(t, found[name], "C3")
         panel.set(title=f"{name}_k, as figure {number}", xlabel="time (s)")
     rules = published.published_filter(published.tuned())
-    assert rules.measurement is not None
     for panel, made, kind, title in (
         (panels[1, 0], rules.process[0], "input", "alpha, as figure 7"),
         (panels[1, 1], rules.process[0], "output", "q, as figure 8"),

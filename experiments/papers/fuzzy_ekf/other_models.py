@@ -20,8 +20,8 @@ from experiments.papers.fuzzy_ekf import published
 from experiments.papers.fuzzy_ekf.tuned_once import NOISES
 
 GRIDS = {
-    "Singer": [(Singer, *one) for one in product((5.0, 10.0, 20.0, 40.0), (1.0, 2.0, 5.0, 10.0, 20.0))],
-    "jerk": [(Jerk, *one) for one in product((1.0, 2.0, 5.0, 10.0, 20.0), (0.5, 1.0, 2.0, 5.0, 20.0))],
+    "Singer": [(Singer, *values) for values in product((5.0, 10.0, 20.0, 40.0), (1.0, 2.0, 5.0, 10.0, 20.0))],
+    "jerk": [(Jerk, *values) for values in product((1.0, 2.0, 5.0, 10.0, 20.0), (0.5, 1.0, 2.0, 5.0, 20.0))],
 }
 """Model, standard deviation (m/s^2, m/s^3), correlation time (s)."""
 
@@ -36,11 +36,11 @@ def experiment(
     """Tune each model, then compare on C to H; --quick has fewer runs."""
     flights = np.random.default_rng(published.tuned()["seed"])
     batch = Batch.draw(random_flights(50, flights), 1, flights)
-    noise = min(NOISES, key=lambda one: score(lambda: ExtendedKalmanFilter(ConstantAcceleration(one)), batch))
+    noise = min(NOISES, key=lambda noise: score(lambda: ExtendedKalmanFilter(ConstantAcceleration(noise)), batch))
     makers: dict[str, Callable[[], ExtendedKalmanFilter]] = {}
     claims = []
     for name, grid in grids.items():
-        found = [lambda one=one: ExtendedKalmanFilter(one[0](*one[1:])) for one in grid]
+        found = [lambda model=model: ExtendedKalmanFilter(model[0](*model[1:])) for model in grid]
         values = [score(make, batch) for make in found]
         makers[name] = found[int(np.argmin(values))]
         _, sigma, seconds = grid[int(np.argmin(values))]

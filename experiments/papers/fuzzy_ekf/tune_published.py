@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
         chosen.evaluations, chosen.seed,
     )  # fmt: skip
     data = from_vector(best)
-    ends = [float(np.exp(score(lambda: published_filter(data), one))) for one in (batch, others)]
+    ends = [float(np.exp(score(lambda: published_filter(data), flights))) for flights in (batch, others)]
     about = (
         f"{chosen.evaluations} evaluations on {chosen.flights} random flights: {begun:.1f} m at the start, "
         f"{ends[0]:.1f} m at the end, {ends[1]:.1f} m on as many other flights"

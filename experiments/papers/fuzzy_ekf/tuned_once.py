@@ -39,8 +39,8 @@ def by_equations(data: dict[str, Any], batch: Batch, current: bool) -> Array:
     """Squared position errors (K - 2, runs) by equations 21 to 36; S of alpha has R_k if `current`, otherwise R_0."""
     motion, radar = ConstantAcceleration(data["noise"]), batch.radar
     (F, Q), (infer_q, infer_r) = (
-        (one[0] for one in motion.matrices(1.0)),
-        (published.rules_of(data, one) for one in "qr"),
+        (matrix[0] for matrix in motion.matrices(1.0)),
+        (published.rules_of(data, noise) for noise in "qr"),
     )
     state, found = batch.start(9), []
     m, P = state.mean, state.covariance
@@ -62,7 +62,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Choose the noise, then compare on C to H; --quick has fewer runs."""
     flights = np.random.default_rng(published.tuned()["seed"])
     batch = Batch.draw(random_flights(50, flights), 1, flights)
-    noise = min(NOISES, key=lambda one: score(lambda: ExtendedKalmanFilter(ConstantAcceleration(one)), batch))
+    noise = min(NOISES, key=lambda noise: score(lambda: ExtendedKalmanFilter(ConstantAcceleration(noise)), batch))
     best = search(
         "sets as named", lambda x: score(lambda: published.published_filter(named(x)), batch), np.zeros(7),
         20 if quick else 200, 0,

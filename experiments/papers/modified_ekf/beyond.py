@@ -93,13 +93,13 @@ def about_matrices(rng: np.random.Generator) -> list[Claim]:
     """Compare the products of the matrices of section 4.1 with the model, and the second with its Jacobian."""
     motion = UnitRates(np.eye(6))
     states = START + rng.standard_normal((1000, 6))
-    both = [matrices(one) for one in states]
-    rates, steps = (np.array(one) for one in zip(*both, strict=True))
+    both = [matrices(state) for state in states]
+    rates, steps = (np.array(part) for part in zip(*both, strict=True))
     moved, jacobian = motion.propagate(states, DT), motion.jacobian(states, DT)
-    flown, turned = (np.einsum("bij,bj->bi", one, states) for one in (rates, steps))
+    flown, turned = (np.einsum("bij,bj->bi", matrix, states) for matrix in (rates, steps))
     # a step changes a state by little: what counts is the change
     least = np.abs(moved - states).max()
-    grown, derived = (one - np.eye(6) for one in (steps, jacobian))
+    grown, derived = (matrix - np.eye(6) for matrix in (steps, jacobian))
     rounding = (None, 1e-9)
     return [
         Claim("state-space matrices: largest difference of the continuous one's rates, relative", "", None,

@@ -86,23 +86,23 @@ def simulate(reading: str, count: int, rng: np.random.Generator) -> Runs:
     exact = true_sensor.measure(truth.reshape(-1, 6)[:, :3]).reshape(*truth.shape[:2], 3)
     seen = exact + rng.standard_normal(exact.shape) * true_sensor.noise
     estimates, innate = {}, 0.0
-    for name, (one, sensor) in filters.items():
-        estimates[name], spread = follow(one, sensor, seen)
+    for name, (filter, sensor) in filters.items():
+        estimates[name], spread = follow(filter, sensor, seen)
         if name == "EKF":
             innate = spread * float(np.linalg.norm(START[:3])) / float(sensor.noise[0])
     return Runs(truth, estimates, innate)
 
 
-def follow(one: Filter[Gaussian], sensor: Measurement, seen: Array) -> tuple[Array, float]:
+def follow(filter: Filter[Gaussian], sensor: Measurement, seen: Array) -> tuple[Array, float]:
     """Estimates (STEPS + 1, runs, 6) from measurements (STEPS + 1, runs, 3), and the mean prior variance of z[1]."""
-    state = one.start(Gaussian(np.tile(START, (seen.shape[1], 1)), P0 * np.eye(6)))
+    state = filter.start(Gaussian(np.tile(START, (seen.shape[1], 1)), P0 * np.eye(6)))
     means, spreads = [state.mean], []
     for z in seen[1:]:
-        state = one.predict(state, DT)
+        state = filter.predict(state, DT)
         own = state.covariance
         across = np.array([-state.mean[:, 1], state.mean[:, 0]]) / np.hypot(*state.mean[:, :2].T) ** 2
         spreads.append(float(np.einsum("ib,bij,jb->b", across, own[:, :2, :2], across).mean()))
-        state = one.update(state, z, sensor).state
+        state = filter.update(state, z, sensor).state
         means.append(state.mean)
     return np.stack(means), float(np.mean(spreads))
 
