@@ -22,6 +22,7 @@ from assoc._files.output import write_atomically
 from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
 from experiments.common.results import Results
+from experiments.metaheuristics import sweep
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 LARGEST = 250_000
@@ -195,9 +196,6 @@ def surfaces(kind: str) -> Callable[[Any], None]:
     """Return what draws the published surfaces of the ant colony on one kind of problem."""
 
     def draw(figure: Any) -> None:
-        from experiments.common.results import Results
-        from experiments.metaheuristics import sweep
-
         shown, size = sweep.pictures(Results(sweep.NAME).claims)[kind]
         figure.set_size_inches(*size)
         sweep.draw(figure, shown)
@@ -225,25 +223,12 @@ def reliability(figure: Any) -> None:
     axes.set(xlabel="probability given", ylabel="share that is true", xlim=(0, 1), ylim=(0, 1.02))
 
 
-PICTURES: dict[str, Callable[[Any], None]] = {
-    "first-sight": first_sight,
-    "scene": scene,
-    "solution": solution,
-    "ghosts": ghosts,
-    "gates": gates,
-    "costs": costs,
-    "convergence": convergence,
-    "pheromone": pheromone,
-    "heat-map": heat_map,
-    "tracks": tracks,
-    "metric": metric,
-    "overview": overview,
-    "surfaces-ghosts-20": surfaces("surfaces-ghosts-20"),
-    "surfaces-ghosts-40": surfaces("surfaces-ghosts-40"),
-    "surfaces-poor-radars": surfaces("surfaces-poor-radars"),
-    "stonesoup-fusion": stonesoup_fusion,
-    "reliability": reliability,
-}
+_DRAWN = (
+    first_sight, scene, solution, ghosts, gates, costs, convergence, pheromone, heat_map, tracks, metric, overview,
+    stonesoup_fusion, reliability,
+)  # fmt: skip
+PICTURES: dict[str, Callable[[Any], None]] = {draw.__name__.replace("_", "-"): draw for draw in _DRAWN}
+PICTURES |= {f"surfaces-{kind}": surfaces(f"surfaces-{kind}") for kind in ("ghosts-20", "ghosts-40", "poor-radars")}
 _NEEDS = {"report": "chromium and chromedriver are", "stonesoup-fusion": "stonesoup is"}
 
 

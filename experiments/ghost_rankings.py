@@ -16,7 +16,7 @@ from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from experiments.benchmarks.families import WIDE_GAPS
-from experiments.common.claims import Claim
+from experiments.common.claims import Claim, with_goal
 from experiments.common.command import main_of_parts
 from experiments.common.instances import FIRST_SEED, scenes
 from experiments.common.measuring import one_core, timed
@@ -81,9 +81,9 @@ def claims_of(name: str, kind: Kind, seeds: tuple[int, ...]) -> list[Claim]:
             checked += nothing_better(build_problem(scene, 0), ranking, _CHECK)
     claims = [
         Claim(f"{name}: scenes", "", None, len(seeds)),
-        Claim(f"{name}: proved", "", None, proved, None, (len(seeds), None), source="goal chosen by us"),
+        with_goal(f"{name}: proved", "", proved, least=len(seeds)),
         Claim(f"{name}: kbest, median", "s", None, float(np.median(seconds))),
-        Claim(f"{name}: kbest, longest", "s", None, max(seconds), None, (None, kind.goal), source="goal chosen by us"),
+        with_goal(f"{name}: kbest, longest", "s", max(seconds), most=kind.goal),
         Claim(f"{name}: marginals, median", "s", None, float(np.median(spent))),
         Claim(f"{name}: marginals, longest", "s", None, max(spent)),
         Claim(f"{name}: widest interval, median", "", None, float(np.median(unseen))),

@@ -23,13 +23,12 @@ from assoc.ranking.estimates.sampler import estimates
 from assoc.ranking.estimates.swept import swept
 from assoc.ranking.marginals import Marginals
 from assoc.simulation import simulate
-from experiments.common.claims import Claim
+from experiments.common.claims import Claim, with_goal
 from experiments.common.command import main_of_parts
 from experiments.common.instances import scenes
 from experiments.common.measuring import one_core, timed
 
 NAME = "probabilities"
-_GOAL = "goal chosen by us"
 # of the chains compared with, times the moves; of the sweeps, times the states
 _LONG, _STATES = 3.0, 8.0
 # seconds on the clock, where others may use the machine, and the goal for those of a core
@@ -84,13 +83,13 @@ def widths(name: str, seeds: Sequence[int]) -> list[Claim]:
             apart.append(float(away.mean()))
             furthest.append(float(away.max()))
     claims = [
-        Claim(f"{name}: mean width", "", None, float(np.mean(mean)), None, (None, goal), source=_GOAL),
-        Claim(f"{name}: seconds", "s", None, float(np.mean(seconds)), None, (None, limit), source=_GOAL),
+        with_goal(f"{name}: mean width", "", float(np.mean(mean)), most=goal),
+        with_goal(f"{name}: seconds", "s", float(np.mean(seconds)), most=limit),
     ]
     if taken:
         claims += [
-            Claim(f"{name}: estimate, seconds", "s", None, float(np.mean(taken)), None, (None, 2.0), source=_GOAL),
-            Claim(f"{name}: estimate, mean off longer runs", "", None, apart[0], None, (None, 0.02), source=_GOAL),
+            with_goal(f"{name}: estimate, seconds", "s", float(np.mean(taken)), most=2.0),
+            with_goal(f"{name}: estimate, mean off longer runs", "", apart[0], most=0.02),
             Claim(f"{name}: estimate, furthest off longer runs", "", None, furthest[0]),
         ]
     return claims

@@ -26,11 +26,10 @@ from assoc.simulation import simulate
 from assoc.sweeps import Setting, Study
 from assoc.sweeps.sources import StudySource
 from assoc.sweeps.study import Counts
-from experiments.common.claims import Claim
+from experiments.common.claims import Claim, with_goal
 from experiments.common.command import main
 
 WORKERS = 2
-GOAL = "goal chosen by us"
 GOALS = {"one process": 1.0, "two processes": 1.0, "dask": 5.0}
 KINDS = {"greedy": Setting("greedy", {}), "ant colony": Setting("aco", {"mode": "paper"})}
 
@@ -46,16 +45,8 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
             overhead, processor, start, solving = _overhead(study, backend)
             words = f"{kind}, {backend}"
             claims += [
-                Claim(f"{words}: overhead a run", "ms", None, 1e3 * overhead, None, (None, goal), source=GOAL),
-                Claim(
-                    f"{words}: processor time of the sweep, a run",
-                    "ms",
-                    None,
-                    1e3 * processor,
-                    None,
-                    (None, goal),
-                    source=GOAL,
-                ),
+                with_goal(f"{words}: overhead a run", "ms", 1e3 * overhead, most=goal),
+                with_goal(f"{words}: processor time of the sweep, a run", "ms", 1e3 * processor, most=goal),
                 Claim(f"{words}: in the solver, a run", "ms", None, 1e3 * solving),
                 Claim(f"{words}: until a tenth of {study.size} runs is done", "s", None, start),
             ]

@@ -16,7 +16,7 @@ from experiments.benchmarks.families import Case, Entry, cases, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all
 from experiments.common import contestants
-from experiments.common.command import above_zero, whole
+from experiments.common.command import whole
 
 TABLE, PAGES = Path("docs/benchmarks.csv"), (Path("README.md"), Path("paper.md"))
 # what a brief run gives other solvers, in seconds
@@ -44,13 +44,11 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--seeds", type=whole(1), metavar="N", help="seeds of each size at the most (default: each family's own number)"
     )
-    add("--peer-limit", type=above_zero, metavar="S", help="time limit of other solvers at the most, in seconds")
     text = f"everything in some 25 minutes: two seeds (ghosts up to ten), and other solvers get {_BRIEF_LIMIT:g} s"
     add("--brief", action="store_true", help=text)
     text = "seeds at a time, everybody on one core (default 1)"
     add("--processes", type=whole(1), default=1, metavar="N", help=text)
     add("--csv", type=Path, default=TABLE, metavar="FILE", help=f"the rows (default {TABLE})")
-    add("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
     text = "keep the rows of the CSV that this run does not measure (with --solvers: those of other solvers)"
     add("--update", action="store_true", help=text)
     text = "keep all rows of the CSV, and run only families and sizes that have none: go on after an interruption"
@@ -65,7 +63,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = _parser()
     options = parser.parse_args(argv)
     table: Path = options.csv
-    report: Path = options.markdown or table.with_suffix(".md")
+    report = table.with_suffix(".md")
     if options.report_only:
         if not table.exists():
             parser.error(f"--report-only: {table} does not exist")
@@ -123,7 +121,7 @@ def _measure(options: argparse.Namespace, done: set[tuple[str, str]]) -> Iterato
     chosen = [case for case in cases() if _to_run(case, options) and (case.family, case.size) not in done]
     if options.brief:
         chosen = [replace(case, seeds=case.seeds[: case.brief]) for case in chosen]
-    limit = options.peer_limit or (_BRIEF_LIMIT if options.brief else math.inf)
+    limit = _BRIEF_LIMIT if options.brief else math.inf
 
     def change(entry: Entry) -> Entry | None:
         if options.solvers and entry.solver not in options.solvers:

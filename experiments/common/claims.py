@@ -59,6 +59,14 @@ class Claim:
             put(self, "holds", bool(self.holds))
 
 
+GOAL = "goal chosen by us"
+
+
+def with_goal(quantity: str, unit: str, ours: float, *, least: float | None = None, most: float | None = None) -> Claim:
+    """Return what we measured where a goal of ours says how small or large it may be."""
+    return Claim(quantity, unit, ours=ours, band=(least, most), source=GOAL)
+
+
 def to_dict(claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> dict[str, Any]:
     """Return the claims as the JSON form "assoc.claims", version 1; `about` tells the settings."""
     return {

@@ -20,7 +20,7 @@ from assoc.recordings.autoferry import read_autoferry
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Initiation, LifeCycle, MovingTargets, Tracker
 from assoc.tracking.filter_choice import two_speeds
-from experiments.common.claims import Claim
+from experiments.common.claims import GOAL, Claim
 from experiments.common.command import make_parser, run
 
 CUTOFF, NEAR = 50.0, 25.0
@@ -173,7 +173,7 @@ def experiment(folder: Path, quick: bool, names: Sequence[str], sets: Sequence[s
                 claims.append(Claim(f"{label}, scenario {number}: GOSPA", "m", ours=j.gospa, source=source))
             mean = float(np.mean([j.gospa for j in results.values()]))
             band = (None, GOALS[which]) if name == "multi-sensor" else None
-            claims.append(Claim(f"{label}, mean: GOSPA", "m", ours=mean, band=band, source="goal chosen by us"))
+            claims.append(Claim(f"{label}, mean: GOSPA", "m", ours=mean, band=band, source=GOAL))
     return claims
 
 

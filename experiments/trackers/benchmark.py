@@ -19,10 +19,9 @@ import numpy as np
 from assoc._types import Array
 from assoc.metrics import gospa
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
-from experiments.common.claims import Claim
+from experiments.common.claims import GOAL, Claim, with_goal
 from experiments.common.command import above_zero, main, mean_interval
 from experiments.trackers import labelled
-from experiments.trackers.judging import GOAL
 from experiments.trackers.plane import Plane, simulate
 from experiments.trackers.running import in_plane
 
@@ -90,14 +89,14 @@ def against_peers(targets: int, clutter: float, scans: int, seeds: Sequence[int]
             Claim(f"{label}, {peer}: mean GOSPA, ours - theirs", "m", None, *better),
         ]
     ratio, (worse, interval), _ = _paired(found["mht"], found["mfa"])
-    low, high = interval or (worse, worse)
+    low, _ = interval or (worse, worse)
     claims += [
-        Claim(f"goal: {label}: CPU time, MFA / ours", "", ours=ratio, band=(TIMES_FASTER, None), source=GOAL),
+        with_goal(f"goal: {label}: CPU time, MFA / ours", "", ratio, least=TIMES_FASTER),
         Claim(f"goal: {label}: mean GOSPA, ours - MFA", "m", None, worse, interval, (None, 0.0), low <= ROUNDING, GOAL),
     ]
     _, (worse, interval), _ = _paired(found["mht"], found["gnn"])
     if clutter == max(CLUTTER):
-        low, high = interval or (worse, worse)
+        low, _ = interval or (worse, worse)
         what = f"goal: {label}: mean GOSPA, ours - GNN"
         claims.append(Claim(what, "m", None, worse, interval, (None, 0.0), low <= ROUNDING, GOAL))
     return claims

@@ -11,11 +11,10 @@ from functools import partial
 import numpy as np
 
 from assoc.tracking import HypothesisOrientedMHT, MultiSensorTracker, TrackOrientedMHT
-from experiments.common.claims import Claim
+from experiments.common.claims import Claim, with_goal
 from experiments.common.command import main
 from experiments.trackers.biases import flights
 from experiments.trackers.goals import NEAR, crowd, three_radar
-from experiments.trackers.judging import GOAL
 from experiments.trackers.running import through
 
 SCAN, MHT_SCAN, REID_SCAN = 1.0, 0.5, 0.1
@@ -31,7 +30,7 @@ def long_runs(quick: bool, seed: int) -> list[Claim]:
     alone = [run for run in found if np.isfinite(run.best)]
     gain = float(np.sqrt(np.mean([run.best for run in alone]) / np.mean([run.multi for run in alone])))
     lost = 100.0 * sum(run.lost for run in found) / sum(run.instants for run in found)
-    least = float(np.sqrt(2))
+
     length = 40 if quick else 1_000
     seconds, counts, _ = crowd(MultiSensorTracker, 60, length, seed)
     first, last = seconds[length // 10 : length // 2], seconds[length // 2 :]
@@ -41,9 +40,7 @@ def long_runs(quick: bool, seed: int) -> list[Claim]:
         Claim("three radars: instants without a track", "%", ours=lost),
         _most("three radars: false confirmed tracks", "", sum(run.false for run in found), 0.0),
         Claim("three radars: position RMSE", "m", ours=float(np.sqrt(np.mean([run.multi for run in found])))),
-        Claim(
-            "goal: three radars: RMSE of the best radar alone / ours", "", ours=gain, band=(least, None), source=GOAL
-        ),
+        with_goal("goal: three radars: RMSE of the best radar alone / ours", "", gain, least=float(np.sqrt(2))),
         _most(f"60 targets, {length} scans: median time of the second half / first half", "", slower, 1.1),
         Claim(f"60 targets, {length} scans: confirmed tracks at the end", "", ours=float(counts[-1])),
     ]
@@ -72,23 +69,16 @@ def crowds(quick: bool, seed: int) -> list[Claim]:
         _most(f"{many} targets: last third's time / second third's", "", float(halves[1] / halves[0]), 1.25),
         Claim(f"{many} targets: targets tracked at the end", "%", ours=100.0 * right / many),
         Claim(f"{many} targets: confirmed tracks at the end", "", ours=float(counts[-1])),
-        _most(
-            f"{some} targets, mht: time of a scan from the third on, largest", "s", float(hundreds[2:].max()), MHT_SCAN
-        ),
+        _most(f"{some} targets, mht: time of a scan from the third on, largest", "s", hundreds[2:].max(), MHT_SCAN),
         Claim(f"{some} targets, mht: time of the first two scans, largest", "s", ours=float(hundreds[:2].max())),
         Claim(f"{some} targets, mht: targets tracked at the end", "%", ours=100.0 * followed / some),
         _most(f"{hundred} aircraft, mht-hypothesis: not confirmed after {WITHIN} scans", "", int((~near).sum()), 0.0),
-        _most(
-            f"{hundred} aircraft, mht-hypothesis: time of a scan, median",
-            "s",
-            float(np.median(done.seconds)),
-            REID_SCAN,
-        ),
+        _most(f"{hundred} aircraft, mht-hypothesis: time of a scan, median", "s", np.median(done.seconds), REID_SCAN),
     ]
 
 
 def _most(quantity: str, unit: str, value: float, most: float) -> Claim:
-    return Claim(f"goal: {quantity}", unit, ours=value, band=(None, most), source=GOAL)
+    return with_goal(f"goal: {quantity}", unit, value, most=most)
 
 
 def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:

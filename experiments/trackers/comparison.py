@@ -53,22 +53,16 @@ def experiment(chosen: argparse.Namespace) -> list[Claim]:
     scenes = [simulation.simulate("three-radar", seed + k, scans=length) for k in range(count)]
     claims = compare("three radars", scenes, names)
     if chosen.file is not None:
-        values = {"file": chosen.file} | ({} if chosen.scans is None else {"scans": chosen.scans})
         runs = range(1 if chosen.quick else chosen.seeds)
-        claims += compare(
-            "recorded traffic", [simulation.simulate("from-tracks", seed + k, **values) for k in runs], names
-        )
+        scenes = [simulation.simulate("from-tracks", seed + k, file=chosen.file) for k in runs]
+        claims += compare("recorded traffic", scenes, names)
     return claims
-
-
-def _add_scans(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scans", type=int, metavar="N", help="scans of the recorded trajectories (default: all)")
 
 
 program = partial(
     main, "trackers.comparison", experiment, __doc__,
     options=(
-        add_recording, _add_scans, partial(add_seeds, default=3, of="runs on recorded trajectories", least=1),
+        add_recording, partial(add_seeds, default=3, of="runs on recorded trajectories", least=1),
         partial(add_only, names=NAMES),
     ),
     said=" {seeds} runs on recorded trajectories.",

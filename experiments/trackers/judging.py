@@ -9,7 +9,7 @@ from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, hota, identity, mean_gospa, ospa2
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Tracker
-from experiments.common.claims import Claim
+from experiments.common.claims import GOAL, Claim
 from experiments.common.command import mean_interval
 from experiments.trackers.oracle import OracleTracker
 from experiments.trackers.running import through
@@ -18,7 +18,6 @@ CUTOFF = 500.0
 """Of GOSPA (order 2), OSPA(2) and HOTA, metres."""
 NAMES = ("oracle", *TRACKERS, "GNN")
 AT_ONCE = "joint-probabilistic, all sensors"
-GOAL = "goal chosen by us"
 
 
 class Judged(NamedTuple):

@@ -192,7 +192,7 @@ def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
     def compared(words: str, unit: str, values: Any, measure: Any, **how: Any) -> Claim:
         # rounded, so that equal means tie
         interval = _ends(measure(resampled_means(values).round(9)))
-        known = None if paper is None or values is not runs.cycles else float(measure(paper))
+        known = None if paper is None or values is not cycles else float(measure(paper))
         # a difference holds if its whole interval is on the right side of zero
         certain = how.pop("certain", None)
         if certain is not None:
@@ -202,55 +202,27 @@ def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
         source = {"source": "section Simulasi and conclusion, in words"} | how
         return Claim(f"mode {mode}: {words}", unit, known, value, interval, **source)
 
-    rate, seconds = 100 * runs.optimal, 1e3 * runs.seconds
+    cycles, rate, seconds = runs.cycles, 100 * runs.optimal, 1e3 * runs.seconds
     found = []
     if paper is not None:
+        low, high = ((1 + sign * TOLERANCE) * float(paper.mean()) for sign in (-1, 1))
         found.append(
-            compared(
-                "mean cycles over all settings",
-                "cycles",
-                runs.cycles,
-                lambda m: m.mean(axis=-1),
-                band=((1 - TOLERANCE) * float(paper.mean()), (1 + TOLERANCE) * float(paper.mean())),
-                source="mean of table 1; band of 10 % chosen by us",
-            )
-        )
-    found += [
-        compared(
-            "largest less smallest mean cycles of a setting",
-            "cycles",
-            runs.cycles,
-            spread,
-            band=(0, 0.1),
-            source="table 1; 0.1 chosen by us",
-        ),
-        compared(
-            "cycles, alpha > beta less the others", "cycles", runs.cycles, contrast, band=(None, 0), certain="below"
-        ),
-        compared(
-            "certified optimal, alpha > beta less the others", "%", rate, contrast, band=(0, None), certain="above"
-        ),
-        compared("time, alpha > beta less the others", "ms", seconds, contrast, band=(None, 0), certain="below"),
-        compared("rank in cycles of alpha 2 beta 1 rho 0.3 of 24", "", runs.cycles, rank, band=(1, 1)),
-        compared(
-            "cycles, alpha 2 beta 1 rho 0.3 less the best other",
-            "cycles",
-            runs.cycles,
-            lead,
-            band=(None, 0),
-            certain="below",
-        ),
+            compared("mean cycles over all settings", "cycles", cycles, lambda m: m.mean(axis=-1), band=(low, high),
+                     source="mean of table 1; band of 10 % chosen by us")
+        )  # fmt: skip
+    below, above = {"band": (None, 0), "certain": "below"}, {"band": (0, None), "certain": "above"}
+    return found + [
+        compared("largest less smallest mean cycles of a setting", "cycles", cycles, spread, band=(0, 0.1),
+                 source="table 1; 0.1 chosen by us"),
+        compared("cycles, alpha > beta less the others", "cycles", cycles, contrast, **below),
+        compared("certified optimal, alpha > beta less the others", "%", rate, contrast, **above),
+        compared("time, alpha > beta less the others", "ms", seconds, contrast, **below),
+        compared("rank in cycles of alpha 2 beta 1 rho 0.3 of 24", "", cycles, rank, band=(1, 1)),
+        compared("cycles, alpha 2 beta 1 rho 0.3 less the best other", "cycles", cycles, lead, **below),
         compared("rank in time of alpha 2 beta 1 rho 0.3 of 24", "", seconds, rank, band=(1, 1)),
-        compared(
-            "least certified optimal of a setting",
-            "%",
-            rate,
-            lambda m: m.min(axis=-1),
-            band=(99, 100),
-            source="chosen by us",
-        ),
-    ]
-    return found
+        compared("least certified optimal of a setting", "%", rate, lambda m: m.min(axis=-1), band=(99, 100),
+                 source="chosen by us"),
+    ]  # fmt: skip
 
 
 def _ends(values: Any) -> tuple[float, float]:
