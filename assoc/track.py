@@ -134,7 +134,6 @@ def _has_plots(file: str) -> bool:
 def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -> Tracked:
     """Track the radars of a description."""
     from assoc._cli.track.radars_file import read_radars
-    from assoc.tracking import smoothed, track_scene
 
     given.check_use((*OF_SCENES, *OF_PLOTS), input="radars")
     if given["origin"] is not None:
@@ -144,29 +143,15 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) 
         raise InvalidInputError("--registration: online needs scans of one instant; take first")
     found = read_radars(file)
     settings["initiation"] = closing(settings["initiation"], found.closed)
-    scene, scans = _registered(found.scene, given, settings), range(found.scene.num_scans)
-    known = None if given["identity"] == "ignore" else found.identities
+    scene = _registered(found.scene, given, settings)
     tracker = make_tracker(
         given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, min(found.turns)
     )
-    (tracks, decisions), count = _watched(
-        given,
-        tracker,
-        scans,
-        lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
-        lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=known),
-        len(scans),
-    )
-    if given["smooth"]:
-        named, tracks = tracks, smoothed(tracker, scene, decisions)
-        tracks.take_names(named)
-    tracked = scene if count == scene.num_scans else scene.part(0, count)
-    return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
+    return _of_scans(scene, tracker, given, None if given["identity"] == "ignore" else found.identities)
 
 
 def _of_scene(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -> Tracked:
     from assoc.scene.scene import Scene
-    from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
 
     given.check_use((*OF_SCENES, *OF_PLOTS), input="scenes")
@@ -182,16 +167,25 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     name, pace = given["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = make_tracker(name, scene.sensors, given, settings, scene.region, pace, scene)
+    return _of_scans(scene, tracker, given)
+
+
+def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = None) -> Tracked:
+    """Track the scans of a scene."""
+    from assoc.tracking import smoothed, track_scene
+
     (tracks, decisions), count = _watched(
         given,
         tracker,
         range(scene.num_scans),
         lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
-        lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans),
+        lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=identities),
         scene.num_scans,
     )
     if given["smooth"]:
-        tracks = smoothed(tracker, scene, decisions)
+        named, tracks = tracks, smoothed(tracker, scene, decisions)
+        if identities is not None:
+            tracks.take_names(named)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
     return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
