@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 import os
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain, islice
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +18,9 @@ from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.altitude import GARBLED_CODES, NEARBY, garbled_altitudes
-from assoc.recordings.columns import COLUMNS, DAY, REQUIRED, UNITS, choose, code, number, seconds, whole
-from assoc.recordings.recording import UNDECODED, Recording, joined
+from assoc.recordings.columns import COLUMNS, UNITS, choose
+from assoc.recordings.recording import Recording, joined
+from assoc.recordings.table_rows import AIRCRAFT, ALTITUDE, BEARING, MODE3, RANGE, TIME, TableRows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,12 +29,8 @@ MAX_DISORDER = 30.0
 """Plots up to this late (s) are sorted in; later ones are an error."""
 
 MOST_PLOTS = 20_000_000
-_FARTHEST = 1e7
 # metres: no radar of plots sees farther; and plots from which on bearings within 2 pi degrees are no chance
 _REACH, _ENOUGH = 1.5e6, 10
-# what pandas takes for a number and `number` does not
-_NO_NUMBER = re.compile(r"(^|[,;\t])[ +-]*(nan|inf)", re.IGNORECASE | re.MULTILINE)
-_TIME, _RANGE, _BEARING, _MODE3, _ALTITUDE, _AIRCRAFT = range(len(COLUMNS))
 
 
 @door
@@ -124,8 +118,8 @@ class PlotReader:
             columns_of, units = choose(header, self._columns, self._units)
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.file}: {error}") from None
-        table = _Table(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator, self._at_once)
-        order = _Order(table, self._max_disorder)
+        table = TableRows(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator, self._at_once)
+        order = _Order(self.file, self._max_disorder)
         plots = _Plots(self.file.name, units, "aircraft" in columns_of, self._codes, self._at_once)
         for rows in table.of_frames(content) if parquet else table.of_lines(content):
             yield from plots.of(order.take(rows), last=False)
@@ -180,201 +174,23 @@ def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataF
     return [str(name) for name in next(content)], ",", content
 
 
-class _Table:
-    """Makes rows of a file into arrays with a column for each meaning, NaN where it is empty, and the line (n, 7)."""
-
-    def __init__(
-        self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, separator: str, at_once: int
-    ) -> None:
-        self.file, self._at_once = file, at_once
-        self.columns_of = columns_of
-        self.base, self.separator = base, separator
-        self.decimal = "." if separator == "," else ","
-        self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
-        self.fillers = self.midnights = self.blank = self.unread = 0
-        self.clock: bool | None = None
-        self.day = self.before = 0.0
-        self._begun = False
-
-    def of_lines(self, lines: Iterator[str]) -> Iterator[Array]:
-        """The rows of the lines that follow the header."""
-        done = 1
-        while block := list(islice(lines, self._at_once)):
-            text = "".join(block)
-            if '"' in text:
-                # what is in quotes may reach over several lines: the rest is read cell by cell
-                yield from self._slowly(chain(block, lines), done)
-                return
-            found = self._quickly(text, len(block), done)
-            yield from self._slowly(block, done) if found is None else (found,)
-            done += len(block)
-
-    def of_frames(self, frames: Iterator[pd.DataFrame]) -> Iterator[Array]:
-        """The rows of tables."""
-        done = 1
-        for frame in frames:
-            chosen = frame.iloc[:, list(self.columns_of.values())]
-            found = None
-            if all(kind.kind in "iu" or kind == np.float64 for kind in chosen.dtypes):
-                found = self._checked(chosen.to_numpy(dtype=np.float64), done)
-            if found is None:
-                yield from self._slowly(io.StringIO(frame.to_csv(index=False, header=False)), done)
-            else:
-                yield found
-            done += len(frame)
-
-    def _quickly(self, text: str, count: int, done: int) -> Array | None:
-        """Rows of plain numbers; None if there is anything else in them."""
-        import pandas as pd
-
-        text = text.replace("\r\n", "\n")
-        if self.clock or "\r" in text or _NO_NUMBER.search(text):
-            return None
-        # later versions read numbers exactly, and warn of the argument
-        exact: Any = (
-            {"float_precision": "round_trip"} if tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1) else {}
-        )
-        try:
-            frame = pd.read_csv(
-                io.StringIO(text), header=None, sep=self.separator, decimal=self.decimal, dtype=np.float64,
-                usecols=list(self.columns_of.values()), na_values=[""], keep_default_na=False, quoting=csv.QUOTE_NONE,
-                **exact,
-            )  # fmt: skip
-        except (ValueError, OverflowError):
-            return None
-        return self._checked(frame[list(self.columns_of.values())].to_numpy(), done) if len(frame) == count else None
-
-    def _checked(self, given: Array, done: int) -> Array | None:
-        """Rows (n, 7) of given columns (n, c), if nothing in them is unusual."""
-        rows = np.full((len(given), len(COLUMNS) + 1), np.nan)
-        rows[:, _MODE3], rows[:, _AIRCRAFT] = UNDECODED, -1.0
-        meanings = list(COLUMNS)
-        for column, meaning in zip(given.T, self.columns_of, strict=True):
-            empty = {"mode3": float(UNDECODED), "aircraft": -1.0}.get(meaning, np.nan)
-            rows[:, meanings.index(meaning)] = np.where(np.isnan(column), empty, column)
-        rows[:, -1] = done + 1 + np.arange(len(rows))
-        time, distance, bearing, mode3, altitude, aircraft = rows[:, :-1].T
-        usual = np.isfinite(rows[:, :_MODE3]).all(axis=1) & (np.abs(time) <= 1e12)
-        usual &= (distance >= 0) & (distance <= _FARTHEST) & (np.abs(bearing) <= 1000)
-        usual &= np.isnan(altitude) | (np.abs(altitude) <= _FARTHEST)
-        usual &= (distance != 0) | (bearing != 0)  # which may be a filler
-        usual &= (mode3 >= 0) & (mode3 < 2.0**53) & (mode3 == np.floor(mode3))
-        usual &= (aircraft >= -1) & (aircraft < 2.0**53) & (aircraft == np.floor(aircraft))
-        if not usual.all() or self.clock:
-            return None
-        if self.base == 8:
-            digits = mode3.astype(np.int64)[:, None] // 10 ** np.arange(4) % 10
-            if (mode3 > 7777).any() or (digits > 7).any():
-                return None
-            rows[:, _MODE3] = digits @ 8 ** np.arange(4)
-        self.clock, self._begun = False, self._begun or len(rows) > 0
-        return rows
-
-    def _slowly(self, lines: Iterable[str], done: int) -> Iterator[Array]:
-        """The rows of any lines, cell by cell; errors name the line."""
-        cells_of = csv.reader(lines, delimiter=self.separator)
-        rows: list[tuple[float, ...]] = []
-        try:
-            for cells in cells_of:
-                line = cells_of.line_num + done
-                row = self._row(cells, line)
-                if row is not None:
-                    rows.append((*row, line))
-                if len(rows) >= self._at_once:
-                    yield np.array(rows)
-                    rows = []
-        except csv.Error as error:
-            raise InvalidInputError(f"{self.file}: line {cells_of.line_num + done}: {error}") from None
-        if rows:
-            yield np.array(rows)
-
-    def _row(self, cells: list[str], line: int) -> tuple[float, ...] | None:
-        """The values of a row; None of one without a plot."""
-        if not any(cell.strip() for cell in cells):
-            return None
-        row = {}
-        for meaning, index in self.columns_of.items():
-            text = cells[index].strip().replace(self.decimal, ".") if index < len(cells) else ""
-            if not text and meaning in REQUIRED:
-                self.blank += 1
-                return None
-            try:
-                row[meaning] = self._value(meaning, text)
-            except (ValueError, OverflowError):
-                raise self._error(line, meaning, self._expected(meaning), text) from None
-        if row["range"] < 0 or row["range"] > _FARTHEST:
-            raise self._error(line, "range", f"0 to {_FARTHEST:g}", f"{row['range']:g}")
-        if abs(row["bearing"]) > 1000 or abs(row.get("altitude", 0.0)) > _FARTHEST or abs(row["time"]) > 1e12:
-            wrong = "bearing" if abs(row["bearing"]) > 1000 else "time" if abs(row["time"]) > 1e12 else "altitude"
-            raise self._error(line, wrong, "a number of usual size", f"{row[wrong]:g}")
-        # a row of zeros separates groups, as in tables 4.5 to 4.8 of the paper
-        if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
-            self.fillers += 1
-            return None
-        row["time"] = self._running(row["time"])
-        defaults = {"altitude": math.nan, "aircraft": -1.0, "mode3": float(UNDECODED)}
-        return tuple(row.get(meaning, defaults.get(meaning, math.nan)) for meaning in COLUMNS)
-
-    def _value(self, meaning: str, text: str) -> float:
-        if meaning == "time":
-            value, clock = seconds(text)
-            if self.clock not in (None, clock):
-                raise ValueError(text)
-            self.clock = clock
-            return value
-        if meaning == "mode3":
-            try:
-                return float(code(text, self.base))
-            except (ValueError, OverflowError):
-                self.unread += 1
-                return float(UNDECODED)
-        if meaning == "aircraft":
-            return float(whole(text)) if text else -1.0
-        if meaning == "altitude" and not text:
-            return math.nan
-        return number(text)
-
-    def _running(self, time: float) -> float:
-        """Let clock times run on over midnight: a fall by more than half a day is a new day."""
-        if self.clock and self._begun and time + self.day < self.before - DAY / 2:
-            self.day += DAY
-            self.midnights += 1
-        running = time + self.day
-        # a late plot of the day before
-        if self.clock and self.midnights and running > self.before + DAY / 2:
-            running -= DAY
-        self.before = max(self.before, running) if self._begun else running
-        self._begun = True
-        return running
-
-    def _expected(self, meaning: str) -> str:
-        if meaning == "time":
-            kind = {None: "seconds, h:mm:ss or an ISO date", True: "h:mm:ss", False: "seconds or an ISO date"}
-            return kind[self.clock]
-        return "a whole number" if meaning == "aircraft" else "a number"
-
-    def _error(self, line: int, meaning: str, expected: str, text: str) -> InvalidInputError:
-        name = self.names[meaning]
-        return InvalidInputError(f"{self.file}: line {line}, column {name!r}: expected {expected}, got {text[:60]!r}")
-
-
 class _Order:
     """Sorts rows by time that may be late, and leaves repeated ones out."""
 
-    def __init__(self, table: _Table, max_disorder: float) -> None:
-        self._table, self._max_disorder = table, max_disorder
+    def __init__(self, file: Path, max_disorder: float) -> None:
+        self._file, self._max_disorder = file, max_disorder
         self._waiting = np.zeros((0, len(COLUMNS) + 1))
         self._latest = -math.inf
         self.count = self.late = self.repeated = 0
 
     def take(self, rows: Array) -> Array:
         """Take rows in, and return those before which none can come any more."""
-        times = rows[:, _TIME]
+        times = rows[:, TIME]
         late = np.maximum(np.maximum.accumulate(times), self._latest) - times
         if (late > self._max_disorder).any():
             row = int(np.argmax(late > self._max_disorder))
             raise InvalidInputError(
-                f"{self._table.file}: line {rows[row, -1]:.0f}: the time jumps back by {late[row]:.6g} s, expected at "
+                f"{self._file}: line {rows[row, -1]:.0f}: the time jumps back by {late[row]:.6g} s, expected at "
                 f"most {self._max_disorder:g} s; split the file there (from Python: or allow more with max_disorder)"
             )
         self.count += len(rows)
@@ -388,10 +204,10 @@ class _Order:
         return self._out(math.inf)
 
     def _out(self, end: float) -> Array:
-        rows = self._waiting[np.argsort(self._waiting[:, _TIME], kind="stable")]
-        cut = int(np.searchsorted(rows[:, _TIME], end))
+        rows = self._waiting[np.argsort(self._waiting[:, TIME], kind="stable")]
+        cut = int(np.searchsorted(rows[:, TIME], end))
         self._waiting, rows = rows[cut:], rows[:cut]
-        same = np.flatnonzero(np.diff(rows[:, _TIME]) == 0)
+        same = np.flatnonzero(np.diff(rows[:, TIME]) == 0)
         if len(same):
             # missing values are equal to one another only
             twins = np.union1d(same, same + 1)
@@ -415,28 +231,28 @@ class _Plots:
     def of(self, rows: Array, *, last: bool) -> Iterator[Recording]:
         """Take rows in, and yield the plots that can be judged."""
         self._rows = np.concatenate([self._rows, rows])
-        times, begin = self._rows[:, _TIME], self._done
+        times, begin = self._rows[:, TIME], self._done
         end = len(times) if last or not len(times) else int(np.searchsorted(times, times[-1] - NEARBY))
         if end == begin or (end - begin < self._at_once and not last):
             return
         scale = {meaning: UNITS[meaning][unit] for meaning, unit in self._units.items()}
-        levels, identities = self._rows[:, _ALTITUDE], self._rows[:, _MODE3].astype(np.int64)
+        levels, identities = self._rows[:, ALTITUDE], self._rows[:, MODE3].astype(np.int64)
         in_levels = levels * scale["altitude"] / UNITS["altitude"]["fl"]
         garbled = garbled_altitudes(in_levels, identities, self._codes, times)[begin:end]
         rows = self._rows[begin:end]
         self._count += len(rows)
-        self._farthest = max(self._farthest, float(rows[:, _RANGE].max()))
-        self._least = min(self._least, float(np.abs(rows[:, _BEARING]).min()))
-        self._most = max(self._most, float(np.abs(rows[:, _BEARING]).max()))
+        self._farthest = max(self._farthest, float(rows[:, RANGE].max()))
+        self._least = min(self._least, float(np.abs(rows[:, BEARING]).min()))
+        self._most = max(self._most, float(np.abs(rows[:, BEARING]).max()))
         yield Recording(
-            times=rows[:, _TIME],
-            ranges=rows[:, _RANGE] * scale["range"],
-            azimuths=math.pi / 2 - rows[:, _BEARING] * scale["bearing"],
+            times=rows[:, TIME],
+            ranges=rows[:, RANGE] * scale["range"],
+            azimuths=math.pi / 2 - rows[:, BEARING] * scale["bearing"],
             identities=identities[begin:end],
-            altitudes=rows[:, _ALTITUDE] * scale["altitude"],
+            altitudes=rows[:, ALTITUDE] * scale["altitude"],
             garbled=garbled,
             lines=rows[:, -1].astype(np.int64),
-            sources=rows[:, _AIRCRAFT].astype(np.int64) if self._sources else None,
+            sources=rows[:, AIRCRAFT].astype(np.int64) if self._sources else None,
             name=self._name,
         )
         kept = int(np.searchsorted(times, times[end - 1] - NEARBY))

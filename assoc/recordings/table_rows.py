@@ -1,0 +1,206 @@
+"""Rows of radar plots in a CSV or Parquet file: cells as numbers, clocks that run on over midnight, errors by line."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain, islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.recordings.columns import COLUMNS, DAY, REQUIRED, code, number, seconds, whole
+from assoc.recordings.recording import UNDECODED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TIME, RANGE, BEARING, MODE3, ALTITUDE, AIRCRAFT = range(len(COLUMNS))
+"""Columns of the arrays; the last one, after these, is the line in the file."""
+_FARTHEST = 1e7
+# what pandas takes for a number and `number` does not
+_NO_NUMBER = re.compile(r"(^|[,;\t])[ +-]*(nan|inf)", re.IGNORECASE | re.MULTILINE)
+
+
+class TableRows:
+    """Makes rows of a file into arrays with a column for each meaning, NaN where it is empty, and the line (n, 7)."""
+
+    def __init__(
+        self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, separator: str, at_once: int
+    ) -> None:
+        self.file, self._at_once = file, at_once
+        self.columns_of = columns_of
+        self.base, self.separator = base, separator
+        self.decimal = "." if separator == "," else ","
+        self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
+        self.fillers = self.midnights = self.blank = self.unread = 0
+        self.clock: bool | None = None
+        self.day = self.before = 0.0
+        self._begun = False
+
+    def of_lines(self, lines: Iterator[str]) -> Iterator[Array]:
+        """The rows of the lines that follow the header."""
+        done = 1
+        while block := list(islice(lines, self._at_once)):
+            text = "".join(block)
+            if '"' in text:
+                # what is in quotes may reach over several lines: the rest is read cell by cell
+                yield from self._slowly(chain(block, lines), done)
+                return
+            found = self._quickly(text, len(block), done)
+            yield from self._slowly(block, done) if found is None else (found,)
+            done += len(block)
+
+    def of_frames(self, frames: Iterator[pd.DataFrame]) -> Iterator[Array]:
+        """The rows of tables."""
+        done = 1
+        for frame in frames:
+            chosen = frame.iloc[:, list(self.columns_of.values())]
+            found = None
+            if all(kind.kind in "iu" or kind == np.float64 for kind in chosen.dtypes):
+                found = self._checked(chosen.to_numpy(dtype=np.float64), done)
+            if found is None:
+                yield from self._slowly(io.StringIO(frame.to_csv(index=False, header=False)), done)
+            else:
+                yield found
+            done += len(frame)
+
+    def _quickly(self, text: str, count: int, done: int) -> Array | None:
+        """Rows of plain numbers; None if there is anything else in them."""
+        import pandas as pd
+
+        text = text.replace("\r\n", "\n")
+        if self.clock or "\r" in text or _NO_NUMBER.search(text):
+            return None
+        # later versions read numbers exactly, and warn of the argument
+        exact: Any = (
+            {"float_precision": "round_trip"} if tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1) else {}
+        )
+        try:
+            frame = pd.read_csv(
+                io.StringIO(text), header=None, sep=self.separator, decimal=self.decimal, dtype=np.float64,
+                usecols=list(self.columns_of.values()), na_values=[""], keep_default_na=False, quoting=csv.QUOTE_NONE,
+                **exact,
+            )  # fmt: skip
+        except (ValueError, OverflowError):
+            return None
+        return self._checked(frame[list(self.columns_of.values())].to_numpy(), done) if len(frame) == count else None
+
+    def _checked(self, given: Array, done: int) -> Array | None:
+        """Rows (n, 7) of given columns (n, c), if nothing in them is unusual."""
+        rows = np.full((len(given), len(COLUMNS) + 1), np.nan)
+        rows[:, MODE3], rows[:, AIRCRAFT] = UNDECODED, -1.0
+        meanings = list(COLUMNS)
+        for column, meaning in zip(given.T, self.columns_of, strict=True):
+            empty = {"mode3": float(UNDECODED), "aircraft": -1.0}.get(meaning, np.nan)
+            rows[:, meanings.index(meaning)] = np.where(np.isnan(column), empty, column)
+        rows[:, -1] = done + 1 + np.arange(len(rows))
+        time, distance, bearing, mode3, altitude, aircraft = rows[:, :-1].T
+        usual = np.isfinite(rows[:, :MODE3]).all(axis=1) & (np.abs(time) <= 1e12)
+        usual &= (distance >= 0) & (distance <= _FARTHEST) & (np.abs(bearing) <= 1000)
+        usual &= np.isnan(altitude) | (np.abs(altitude) <= _FARTHEST)
+        usual &= (distance != 0) | (bearing != 0)  # which may be a filler
+        usual &= (mode3 >= 0) & (mode3 < 2.0**53) & (mode3 == np.floor(mode3))
+        usual &= (aircraft >= -1) & (aircraft < 2.0**53) & (aircraft == np.floor(aircraft))
+        if not usual.all() or self.clock:
+            return None
+        if self.base == 8:
+            digits = mode3.astype(np.int64)[:, None] // 10 ** np.arange(4) % 10
+            if (mode3 > 7777).any() or (digits > 7).any():
+                return None
+            rows[:, MODE3] = digits @ 8 ** np.arange(4)
+        self.clock, self._begun = False, self._begun or len(rows) > 0
+        return rows
+
+    def _slowly(self, lines: Iterable[str], done: int) -> Iterator[Array]:
+        """The rows of any lines, cell by cell; errors name the line."""
+        cells_of = csv.reader(lines, delimiter=self.separator)
+        rows: list[tuple[float, ...]] = []
+        try:
+            for cells in cells_of:
+                line = cells_of.line_num + done
+                row = self._row(cells, line)
+                if row is not None:
+                    rows.append((*row, line))
+                if len(rows) >= self._at_once:
+                    yield np.array(rows)
+                    rows = []
+        except csv.Error as error:
+            raise InvalidInputError(f"{self.file}: line {cells_of.line_num + done}: {error}") from None
+        if rows:
+            yield np.array(rows)
+
+    def _row(self, cells: list[str], line: int) -> tuple[float, ...] | None:
+        """The values of a row; None of one without a plot."""
+        if not any(cell.strip() for cell in cells):
+            return None
+        row = {}
+        for meaning, index in self.columns_of.items():
+            text = cells[index].strip().replace(self.decimal, ".") if index < len(cells) else ""
+            if not text and meaning in REQUIRED:
+                self.blank += 1
+                return None
+            try:
+                row[meaning] = self._value(meaning, text)
+            except (ValueError, OverflowError):
+                raise self._error(line, meaning, self._expected(meaning), text) from None
+        if row["range"] < 0 or row["range"] > _FARTHEST:
+            raise self._error(line, "range", f"0 to {_FARTHEST:g}", f"{row['range']:g}")
+        if abs(row["bearing"]) > 1000 or abs(row.get("altitude", 0.0)) > _FARTHEST or abs(row["time"]) > 1e12:
+            wrong = "bearing" if abs(row["bearing"]) > 1000 else "time" if abs(row["time"]) > 1e12 else "altitude"
+            raise self._error(line, wrong, "a number of usual size", f"{row[wrong]:g}")
+        # a row of zeros separates groups, as in tables 4.5 to 4.8 of the paper
+        if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
+            self.fillers += 1
+            return None
+        row["time"] = self._running(row["time"])
+        defaults = {"altitude": math.nan, "aircraft": -1.0, "mode3": float(UNDECODED)}
+        return tuple(row.get(meaning, defaults.get(meaning, math.nan)) for meaning in COLUMNS)
+
+    def _value(self, meaning: str, text: str) -> float:
+        if meaning == "time":
+            value, clock = seconds(text)
+            if self.clock not in (None, clock):
+                raise ValueError(text)
+            self.clock = clock
+            return value
+        if meaning == "mode3":
+            try:
+                return float(code(text, self.base))
+            except (ValueError, OverflowError):
+                self.unread += 1
+                return float(UNDECODED)
+        if meaning == "aircraft":
+            return float(whole(text)) if text else -1.0
+        if meaning == "altitude" and not text:
+            return math.nan
+        return number(text)
+
+    def _running(self, time: float) -> float:
+        """Let clock times run on over midnight: a fall by more than half a day is a new day."""
+        if self.clock and self._begun and time + self.day < self.before - DAY / 2:
+            self.day += DAY
+            self.midnights += 1
+        running = time + self.day
+        # a late plot of the day before
+        if self.clock and self.midnights and running > self.before + DAY / 2:
+            running -= DAY
+        self.before = max(self.before, running) if self._begun else running
+        self._begun = True
+        return running
+
+    def _expected(self, meaning: str) -> str:
+        if meaning == "time":
+            kind = {None: "seconds, h:mm:ss or an ISO date", True: "h:mm:ss", False: "seconds or an ISO date"}
+            return kind[self.clock]
+        return "a whole number" if meaning == "aircraft" else "a number"
+
+    def _error(self, line: int, meaning: str, expected: str, text: str) -> InvalidInputError:
+        name = self.names[meaning]
+        return InvalidInputError(f"{self.file}: line {line}, column {name!r}: expected {expected}, got {text[:60]!r}")
