@@ -69,7 +69,7 @@ def plot_scene(
         ends = unit.factor * stacked(row)
         label = sensor.name or f"sensor {s + 1}"
         if _bears(sensor):
-            _rays(ax, unit.factor * sensor.position, ends, color=colour(s), linewidth=0.5, alpha=0.5, label=label)
+            draw_rays(ax, unit.factor * sensor.position, ends, color=colour(s), linewidth=0.5, alpha=0.5, label=label)
             continue
         size = 3.0 if scan is None else 7.0 - (s % 3)
         style: dict[str, Any] = {"markerfacecolor": "none"} if scan is not None else {"alpha": 0.5}
@@ -93,7 +93,8 @@ def _ends(scene: Scene, sensor: Sensor, z: Array, height: float) -> Array:
     return positions_of(sensor, z, height, distance)
 
 
-def _rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
+def draw_rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
+    """Draw lines from a sensor to these points (n, 2 or 3)."""
     lines = np.full((len(ends), 3, 2), np.nan)
     lines[:, 0], lines[:, 1] = site[:2], ends[:, :2]
     ax.plot(*lines.reshape(-1, 2).T, **style)
@@ -117,7 +118,7 @@ def _draw_gates(
 
             half = float(ndtri(0.5 + 0.5 * probability) * np.sqrt(sensor.covariance[0, 0]))
             for side in (-half, half):
-                _rays(ax, factor * sensor.position, factor * _ends(scene, sensor, z + side, height), **style)
+                draw_rays(ax, factor * sensor.position, factor * _ends(scene, sensor, z + side, height), **style)
             continue
         x, y = ellipses(positions_of(sensor, z, height, 0.0), position_covariances(sensor, z, height), probability)
         ax.plot(factor * x, factor * y, **style)

@@ -14,7 +14,7 @@ from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, 
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
 from assoc.plotting.ellipses import ellipses
 from assoc.plotting.measured import distances_to_border, positions_of, scan_of
-from assoc.plotting.scene import draw_sensors, draw_truth
+from assoc.plotting.scene import draw_rays, draw_sensors, draw_truth
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 
@@ -101,9 +101,7 @@ def plot_solution(
 
 def _bearings(ax: Any, site: Array, ends: Array, label: Array) -> None:
     for chosen, style in ((label >= 0, {"color": SKY}), (label < 0, {"color": GREY, "linestyle": ":"})):
-        lines = np.full((int(chosen.sum()), 3, 2), np.nan)
-        lines[:, 0], lines[:, 1] = site[:2], ends[chosen, :2]
-        ax.plot(*lines.reshape(-1, 2).T, linewidth=0.6, zorder=1, **style)
+        draw_rays(ax, site, ends[chosen], linewidth=0.6, zorder=1, **style)
 
 
 def measured_positions(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:

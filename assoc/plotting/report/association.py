@@ -13,7 +13,7 @@ from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source, warnings_of
 from assoc.errors import InvalidInputError
-from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, settings_section, sortable_table
 from assoc.plotting.report.pheromone import add_pheromone
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
@@ -199,7 +199,5 @@ def _sensors(sources: Sequence[Source], files: Sequence[str]) -> str:
 
 
 def _settings(association: Association, words: Sequence[str] | None) -> str:
-    made = made_with("assoc.solve", words)
-    command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     used = {"solver": association.solver, "seed": association.seed, **association.parameters}
-    return f"{command}<h3>Parameters</h3>{definitions(used)}<h3>Made with</h3>{definitions(made)}"
+    return settings_section(f"<h3>Parameters</h3>{definitions(used)}", "assoc.solve", words)

@@ -101,10 +101,17 @@ def _policy(scripts: Sequence[str]) -> str:
     return f"{nothing}; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"
 
 
-def made_with(program: str | None, words: Sequence[str] | None) -> dict[str, str]:
+def settings_section(settings: str, program: str, words: Sequence[str] | None) -> str:
+    """Return the HTML of settings with what is needed to make the report again before and below them."""
+    made = made_with(program, words)
+    command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
+    return f"{command}{settings}<h3>Made with</h3>{definitions(made)}"
+
+
+def made_with(program: str, words: Sequence[str] | None) -> dict[str, str]:
     """Return what is needed to make the report again: command, versions, machine, date."""
     content = {}
-    if program is not None and words is not None:
+    if words is not None:
         content["command"] = shlex.join(["python", "-m", program, *words])
     content["assoc"] = __version__
     content["Python"] = platform.python_version()

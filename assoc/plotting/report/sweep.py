@@ -13,7 +13,7 @@ import numpy as np
 from assoc._system.door import door
 from assoc._text.html import escape
 from assoc.plotting.heat_map import LABELS, cells
-from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, definitions, settings_section, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.views import number
 from assoc.plotting.study_figures import setting_title
@@ -73,13 +73,11 @@ def write_sweep_report(
     check_report()
     frame = load(folder) if frame is None else frame
     manifest = read_manifest(folder).to_dict()
-    made = made_with("assoc.sweep", words)
-    command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     used = {key: manifest[key] for key in ("seed", "time_limit")} | dict(manifest["gating"])
     sources = "".join(f"<li>{escape(source['name'])}</li>" for source in manifest["sources"])
-    settings = f"{command}<h3>Sources</h3><ul>{sources}</ul><h3>Study</h3>{definitions(used)}"
+    settings = f"<h3>Sources</h3><ul>{sources}</ul><h3>Study</h3>{definitions(used)}"
     settings += "".join(f"<h3>Parameters of {escape(solver)}</h3>{definitions(same)}" for solver, same in _fixed(frame))
-    settings += f"<h3>Made with</h3>{definitions(made)}"
+    settings = settings_section(settings, "assoc.sweep", words)
     name = Path(folder).resolve().name
     lead = f"Parameter study of {', '.join(map(str, frame['solver'].unique())) or 'nothing yet'}"
     if frame.empty:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._system.door import door
-from assoc._text.html import escape, warning_list
+from assoc._text.html import warning_list
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.metrics.trajectories import last_at_each_instant
 from assoc.plotting.measured import positions_of
-from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, settings_section, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.plots import plot_data
 from assoc.plotting.report.views import number, plain_numbers
@@ -104,8 +104,6 @@ def write_tracking_report(
     known = scene is not None and bool(truth)
     times, values = _gospa(frame, scene, cutoff) if known and scene is not None else (np.zeros(0), [])
     rows = _lives(frame, values)
-    made = made_with("assoc.track", words)
-    command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
     warnings = warning_list(() if scene is None else scene.warnings)
     sections = [("summary", "Summary", warnings + _summary(frame, len(rows), values, cutoff, plots))]
@@ -120,7 +118,7 @@ def write_tracking_report(
     sections += [
         ("numbers", "Number of tracks over time", _COUNTS),
         ("life", "Life of the tracks", _table(rows, known)),
-        ("settings", "Settings", f"{command}{shown}<h3>Made with</h3>{definitions(made)}"),
+        ("settings", "Settings", settings_section(shown, "assoc.track", words)),
     ]
     title = (scene.name if scene is not None else "") or name or "Tracks"
     data = _data(frame, scene, truth, plots)
