@@ -10,7 +10,7 @@ from assoc import live
 from assoc.scene import Scene
 from assoc.sensors import PositionSensor
 from assoc.tracking import TRACKERS, IdentityParameters, track_scene
-from assoc.tracking.adapting.identity_watch import MOST, IdentityWatch, Sight
+from assoc.tracking.adapting.identity_watch import MOST, IdentityWatch, TrackLookup
 from assoc.tracking.stages.identity_evidence import ship
 
 A, B, C = 0x3C6444, 0x4B1A22, 0x400001
@@ -30,14 +30,14 @@ NAMES = ["radar", "AIS"]
 def told(*plots, decimal=False, near=(), column=1, used=False):
     """What is found of plots (time, sensor, track, number), one in each step; `near`: tracks in one place."""
     watch = IdentityWatch(decimal=decimal)
-    sight = Sight(lambda track: [other for other in near if other != track and track in near], set)
+    lookup = TrackLookup(lambda track: [other for other in near if other != track and track in near], set)
     for k, (time, s, track, number) in enumerate(plots):
         pairs = [np.zeros((0, 2), dtype=np.int64)] * 2
         pairs[s] = np.zeros((1, 2), dtype=np.int64)
         pairs[s][0, column] = number
         taken = [np.full(len(pair), track) for pair in pairs]
         before, text = watch, watch.text()
-        watch = watch.after(k, time, NAMES, taken, [ids > 0 for ids in taken], None, pairs, sight, used=used)
+        watch = watch.after(k, time, NAMES, taken, [ids > 0 for ids in taken], None, pairs, lookup, used=used)
         assert before.text() == text and IdentityWatch.restored(watch.text()) == watch
     return [str(odd) for odd in watch.found]
 
@@ -123,11 +123,11 @@ def test_a_new_address_that_began_its_own_track():
 
 
 def test_memory_is_bounded():
-    watch, pairs, sight = IdentityWatch(), np.zeros((2, 2), dtype=np.int64), Sight(lambda _: (), set)
+    watch, pairs, lookup = IdentityWatch(), np.zeros((2, 2), dtype=np.int64), TrackLookup(lambda _: (), set)
     for k in range(10 * MOST):
         pairs[:, 1] = 1 + k // 9
         taken = [np.array([1, 2 + k])]
-        watch = watch.after(k, float(k), NAMES[:1], taken, [np.array([True, False])], None, [pairs[:, :]], sight)
+        watch = watch.after(k, float(k), NAMES[:1], taken, [np.array([True, False])], None, [pairs[:, :]], lookup)
     assert len(watch.voices) < 400 and len(watch.numbers) < 400 and len(watch.doubts) < 400
     assert len(watch.found) == MOST
 

@@ -1,14 +1,14 @@
-"""Identities that cannot all be right, told by name: which one, of which tracks, by which sensor, when.
+"""Identities that cannot all be right: which number, of which tracks, by which sensor, when.
 
-A transponder or an AIS that says a wrong code or address is seen in four ways: its track's address changes; a track
-with a new address goes on where another ended (a tracker that associates by addresses); two sensors say different ones
-of one track; two tracks have the same one at a time. A sensor's word counts once it has said the same of a confirmed
+A transponder or an AIS that sends a wrong code or address is noticed in four ways: its track's address changes; a track
+with a new address goes on where another ended (a tracker that associates by addresses); two sensors measure different
+ones on one track; two tracks have the same one at a time. A number counts once a sensor has measured it on a confirmed
 track three times in a row: single garbled or misplaced plots mean nothing. A code may change in flight, and codes that
-end in 00 are of many aircraft.
+end in 00 are shared by many aircraft.
 
-Tracks that swap plots where targets meet are no fault of identities. What is wrong survives a swap: an address that
-became another is heard no more, from any track; the new one was not that of another track. Two tracks with two
-addresses in common have exchanged plots.
+Tracks that swap plots where targets meet are no fault of identities. A real change survives a swap: the old address is
+measured on no track any more, and the new one was not that of another track. Two tracks with two addresses in common
+have exchanged plots.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from assoc._types import Array
 from assoc.tracking.stages.identity_evidence import UNKNOWN, address_text
 
 SURE = 3
-"""Equal identities in a row that a sensor must have said of a track."""
+"""Equal identities in a row that a sensor must have measured on a track."""
 SILENT = 6
-"""Reports of a new address in a row after which the old one, unheard meanwhile, is taken to have become it."""
+"""Plots in a row with a new address after which it replaces the old one, which was not measured meanwhile."""
 MOST = 1_000
-"""Odd identities that are remembered."""
+"""Odd identities that are kept."""
 _CODE = 0
 _FORGET = 100
 
@@ -48,7 +48,7 @@ class OddIdentity(NamedTuple):
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What is odd, whoever says it, and when."""
+        """What is odd, whichever sensor measured it, and whenever."""
         return self.kind, self.column, self.tracks, self.numbers
 
     def named(self, name: Callable[[int], int]) -> OddIdentity:
@@ -73,42 +73,42 @@ class OddIdentity(NamedTuple):
         return address_text(number)
 
 
-class Voice(NamedTuple):
-    """What one sensor says of one track; times in seconds."""
+class Series(NamedTuple):
+    """The numbers that one sensor measured on one track; times in seconds."""
 
-    said: int
-    """The last number."""
+    number: int
+    """The last one."""
     run: int
     """How often in a row."""
     begin: float
-    """When it said it first."""
+    """When first in this row."""
     before: float
     last: float
     """The last two times."""
     settled: int
-    """The last number that it said three times in a row."""
+    """The last number that came three times in a row."""
 
 
-class Heard(NamedTuple):
-    """Where a number was heard."""
+class LastSeen(NamedTuple):
+    """When and on which tracks a number was last measured."""
 
-    last: float
-    """When, of any track or none, seconds."""
+    time: float
+    """On any track or none, seconds."""
     scan: int
-    carriers: tuple[tuple[int, float], ...]
+    tracks: tuple[tuple[int, float], ...]
     """The last two confirmed tracks that had it, the newest first, and when."""
 
 
-class Doubt(NamedTuple):
-    """A number that may have become another one."""
+class Change(NamedTuple):
+    """A number that another one may have replaced."""
 
     number: int
     track: int
     since: float
-    """When the new one was first said, seconds."""
+    """When the new one was first measured, seconds."""
 
 
-class Sight(NamedTuple):
+class TrackLookup(NamedTuple):
     """What is known of tracks besides their identities."""
 
     near: Callable[[int], Sequence[int]]
@@ -122,19 +122,19 @@ class IdentityWatch(NamedTuple):
 
     decimal: bool = False
     """As of `OddIdentity`."""
-    voices: Mapping[tuple[int, int, str], Voice] = {}
+    series: Mapping[tuple[int, int, str], Series] = {}
     """By track, column and name of the sensor."""
-    numbers: Mapping[tuple[int, int], Heard] = {}
+    numbers: Mapping[tuple[int, int], LastSeen] = {}
     """By column and number."""
-    doubts: Mapping[tuple[int, int, str], Doubt] = {}
-    """As voices."""
+    changes: Mapping[tuple[int, int, str], Change] = {}
+    """By track, column and name of the sensor."""
     found: tuple[OddIdentity, ...] = ()
-    """What was found so far, at most 1,000."""
+    """Odd ones found so far, at most 1,000."""
     forget_at: int = _FORGET
 
     def after(
         self, scan: int, time: float, names: Sequence[str], taken: Sequence[Array], confirmed: Sequence[Array],
-        times: Sequence[Array] | None, identities: Sequence[Array], sight: Sight, *, used: bool = False,
+        times: Sequence[Array] | None, identities: Sequence[Array], lookup: TrackLookup, *, used: bool = False,
     ) -> IdentityWatch:  # fmt: skip
         """The watch after the measurements of a step.
 
@@ -150,13 +150,13 @@ class IdentityWatch(NamedTuple):
             Own times; None: that of the step.
         identities : sequence over sensors of int arrays (n_s, 2)
             Codes and addresses, 0 where there are none.
-        sight : Sight
+        lookup : TrackLookup
         used : bool
             Whether the tracker associates by addresses.
         """
         if not any(pairs.any() for pairs in identities):
             return self
-        hearing = _Hearing(self, scan, names, sight, used)
+        update = _Update(self, scan, names, lookup, used)
         for s, (ids, sure, pairs) in enumerate(zip(taken, confirmed, identities, strict=True)):
             known = pairs.any(axis=1)
             stamps = [time] * int(known.sum()) if times is None else times[s][known].tolist()
@@ -164,8 +164,8 @@ class IdentityWatch(NamedTuple):
             for track, certain, when, pair in rows:
                 for column, number in enumerate(pair):
                     if number != UNKNOWN:
-                        hearing.hear(track if certain else 0, column, names[s], when, number)
-        return hearing.watch()
+                        update.take(track if certain else 0, column, names[s], when, number)
+        return update.watch()
 
     def text(self) -> str:
         """The watch as JSON; `restored` reads it."""
@@ -175,14 +175,14 @@ class IdentityWatch(NamedTuple):
     @staticmethod
     def restored(text: str) -> IdentityWatch:
         """Read what `text` returned; ValueError or TypeError for anything else."""
-        decimal, voices, numbers, doubts, found, forget_at = json.loads(text)
+        decimal, series, numbers, changes, found, forget_at = json.loads(text)
         return IdentityWatch(
             bool(decimal),
-            {(int(t), int(c), str(s)): Voice(int(a), int(n), float(x), float(y), float(z), int(b))
-             for t, c, s, a, n, x, y, z, b in voices},
-            {(int(c), int(n)): Heard(float(last), int(scan), tuple((int(t), float(x)) for t, x in of))
+            {(int(t), int(c), str(s)): Series(int(a), int(n), float(x), float(y), float(z), int(b))
+             for t, c, s, a, n, x, y, z, b in series},
+            {(int(c), int(n)): LastSeen(float(last), int(scan), tuple((int(t), float(x)) for t, x in of))
              for c, n, last, scan, of in numbers},
-            {(int(t), int(c), str(s)): Doubt(int(n), int(o), float(x)) for t, c, s, n, o, x in doubts},
+            {(int(t), int(c), str(s)): Change(int(n), int(o), float(x)) for t, c, s, n, o, x in changes},
             tuple(_odd(*row) for row in found),
             int(forget_at),
         )  # fmt: skip
@@ -198,138 +198,137 @@ def _odd(time: Any, kind: Any, column: Any, tracks: Any, numbers: Any, sensors: 
     return found
 
 
-class _Hearing:
+class _Update:
     """The watch while the measurements of a step are taken in."""
 
-    def __init__(self, before: IdentityWatch, scan: int, names: Sequence[str], sight: Sight, used: bool) -> None:
-        self._before, self._scan, self._sight, self._used = before, scan, sight, used
+    def __init__(self, before: IdentityWatch, scan: int, names: Sequence[str], lookup: TrackLookup, used: bool) -> None:
+        self._before, self._scan, self._lookup, self._used = before, scan, lookup, used
         self._names = tuple(dict.fromkeys(names))
-        self._voices, self._numbers, self._doubts = dict(before.voices), dict(before.numbers), dict(before.doubts)
+        self._series, self._numbers, self._changes = dict(before.series), dict(before.numbers), dict(before.changes)
         self._found = list(before.found)
 
     def watch(self) -> IdentityWatch:
         """The watch now."""
         forget_at = self._before.forget_at
-        if max(len(self._voices), len(self._numbers)) > forget_at:
-            self._forget(self._sight.living())
-            forget_at = _FORGET + 2 * max(len(self._voices), len(self._numbers))
-        tables = self._voices, self._numbers, self._doubts
+        if max(len(self._series), len(self._numbers)) > forget_at:
+            self._forget(self._lookup.living())
+            forget_at = _FORGET + 2 * max(len(self._series), len(self._numbers))
+        tables = self._series, self._numbers, self._changes
         return self._before._replace(
-            voices=tables[0], numbers=tables[1], doubts=tables[2], found=tuple(self._found), forget_at=forget_at
+            series=tables[0], numbers=tables[1], changes=tables[2], found=tuple(self._found), forget_at=forget_at
         )
 
     def _forget(self, living: set[int]) -> None:
-        """Forget tracks that do not live, and numbers that only they had and that were not heard of late."""
-        self._voices = {key: voice for key, voice in self._voices.items() if key[0] in living}
-        self._doubts = {key: doubt for key, doubt in self._doubts.items() if key[0] in living}
+        """Forget tracks that do not live, and numbers that only they had and that were not measured lately."""
+        self._series = {key: series for key, series in self._series.items() if key[0] in living}
+        self._changes = {key: change for key, change in self._changes.items() if key[0] in living}
         late = self._scan - _FORGET
         self._numbers = {
-            key: heard
-            for key, heard in self._numbers.items()
-            if heard.scan > late or any(track in living for track, _ in heard.carriers)
+            key: seen
+            for key, seen in self._numbers.items()
+            if seen.scan > late or any(track in living for track, _ in seen.tracks)
         }
 
-    def hear(self, track: int, column: int, sensor: str, time: float, number: int) -> None:
-        """Take in what a sensor says of a confirmed track; 0: of something else."""
-        heard = self._numbers.get((column, number))
-        carriers = () if heard is None else heard.carriers
-        alone = len(carriers) == 1 and carriers[0][0] == track
-        others = () if alone else tuple(carrier for carrier in carriers if carrier[0] != track)
+    def take(self, track: int, column: int, sensor: str, time: float, number: int) -> None:
+        """Take in the number of a plot of a confirmed track; 0: of anything else."""
+        seen = self._numbers.get((column, number))
+        tracks = () if seen is None else seen.tracks
+        alone = len(tracks) == 1 and tracks[0][0] == track
+        others = () if alone else tuple(other for other in tracks if other[0] != track)
         if track:
-            carriers = ((track, time), *others[:1])
-        self._numbers[column, number] = Heard(time, self._scan, carriers)
+            tracks = ((track, time), *others[:1])
+        self._numbers[column, number] = LastSeen(time, self._scan, tracks)
         if not track:
             return
         key = track, column, sensor
-        voice = self._voices.get(key)
-        if voice is None:
-            voice = Voice(number, 1, time, time, time, UNKNOWN)
+        series = self._series.get(key)
+        if series is None:
+            series = Series(number, 1, time, time, time, UNKNOWN)
             if self._used and column != _CODE and not others:
                 self._find_predecessor(key, time)
-        elif voice.said == number:
-            voice = Voice(number, voice.run + 1, voice.begin, voice.last, time, voice.settled)
+        elif series.number == number:
+            series = Series(number, series.run + 1, series.begin, series.last, time, series.settled)
         else:
-            voice = Voice(number, 1, time, time, time, voice.settled)
-        if voice.run >= SURE:
-            if voice.settled != number:
-                self._settle(key, voice, others)
-                voice = voice._replace(settled=number)
-            if key in self._doubts:
-                self._judge(key, voice)
-        self._voices[key] = voice
-        if voice.run >= SURE:
+            series = Series(number, 1, time, time, time, series.settled)
+        if series.run >= SURE:
+            if series.settled != number:
+                self._settle(key, series, others)
+                series = series._replace(settled=number)
+            if key in self._changes:
+                self._judge(key, series)
+        self._series[key] = series
+        if series.run >= SURE:
             if others and not self._shared(column, number):
-                self._find_twins(key, voice, others)
+                self._find_twins(key, series, others)
             if len(self._names) > 1:
-                self._compare_sensors(key, voice)
+                self._compare_sensors(key, series)
 
     def _shared(self, column: int, number: int) -> bool:
         """Whether the last two octal digits of a code are 0: those are not of one aircraft."""
         return column == _CODE and number % (100 if self._before.decimal else 64) == 0
 
-    def _settle(self, key: tuple[int, int, str], voice: Voice, others: tuple[tuple[int, float], ...]) -> None:
-        """A sensor has said a new number of a track three times: was it another one before?"""
+    def _settle(self, key: tuple[int, int, str], series: Series, others: tuple[tuple[int, float], ...]) -> None:
+        """A new number came three times in a row: was it another one before?"""
         if others:
-            self._doubts.pop(key, None)
-        elif key[1] != _CODE and voice.settled != UNKNOWN:
-            self._doubts[key] = Doubt(voice.settled, key[0], voice.begin)
+            self._changes.pop(key, None)
+        elif key[1] != _CODE and series.settled != UNKNOWN:
+            self._changes[key] = Change(series.settled, key[0], series.begin)
 
     def _find_predecessor(self, key: tuple[int, int, str], time: float) -> None:
-        """A track is heard for the first time: may it go on where another, of another address, ended?"""
-        for other in self._sight.near(key[0]):
+        """A track has its first number: may it go on where another, of another address, ended?"""
+        for other in self._lookup.near(key[0]):
             for theirs in self._of(other, key[1]).values():
                 if theirs.settled != UNKNOWN:
-                    self._doubts[key] = Doubt(theirs.settled, other, time)
+                    self._changes[key] = Change(theirs.settled, other, time)
                     return
 
-    def _unheard(self, column: int, number: int, since: float) -> bool:
-        heard = self._numbers.get((column, number))
-        return heard is not None and heard.last < since
+    def _is_unseen(self, column: int, number: int, since: float) -> bool:
+        seen = self._numbers.get((column, number))
+        return seen is not None and seen.time < since
 
-    def _judge(self, key: tuple[int, int, str], voice: Voice) -> None:
-        """Whether a number that may have become another one is heard no more."""
-        (track, column, sensor), doubt = key, self._doubts[key]
-        if not self._unheard(column, doubt.number, doubt.since):
-            del self._doubts[key]
-        elif voice.run >= SILENT:
-            del self._doubts[key]
-            kind, tracks = ("became", (track,)) if doubt.track == track else ("goes on", (doubt.track, track))
-            self._add(voice.last, kind, column, tracks, (doubt.number, voice.said), (sensor,))
+    def _judge(self, key: tuple[int, int, str], series: Series) -> None:
+        """Whether a number that another one may have replaced is measured no more."""
+        (track, column, sensor), change = key, self._changes[key]
+        if not self._is_unseen(column, change.number, change.since):
+            del self._changes[key]
+        elif series.run >= SILENT:
+            del self._changes[key]
+            kind, tracks = ("became", (track,)) if change.track == track else ("goes on", (change.track, track))
+            self._add(series.last, kind, column, tracks, (change.number, series.number), (sensor,))
 
-    def _find_twins(self, key: tuple[int, int, str], voice: Voice, others: tuple[tuple[int, float], ...]) -> None:
+    def _find_twins(self, key: tuple[int, int, str], series: Series, others: tuple[tuple[int, float], ...]) -> None:
         """Is a number that of two tracks at once?"""
         track, column, sensor = key
         for other, when in others:
-            if when <= voice.begin:
+            if when <= series.begin:
                 continue
             mine, theirs = self._of(track, column), self._of(other, column)
-            if not any(their.said == voice.said and _at_once(voice, their) for their in theirs.values()):
+            if not any(their.number == series.number and _at_once(series, their) for their in theirs.values()):
                 continue
-            said = ({own.said for own in voices.values() if own.last >= voice.begin} for voices in (mine, theirs))
+            numbers = ({own.number for own in found.values() if own.last >= series.begin} for found in (mine, theirs))
             # two in common: they have exchanged plots
-            if len(set.intersection(*said)) == 1 and other not in self._sight.near(track):
-                self._add(voice.last, "twice", column, (min(track, other), max(track, other)), (voice.said,), (sensor,))
+            if len(set.intersection(*numbers)) == 1 and other not in self._lookup.near(track):
+                both = min(track, other), max(track, other)
+                self._add(series.last, "twice", column, both, (series.number,), (sensor,))
 
-    def _compare_sensors(self, key: tuple[int, int, str], voice: Voice) -> None:
-        """Do two sensors say different numbers of a track?"""
+    def _compare_sensors(self, key: tuple[int, int, str], series: Series) -> None:
+        """Do two sensors measure different numbers on a track?"""
         track, column, sensor = key
         for other in self._names:
-            theirs = self._voices.get((track, column, other))
-            if theirs is None or theirs.said == voice.said or not _at_once(voice, theirs):
+            theirs = self._series.get((track, column, other))
+            if theirs is None or theirs.number == series.number or not _at_once(series, theirs):
                 continue
-            since, pairs = min(voice.begin, theirs.begin), sorted([(voice.said, sensor), (theirs.said, other)])
+            since, pairs = min(series.begin, theirs.begin), sorted([(series.number, sensor), (theirs.number, other)])
             # what another track has is a matter of the two tracks
-            carriers = (
-                self._numbers[column, number].carriers for number, _ in pairs if (column, number) in self._numbers
-            )
-            if all(carrier == track or when < since for of in carriers for carrier, when in of):
+            tracks = (self._numbers[column, number].tracks for number, _ in pairs if (column, number) in self._numbers)
+            if all(found == track or when < since for of in tracks for found, when in of):
                 numbers, sensors = zip(*pairs, strict=True)
-                self._add(voice.last, "differ", column, (track,), numbers, sensors)
+                self._add(series.last, "differ", column, (track,), numbers, sensors)
 
-    def _of(self, track: int, column: int) -> dict[str, Voice]:
-        """What the sensors say of a track."""
-        found = {name: self._voices.get((track, column, name)) for name in self._names}
-        return {name: voice for name, voice in found.items() if voice is not None}
+    def _of(self, track: int, column: int) -> dict[str, Series]:
+        """The numbers of a track by sensor."""
+        found = {name: self._series.get((track, column, name)) for name in self._names}
+        return {name: series for name, series in found.items() if series is not None}
 
     def _add(self, time: float, kind: str, column: int, tracks: Any, numbers: Any, sensors: Any) -> None:
         odd = OddIdentity(time, kind, column, tracks, numbers, sensors, self._before.decimal)
@@ -337,9 +336,9 @@ class _Hearing:
             self._found.append(odd)
 
 
-def _at_once(voice: Voice, other: Voice) -> bool:
-    """Whether `voice`, heard now, and another have both been heard twice since the other's number was first said.
+def _at_once(series: Series, other: Series) -> bool:
+    """Whether `series`, measured now, and another both came twice since the other's number was first measured.
 
     A track that has ended, and takes one more plot of those of its successor, is not meant.
     """
-    return min(voice.run, other.run) >= SURE and voice.before > other.begin and other.before > voice.begin
+    return min(series.run, other.run) >= SURE and series.before > other.begin and other.before > series.begin

@@ -1,4 +1,4 @@
-"""Identities are watched: those that cannot all be right are told by name, `assoc.tracking.adapting.identity_watch`."""
+"""Finds identities that cannot all be right, by `assoc.tracking.adapting.identity_watch`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from assoc._text.plain import one_line
 from assoc.costs.gating import chi_square_quantiles
 from assoc.recordings.several import NO_HEIGHT
-from assoc.tracking.adapting.identity_watch import Sight
+from assoc.tracking.adapting.identity_watch import TrackLookup
 from assoc.tracking.births.nursery import current
 from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
@@ -17,7 +17,7 @@ _TOGETHER = 0.999
 
 
 def watch_identities(progress: Progress) -> Progress:
-    """Stage: take in what this scan's plots say of their tracks."""
+    """Stage: take in the identities of this scan's plots."""
     settings, state, scan, step = progress.settings, progress.state, progress.scan, progress.step
     if scan.identities is None:
         return progress
@@ -29,10 +29,10 @@ def watch_identities(progress: Progress) -> Progress:
     def tracks() -> TrackBatch:
         return TrackBatch.concatenate([current(settings, state), state.lost])
 
-    sight = Sight(lambda track: _near(progress, tracks(), track), lambda: {*tracks().track_id.tolist()})
+    lookup = TrackLookup(lambda track: _near(progress, tracks(), track), lambda: {*tracks().track_id.tolist()})
     used = settings.identity is not None
     watch = state.watch.after(
-        scan.index, scan.time, names, step.assigned, step.confirmed, scan.times, scan.identities, sight, used=used
+        scan.index, scan.time, names, step.assigned, step.confirmed, scan.times, scan.identities, lookup, used=used
     )
     return progress.with_state(watch=watch)
 
