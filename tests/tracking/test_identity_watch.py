@@ -128,7 +128,7 @@ def test_memory_is_bounded():
         pairs[:, 1] = 1 + k // 9
         taken = [np.array([1, 2 + k])]
         watch = watch.after(k, float(k), NAMES[:1], taken, [np.array([True, False])], None, [pairs[:, :]], lookup)
-    assert len(watch.voices) < 400 and len(watch.numbers) < 400 and len(watch.doubts) < 400
+    assert len(watch.series) < 400 and len(watch.numbers) < 400 and len(watch.changes) < 400
     assert len(watch.found) == MOST
 
 
