@@ -24,7 +24,7 @@ _ROWS, _TEXTS = 50_000, 10_000
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
-    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index, in half its time."""
+    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index, in less than half its time."""
     columns: list[list[str]] = []
     for name in frame:
         values = frame[name]
@@ -44,8 +44,19 @@ def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
 
 def _floats(values: Array) -> list[str]:
     """The shortest texts that are read as these numbers; empty for NaN."""
-    texts = [*map(repr, values.tolist())]
-    return ["" if text == "nan" else text for text in texts] if np.isnan(values).any() else texts
+    texts = np.empty(len(values), dtype=np.object_)
+    size = np.abs(values)
+    # pyarrow makes these texts in a fifth of the time; its whole numbers and exponents look otherwise
+    quick = (size > 1e-3) & (size < 1e9) & (values != np.rint(values))
+    try:
+        import pyarrow as pa
+    except ImportError:
+        quick[:] = False
+    if quick.any():
+        texts[quick] = pa.array(values[quick]).cast("string").to_numpy(zero_copy_only=False)
+    texts[~quick] = [*map(repr, values[~quick].tolist())]
+    texts[np.isnan(values)] = ""
+    return list(texts.tolist())
 
 
 def _cell(text: str) -> str:

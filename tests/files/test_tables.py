@@ -1,5 +1,7 @@
 """Tables as CSV."""
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -21,3 +23,19 @@ def test_the_text_is_that_of_pandas(rows):
     })  # fmt: skip
     for header in (True, False):
         assert csv_text(frame, header=header) == frame.to_csv(index=False, header=header, lineterminator="\n")
+
+
+@pytest.mark.parametrize("with_pyarrow", [True, False])
+def test_numbers_have_their_shortest_text(with_pyarrow, monkeypatch):
+    if with_pyarrow:
+        pytest.importorskip("pyarrow")
+    else:
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+    rng = np.random.default_rng(1)
+    sizes = 10.0 ** np.arange(-12, 20)
+    edges = np.concatenate([np.nextafter(sizes, 0.0), sizes, np.nextafter(sizes, np.inf)])
+    every = rng.integers(0, 2**63, 2_000).view(np.float64)
+    spread = sizes * rng.uniform(1.0, 10.0, (60, len(sizes)))
+    values = np.concatenate([edges, every[np.isfinite(every)], *spread, *np.round(spread, 3)])
+    values = np.concatenate([values, -values])
+    assert csv_text(pd.DataFrame({"value": values})).split() == ["value", *map(repr, values.tolist())]
