@@ -27,10 +27,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import assoc
+from assoc._types import Ints
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common import annealing, multi_frame_peer, packing_peers, peers
@@ -68,7 +66,7 @@ class Answer:
     cost: float
     bound: float | None
     seconds: float
-    tuples: NDArray[np.int32]
+    tuples: Ints
     proven: bool = False
     cpu: float = 0.0
 

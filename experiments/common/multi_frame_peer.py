@@ -12,8 +12,8 @@ nothing. Costs are against false alarms; a track's are raised together so that i
 import importlib.util
 
 import numpy as np
-from numpy.typing import NDArray
 
+from assoc._types import Ints
 from assoc.problem import AssignmentProblem
 from experiments.common.packing_peers import Chosen, savings, with_false_alarms
 
@@ -21,7 +21,7 @@ from experiments.common.packing_peers import Chosen, savings, with_false_alarms
 _MOST_CELLS = 60_000_000
 
 
-def _candidates(problem: AssignmentProblem) -> NDArray[np.intp]:
+def _candidates(problem: AssignmentProblem) -> Ints:
     """Tuples of two measurements or more that save something, by their first index; those without one last."""
     count = (problem.tuples > 0).sum(axis=1)
     chosen = np.flatnonzero((savings(problem) > 0) & (count > 1))

@@ -16,12 +16,12 @@ import os
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from assoc._types import Floats, Ints
 from assoc.problem import AssignmentProblem
 
-Chosen = tuple[NDArray[np.intp] | None, float | None, bool]
+Chosen = tuple[Ints | None, float | None, bool]
 
 # sums of weights stay below this: two of the codes count in 32 bits
 _MOST = 2.0e9
@@ -29,13 +29,13 @@ _MOST = 2.0e9
 _CONCURRENT = 4
 
 
-def _numbered(problem: AssignmentProblem) -> NDArray[np.int64]:
+def _numbered(problem: AssignmentProblem) -> Ints:
     """Measurement of each place of each tuple, numbered through all sensors; -1 for none."""
     offsets = np.concatenate([[0], np.cumsum(problem.sizes.astype(np.int64))[:-1]])
     return np.where(problem.tuples > 0, problem.tuples + offsets - 1, -1)
 
 
-def _singletons(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _singletons(problem: AssignmentProblem) -> tuple[Ints, Floats]:
     """Tuple and cost of each measurement as a false alarm."""
     rows = _numbered(problem)
     alone = np.flatnonzero((rows >= 0).sum(axis=1) == 1)
@@ -48,14 +48,14 @@ def _singletons(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[
     return where, cost
 
 
-def savings(problem: AssignmentProblem) -> NDArray[np.float64]:
+def savings(problem: AssignmentProblem) -> Floats:
     """What each tuple saves against its measurements as false alarms."""
     rows = _numbered(problem)
     _, alone = _singletons(problem)
     return np.where(rows >= 0, alone[rows], 0.0).sum(axis=1) - problem.costs
 
 
-def with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+def with_false_alarms(problem: AssignmentProblem, chosen: Ints) -> Ints:
     """Chosen tuples, and the false alarms that are left; places in the problem."""
     where, _ = _singletons(problem)
     rows = _numbered(problem)[chosen]
@@ -64,7 +64,7 @@ def with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> N
     return np.concatenate([chosen, where[free]]).astype(np.intp)
 
 
-def conflict_graph(problem: AssignmentProblem) -> tuple[NDArray[np.intp], NDArray[np.int64], Any]:
+def conflict_graph(problem: AssignmentProblem) -> tuple[Ints, Ints, Any]:
     """Return the vertices (tuples), their weights as whole numbers, and the adjacency as a sparse array.
 
     Raises ValueError: A problem without dummies: its best solution need not be an independent set of greatest weight.

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csc_array
 
+from assoc._types import Array, Floats, Ints
 from assoc.problem import AssignmentProblem
 from experiments.common.packing_peers import Chosen
 
@@ -16,7 +16,7 @@ CP_SAT_SCALE = 1e6
 DENSE_LIMIT = 8_000_000
 
 
-def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+def _rows(problem: AssignmentProblem) -> tuple[Ints, Ints, Array]:
     """Return (measurement, tuple) of each non-zero index, and which measurements must be covered."""
     sizes = problem.sizes.astype(np.int64)
     offsets = np.concatenate([[0], np.cumsum(sizes)])
@@ -95,9 +95,7 @@ def scip(threads: int, problem: AssignmentProblem, time_limit: float) -> Chosen:
         mathopt.Model.from_model_proto(proto),
         mathopt.SolverType.GSCIP,
         params=mathopt.SolveParameters(
-            threads=threads,
-            relative_gap_tolerance=0.0,
-            time_limit=datetime.timedelta(seconds=time_limit),
+            threads=threads, relative_gap_tolerance=0.0, time_limit=datetime.timedelta(seconds=time_limit)
         ),
     )
     bound = result.best_objective_bound()
@@ -107,7 +105,7 @@ def scip(threads: int, problem: AssignmentProblem, time_limit: float) -> Chosen:
     return np.flatnonzero(values > 0.5), bound, result.termination.reason == mathopt.TerminationReason.OPTIMAL
 
 
-def by_milp(problem: AssignmentProblem, time_limit: float, forbidden: Iterable[NDArray[np.integer]] = ()) -> Any:
+def by_milp(problem: AssignmentProblem, time_limit: float, forbidden: Iterable[Ints] = ()) -> Any:
     """HiGHS's result; forbidden are solutions that do not count, each by the indices of its tuples."""
     row, column, must = _rows(problem)
     matrix = csc_array((np.ones(row.size), (row, column)), shape=(len(must), problem.num_tuples))
@@ -177,7 +175,7 @@ def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
     return np.array([listed[key] for key in keys], dtype=np.intp), bound, result.converged and square
 
 
-def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) -> None:
+def _fill_with_dummies(tensor: Floats, problem: AssignmentProblem) -> None:
     """Write the costs into every place where a 0 may be any of the dummies of its sensor."""
     sizes = problem.sizes.tolist()
     tensor[tuple(slice(size, None) for size in sizes)] = 0.0

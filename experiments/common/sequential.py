@@ -1,13 +1,13 @@
 """Sensor by sensor, one two-dimensional assignment each: what most trackers do."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from assoc._types import Floats, Ints
 from assoc.problem import AssignmentProblem
 
 
-def assign_in_turn(problem: AssignmentProblem, time_limit: float) -> tuple[NDArray[np.intp] | None, float | None, bool]:
+def assign_in_turn(problem: AssignmentProblem, time_limit: float) -> tuple[Ints | None, float | None, bool]:
     """Assign sensor after sensor to the clusters so far; a cluster's cost is its tuple over the sensors seen.
 
     With dummies a cluster costs what its tuple with all later sensors missed costs, and one that is not
@@ -43,7 +43,7 @@ def assign_in_turn(problem: AssignmentProblem, time_limit: float) -> tuple[NDArr
     return np.array(chosen, dtype=np.intp), None, False
 
 
-def _prefix_costs(prefixes: NDArray[np.int32], costs: NDArray[np.float64]) -> dict[tuple[int, ...], float]:
+def _prefix_costs(prefixes: Ints, costs: Floats) -> dict[tuple[int, ...], float]:
     """Return the least cost of any listed tuple that begins with each prefix."""
     keys, inverse = np.unique(prefixes, axis=0, return_inverse=True)
     least = np.full(len(keys), np.inf)
@@ -51,14 +51,7 @@ def _prefix_costs(prefixes: NDArray[np.int32], costs: NDArray[np.float64]) -> di
     return {tuple(key): cost for key, cost in zip(keys.tolist(), least.tolist(), strict=True)}
 
 
-def _extend(
-    clusters: NDArray[np.int32],
-    matrix: NDArray[np.float64],
-    now: NDArray[np.float64],
-    alone: NDArray[np.float64],
-    *,
-    must_pair: bool,
-) -> NDArray[np.int32]:
+def _extend(clusters: Ints, matrix: Floats, now: Floats, alone: Floats, *, must_pair: bool) -> Ints:
     """Solve one 2-D assignment of clusters to measurements and append its column."""
     num, size = matrix.shape
     large = 1e6

@@ -35,12 +35,7 @@ from experiments.metaheuristics.running import UNLIMITED, log
 
 NAME = "metaheuristics.sweep"
 Grid = Mapping[str, tuple[float, ...]]
-GRID: Grid = {
-    "alpha": (0.0, 1.0, 2.0),
-    "beta": (1.0, 2.0, 4.0),
-    "rho": (0.3, 0.9),
-    "ants": (5, 15, 45),
-}
+GRID: Grid = {"alpha": (0.0, 1.0, 2.0), "beta": (1.0, 2.0, 4.0), "rho": (0.3, 0.9), "ants": (5, 15, 45)}
 ADVICE = {"alpha": 2.0, "beta": 1.0, "rho": 0.3, "ants": 15}
 """What table 1 of the paper ends with, and the defaults of `AcoParameters`."""
 SURFACES = (("alpha", "beta"), ("rho", "ants"))

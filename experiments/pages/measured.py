@@ -1,6 +1,7 @@
 """Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 from experiments.common.claims import Claim
@@ -157,13 +158,10 @@ def batch() -> str:
     return table(["EKF, batch of 10,000, microseconds a track (goal: 2)", ""], rows)
 
 
-def overhead() -> str:
-    """The overhead of a run in a parameter study."""
-    r = Results("sweep_overhead")
-    parts = ("overhead a run", "processor time of the sweep, a run", "in the solver, a run")
-    backends = ("one process", "two processes", "dask")
-    kinds = [f"{kind}, {backend}" for kind in ("greedy", "ant colony") for backend in backends]
-    return table(["ms", *parts], _grid(r, kinds, parts, 2))
+def _plain(name: str, corner: str, parts: Sequence[str], digits: int = 3) -> str:
+    """Judged figures of an experiment: a row for each kind of problems of which the first part was measured."""
+    r = Results(name)
+    return table([corner, *parts], _grid(r, labels(r, f": {parts[0]}"), parts, digits))
 
 
 def scan_time() -> str:
@@ -188,14 +186,6 @@ def ghost_rankings() -> str:
             number(r[f"{kind}: widest interval, median"].ours, 2),
         ])  # fmt: skip
     return table(["", "proved", *(f"{time}, s" for time in times), "widest interval, median"], rows)
-
-
-def probabilities() -> str:
-    """Mean width of certified intervals of probabilities, and estimates beside long chains."""
-    r = Results("probabilities")
-    what = ("mean width", "seconds", "estimate, seconds", "estimate, mean off longer runs",
-            "estimate, furthest off longer runs")  # fmt: skip
-    return table(["", *what], _grid(r, labels(r, ": mean width"), what))
 
 
 def probabilities_beside() -> str:
@@ -252,14 +242,6 @@ def scale_trackers() -> str:
             worst, median = (number(r[f"{kind}: exponent of {part}"].ours) for part in ("worst", "median"))
             rows.append([f"`{kind}`: grows with the power", worst, "", median, "", ""])
     return table(["tracker, targets", "worst scan, s", "which", "median, s", "peak, MB", "tracked, %"], rows)
-
-
-def large_components() -> str:
-    """Problems that are one large component, beside HiGHS or scipy; bold where a goal is missed."""
-    r = Results("large_components")
-    kinds = dict.fromkeys(c.quantity.rpartition(": ")[0] for c in r.claims)
-    what = ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio")
-    return table(["problems", *what], _grid(r, kinds, what))
 
 
 def first_call(folder: Path = RESULTS) -> str:
@@ -410,9 +392,8 @@ def prior() -> str:
 def recordings_speed() -> str:
     """Plots a second and memory of recordings, and what two processes gain."""
     r = Results("scale.recordings")
-    runs = [claim.quantity.rpartition(":")[0] for claim in r.claims if claim.quantity.endswith(": memory")]
     rows = []
-    for run in runs:
+    for run in labels(r, ": memory"):
         rate, memory = r[f"{run}: plots a second"], r[f"{run}: memory"]
         goals = number((rate.band or (0.0,))[0] or 0.0), number((memory.band or (0.0, 0.0))[1] or 0.0)
         rows.append([run, _judged(rate), goals[0], _judged(memory), goals[1]])
@@ -435,19 +416,29 @@ TABLES = {
     "speed-ratios": speed_ratios,
     "batch": batch,
     "traffic": traffic,
-    "overhead": overhead,
+    "overhead": partial(
+        _plain, "sweep_overhead", "ms",
+        ("overhead a run", "processor time of the sweep, a run", "in the solver, a run"), 2,
+    ),
     "ant-colony": ant_colony,
     "readings": readings,
     "first-call": first_call,
     "linear-programs": linear_programs,
     "scan-time": scan_time,
-    "large-components": large_components,
+    "large-components": partial(
+        _plain, "large_components", "problems",
+        ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio"),
+    ),
     "scale-scans": scale_scans,
     "scale-trackers": scale_trackers,
     "ghost-rankings": ghost_rankings,
-    "probabilities": probabilities,
+    "probabilities": partial(
+        _plain, "probabilities", "",
+        ("mean width", "seconds", "estimate, seconds", "estimate, mean off longer runs",
+         "estimate, furthest off longer runs"),
+    ),
     "probabilities-beside": probabilities_beside,
     "sizes": sizes,
     "extras": extras,
     "prior": prior,
-}
+}  # fmt: skip

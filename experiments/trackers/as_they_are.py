@@ -27,16 +27,7 @@ from experiments.common.claims import Claim
 from experiments.common.command import add_only, make_parser, run, whole
 from experiments.trackers.judging import CUTOFF, goal, mean_claim
 from experiments.trackers.oracle import OracleTracker
-from experiments.trackers.real_scenes import (
-    ADAPTING,
-    ROWS,
-    SCANS,
-    SITES,
-    Case,
-    Row,
-    flat_states,
-    untold_views,
-)
+from experiments.trackers.real_scenes import ADAPTING, ROWS, SCANS, SITES, Case, Row, flat_states, untold_views
 from experiments.trackers.running import through
 from experiments.trackers.sites import Sites
 

@@ -6,21 +6,15 @@ Units are the library's: metres and radians. Problems are made from scenes by ``
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from assoc._types import Floats
 from assoc.scene import Scene, Truth
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D, Sensor
 
 KM = 1000.0
 
 
-def single_scan(
-    sensors: list[Sensor],
-    positions: NDArray[np.float64],
-    region: NDArray[np.float64],
-    rng: np.random.Generator,
-    name: str,
-) -> Scene:
+def single_scan(sensors: list[Sensor], positions: Floats, region: Floats, rng: np.random.Generator, name: str) -> Scene:
     """Let sensors see targets once: detections with noise, Poisson false alarms, all in random order."""
     measurements, sources = [], []
     for sensor in sensors:

@@ -1,9 +1,9 @@
 """Problems drawn as numbers, without a scene: axial, planted with dummies, and two-dimensional ones."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from assoc._types import Floats, Ints
 from assoc.problem import AssignmentProblem
 
 _MAX_GRID = 30_000
@@ -54,16 +54,16 @@ def axial_known_optimum(n: int, seed: int) -> tuple[AssignmentProblem, float]:
     return AssignmentProblem.from_dense(costs[rng.permutation(n)], dummy=False), float(suffix[0])
 
 
-def _least_compatible(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _least_compatible(values: Floats) -> Floats:
     """Return for every (j, k) the smallest value outside row j and column k."""
     n = len(values)
     index = np.arange(n)
     # Row j and column k hold 2 n - 1 values, so one of the 2 n smallest is outside both.
-    order: NDArray[np.intp] = np.argsort(values.ravel(), kind="stable")[: 2 * n]
+    order: Ints = np.argsort(values.ravel(), kind="stable")[: 2 * n]
     order_rows, order_columns = order // n, order % n
     outside = (index[:, None, None] != order_rows) & (index[None, :, None] != order_columns)
     first = np.argmax(outside, axis=-1)
-    least: NDArray[np.float64] = values[order_rows[first], order_columns[first]]
+    least: Floats = values[order_rows[first], order_columns[first]]
     return least
 
 

@@ -103,12 +103,7 @@ class NearestNeighbourTracker:
         tracks, plots = tracks[good], plots[good]
         P, z = covariance[tracks, plots], off[tracks, plots]
         K = P[:, :, :2] @ np.linalg.inv(S[tracks, plots])
-        return (
-            tracks,
-            plots,
-            mean[tracks, plots] + np.einsum("kij,kj->ki", K, z),
-            P - K @ P[:, :2],
-        )
+        return (tracks, plots, mean[tracks, plots] + np.einsum("kij,kj->ki", K, z), P - K @ P[:, :2])
 
     def _start(self, places: Array, noises: Array, now: Array) -> None:
         count = len(places)
