@@ -7,6 +7,7 @@ something better with the ten forbidden: it must not find any. Processor time of
 compiled, from the candidate tuples on: building them counts, too.
 """
 
+from argparse import Namespace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from experiments.benchmarks.families import WIDE_GAPS
 from experiments.common.claims import Claim, with_goal
-from experiments.common.command import main_of_parts
+from experiments.common.command import main
 from experiments.common.instances import FIRST_SEED, scenes
 from experiments.common.measuring import one_core, timed
 from experiments.common.peers import by_milp
@@ -93,7 +94,7 @@ def claims_of(name: str, kind: Kind, seeds: tuple[int, ...]) -> list[Claim]:
     return claims
 
 
-def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Rank scenes of these kinds."""
     claims = []
     with one_core():
@@ -101,10 +102,10 @@ def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
         scene = scenes.ghost(20, 0)
         assoc.kbest(build_problem(scene, 0), K)
         assoc.marginals(build_problem(scene, 0), K, method="certified")
-        for name in kinds:
-            claims += claims_of(name, KINDS[name], KINDS[name].seeds[: 2 if quick else None])
+        for name in chosen.names:
+            claims += claims_of(name, KINDS[name], KINDS[name].seeds[: 2 if chosen.quick else None])
     return claims
 
 
 if __name__ == "__main__":
-    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))
+    raise SystemExit(main(NAME, experiment, __doc__, only=KINDS))

@@ -8,6 +8,7 @@ truth, tuples grouped by the probability they are given, and the share of each g
 all of them.
 """
 
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -24,7 +25,7 @@ from assoc.ranking.estimates.swept import swept
 from assoc.ranking.marginals import Marginals
 from assoc.simulation import simulate
 from experiments.common.claims import Claim, with_goal
-from experiments.common.command import main_of_parts
+from experiments.common.command import main
 from experiments.common.instances import scenes
 from experiments.common.measuring import one_core, timed
 
@@ -144,17 +145,17 @@ def reliability(count: int) -> list[Claim]:
     return claims
 
 
-def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Measure these kinds, and reliability."""
     claims = []
     with one_core():
         # kernels are compiled before anything is timed
         for name in ("two lists of 200", "ghosts of 20"):
             assoc.marginals(KINDS[name][0](0))
-        for name in kinds:
-            claims += widths(name, range(1_000, 1_001 if quick else 1_002))
-        return claims + reliability(_SCENES // 10 if quick else _SCENES)
+        for name in chosen.names:
+            claims += widths(name, range(1_000, 1_001 if chosen.quick else 1_002))
+        return claims + reliability(_SCENES // 10 if chosen.quick else _SCENES)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))
+    raise SystemExit(main(NAME, experiment, __doc__, only=KINDS))

@@ -8,6 +8,7 @@ belief propagation*: that of Stone Soup's JPDA (Williams and Lau, 2014), for two
 more; processor time of one core, kernels compiled.
 """
 
+from argparse import Namespace
 from collections.abc import Callable
 from functools import partial
 
@@ -21,7 +22,7 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import price_all_columns
 from assoc.simulation import simulate
 from experiments.common.claims import Claim
-from experiments.common.command import main_of_parts
+from experiments.common.command import main
 from experiments.common.instances import scenes
 from experiments.common.measuring import one_core, timed
 from experiments.probabilities import two_lists
@@ -206,15 +207,16 @@ def compared(name: str, seeds: range) -> list[Claim]:
     return claims + ([Claim(f"{name}, ours: mean width", "", None, float(np.mean(widths)))] if exact else [])
 
 
-def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Compare on these kinds."""
     with one_core():
         # kernels are compiled before anything is timed
         for name in ("two lists of 12", "gated 4 x 60"):
             plain_mcmc(KINDS[name](0), 0)
             assoc.marginals(KINDS[name](0))
-        return [claim for name in kinds for claim in compared(name, range(2_000, 2_001 if quick else 2_005))]
+        seeds = range(2_000, 2_001 if chosen.quick else 2_005)
+        return [claim for name in chosen.names for claim in compared(name, seeds)]
 
 
 if __name__ == "__main__":
-    raise SystemExit(main_of_parts(NAME, list(KINDS), experiment, __doc__))
+    raise SystemExit(main(NAME, experiment, __doc__, only=KINDS))

@@ -1,8 +1,7 @@
 """The command line that most experiments share: --quick, --seed, --json, --figure, --publish."""
 
 import argparse
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,35 +28,32 @@ def main(
     arguments: Sequence[str] | None = None,
     *,
     figure: Figure | None = None,
+    only: Iterable[str] = (),
+    seeds: tuple[Any, ...] = (),
     options: Sequence[Callable[[argparse.ArgumentParser], object]] = (),
     said: str = "",
     **defaults: Any,
 ) -> int:
     """Run ``python -m experiments.NAME``: print its claims, write what is asked; `about` describes it.
 
+    only: Names of its parts, of which --only chooses some: `names` of the options.
+    seeds: How many scenes there are if --seeds does not say it, of what, and how many at the least (2).
     options: What adds options of its own.
     said: What a result file says of these, with their names in braces.
     defaults: Of options that all experiments have.
     """
-    parser = make_parser(name, about, figure)
+    parser, names = make_parser(name, about, figure), [*only]
+    if names:
+        add_only(parser, names)
+    if seeds:
+        add_seeds(parser, *seeds)
     for add in options:
         add(parser)
     parser.set_defaults(**defaults)
     chosen = parser.parse_args(arguments)
-    call = (lambda *_: experiment(chosen)) if options else experiment
+    chosen.names = getattr(chosen, "only", None) or names
+    call = (lambda *_: experiment(chosen)) if names or seeds or options else experiment
     return run(parser, chosen, call, about + said.format(**vars(chosen)), figure)
-
-
-def main_of_parts(
-    name: str,
-    parts: Sequence[str],
-    experiment: Callable[[bool, Sequence[str]], Any],
-    about: str,
-    arguments: Sequence[str] | None = None,
-) -> int:
-    """As `main`, of an experiment that takes the names of its parts that are to run."""
-    only = partial(add_only, names=parts)
-    return main(name, lambda chosen: experiment(chosen.quick, chosen.only or parts), about, arguments, options=[only])
 
 
 def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse.ArgumentParser:

@@ -7,10 +7,11 @@ own, so that peak memory is its own; processor time of all threads, kernels load
 """
 
 import math
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 
 from experiments.common.claims import Claim
-from experiments.common.command import main_of_parts
+from experiments.common.command import main
 from experiments.scale import one_scan, trackers
 from experiments.scale.alone import Measured, alone
 
@@ -110,10 +111,10 @@ PARTS: dict[str, Callable[[bool], list[Claim]]] = {
 }  # fmt: skip
 
 
-def experiment(quick: bool, names: Sequence[str]) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Measure these parts."""
-    return [claim for name in names for claim in PARTS[name](quick)]
+    return [claim for name in chosen.names for claim in PARTS[name](chosen.quick)]
 
 
 if __name__ == "__main__":
-    raise SystemExit(main_of_parts("scale", list(PARTS), experiment, __doc__))
+    raise SystemExit(main("scale", experiment, __doc__, only=PARTS))

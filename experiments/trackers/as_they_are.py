@@ -12,7 +12,9 @@ sensors and targets. Without map: false alarms are as dense everywhere. Without 
 track is shown while it probably does not exist. All permutations: a joint probabilistic tracker by all joint events.
 """
 
+import argparse
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +26,7 @@ from assoc.tracking import TRACKERS, Track, Tracker
 from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.estimates import Estimates
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run, whole
+from experiments.common.command import main, whole
 from experiments.trackers.judging import CUTOFF, goal, mean_claim
 from experiments.trackers.oracle import OracleTracker
 from experiments.trackers.real_scenes import ADAPTING, ROWS, SCANS, SITES, Case, Row, flat_states, untold_views
@@ -170,14 +172,15 @@ NEARLY = 1.1
 """GOSPA of trackers that are as good as the oracle, nearly, as a multiple of its."""
 
 
-def experiment(rows: Sequence[str], names: Sequence[str], seed: int, seeds: int, others: int) -> list[Claim]:
-    """Run trackers over rows of the table: `seeds` scenes of each, `others` of those without a goal of their own."""
+def experiment(chosen: argparse.Namespace) -> list[Claim]:
+    """Run trackers over rows of the table, those without a goal of their own on fewer scenes."""
     claims = []
-    for label in rows:
+    seeds = 2 if chosen.quick else chosen.seeds
+    for label in chosen.names:
         row = ROWS[label]
-        cases = [row.make(seed + k) for k in range(seeds if row.goals else min(seeds, others))]
+        cases = [row.make(chosen.seed + k) for k in range(seeds if row.goals else min(seeds, chosen.others))]
         own = [*USUAL, *row.also, *(f"multi-sensor, without {part}" for part in row.without)]
-        taken = [name for name in own if name in names or not names]
+        taken = [name for name in own if name in chosen.trackers or not chosen.trackers]
         runs = {name: [judge(name, case, case.declared) for case in cases] for name in taken}
         if all(case.known for case in cases) and ADAPTING in runs:
             known = "multi-sensor if known"
@@ -188,25 +191,17 @@ def experiment(rows: Sequence[str], names: Sequence[str], seed: int, seeds: int,
     return claims
 
 
-NAME = "trackers.as_they_are"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, __doc__)
-    parser.add_argument("--seeds", type=whole(1), default=20, metavar="N", help="scenes of each row (default 20)")
-    text = "scenes of a row that has no goal of its own (default 10)"
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    text = "scenes at the most of a row that has no goal of its own (default 10)"
     parser.add_argument("--others", type=whole(1), default=10, metavar="N", help=text)
-    add_only(parser, list(ROWS))
     every = dict.fromkeys([*USUAL, *(name for row in ROWS.values() for name in row.also)])
     parser.add_argument("--trackers", nargs="+", choices=every, default=[], metavar="NAME", help="these alone")
-    chosen = parser.parse_args(arguments)
-    seeds, others = (2, 2) if chosen.quick else (chosen.seeds, chosen.others)
-    return run(
-        parser, chosen,
-        lambda quick, rng: experiment(chosen.only or [*ROWS], chosen.trackers, chosen.seed, seeds, others),
-        f"{__doc__} {seeds} scenes of each row with a goal of its own, {min(seeds, others)} of the others.",
-    )  # fmt: skip
+
+
+program = partial(
+    main, "trackers.as_they_are", experiment, __doc__, only=ROWS, seeds=(20, "scenes of each row", 1),
+    options=[_add_options], said=" {seeds} scenes of each row with a goal of its own, {others} of the others.",
+)  # fmt: skip
 
 
 if __name__ == "__main__":

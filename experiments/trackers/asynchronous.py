@@ -8,7 +8,7 @@ plots refused, beside the tracks of plots in order. Seeds are --seed and those t
 them (8), half as many for recorded traffic and late plots.
 """
 
-from collections.abc import Sequence
+from argparse import Namespace
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,7 @@ from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_recording, add_seeds, main
+from experiments.common.command import add_recording, main
 from experiments.common.measuring import processor_time
 from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
 from experiments.trackers.running import through
@@ -98,10 +98,9 @@ def late_plots(scene: Scene, rng: np.random.Generator) -> tuple[list[float], flo
     return found, 1e3 * float(np.median(seconds))
 
 
-def experiment(
-    file: str | None, quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES
-) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Trackers of these names on all scenes, then late plots if the multi-sensor tracker is one of them."""
+    file, quick, seed, seeds, names = chosen.file, chosen.quick, chosen.seed, chosen.seeds, chosen.names
     claims: list[Claim] = []
     settings: dict[str, dict[str, Any]] = {
         "thirty airliners": {"name": "rotating-radars", "duration": 60.0 if quick else 240.0}
@@ -137,11 +136,8 @@ def experiment(
 
 
 program = partial(
-    main, "trackers.asynchronous",
-    lambda chosen: experiment(chosen.file, chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
-    options=(
-        add_recording, partial(add_seeds, default=SEEDS, of="scenes of airliners"), partial(add_only, names=NAMES),
-    ),
+    main, "trackers.asynchronous", experiment, __doc__, only=NAMES, seeds=(SEEDS, "scenes of airliners"),
+    options=[add_recording],
     said=" {seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
 )  # fmt: skip
 

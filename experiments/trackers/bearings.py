@@ -6,8 +6,7 @@ heights); a reported track that is further than that from every target is false.
 follow, --seeds of them (20).
 """
 
-from collections.abc import Sequence
-from functools import partial
+from argparse import Namespace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from assoc._types import Array
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, main
+from experiments.common.command import main
 from experiments.trackers.judging import goal, make, mean_claim
 from experiments.trackers.running import through
 
@@ -57,12 +56,13 @@ def judge(name: str, scene: Scene) -> Found:
     return Found(late, np.array(false), np.array(tracked), 1e3 * float(np.median(done.seconds[1:])))
 
 
-def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Trackers of these names on the same scenes."""
-    count, scans = (2, 22) if quick else (seeds, SCANS)
-    scenes = [simulation.simulate("bearing-only", seed + k, targets=TARGETS, scans=scans) for k in range(count)]
+    count, scans = (2, 22) if chosen.quick else (chosen.seeds, SCANS)
+    seeds = range(chosen.seed, chosen.seed + count)
+    scenes = [simulation.simulate("bearing-only", seed, targets=TARGETS, scans=scans) for seed in seeds]
     claims: list[Claim] = []
-    for name in names:
+    for name in chosen.names:
         runs = [judge(name, scene) for scene in scenes]
         late = np.array([float(run.late) for run in runs])
         false = np.array([run.false[SETTLED:].mean() for run in runs])
@@ -78,8 +78,6 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
 
 if __name__ == "__main__":
     raise SystemExit(main(
-        "trackers.bearings",
-        lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or NAMES), __doc__,
-        options=(partial(add_seeds, default=SEEDS, of="scenes"), partial(add_only, names=NAMES)),
-        said=" {seeds} scenes.", seed=FIRST,
+        "trackers.bearings", experiment, __doc__, only=NAMES, seeds=(SEEDS, "scenes"), said=" {seeds} scenes.",
+        seed=FIRST,
     ))  # fmt: skip

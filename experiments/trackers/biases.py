@@ -7,6 +7,7 @@ flights (--seeds of them, 8), and on recorded trajectories (scenario from-tracks
 truth is used but to judge.
 """
 
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -20,7 +21,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import add_recording, add_seeds, main
+from experiments.common.command import add_recording, main
 from experiments.trackers.judging import distances, goal, mean_claim
 from experiments.trackers.running import through
 
@@ -123,24 +124,22 @@ def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim
     return claims
 
 
-def experiment(file: str | None, quick: bool, seed: int, count: int = SEEDS) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Simulated flights, and the file's."""
     kinds: dict[str, Simulate] = {"simulated": flights}
-    if file is not None:
-        kinds["recorded"] = lambda seed: simulation.simulate("from-tracks", seed, file=file, scans=SCANS)
+    if chosen.file is not None:
+        kinds["recorded"] = lambda seed: simulation.simulate("from-tracks", seed, file=chosen.file, scans=SCANS)
     claims = []
     for label, simulate in kinds.items():
-        scenes = count if label == "simulated" else count // 2
-        seeds = [seed + k for k in range(2 if quick else max(2, scenes))]
+        scenes = chosen.seeds if label == "simulated" else chosen.seeds // 2
+        seeds = [chosen.seed + k for k in range(2 if chosen.quick else max(2, scenes))]
         claims += accuracy(label, simulate, seeds)
         claims += tracking(label, simulate, seeds)
     return claims
 
 
 program = partial(
-    main, "trackers.biases",
-    lambda chosen: experiment(chosen.file, chosen.quick, chosen.seed, chosen.seeds), __doc__,
-    options=(add_recording, partial(add_seeds, default=SEEDS, of="scenes of flights")),
+    main, "trackers.biases", experiment, __doc__, seeds=(SEEDS, "scenes of flights"), options=[add_recording],
     said=" Cutoff of GOSPA 500 m. {seeds} scenes of flights, half as many (at least 2) recorded.",
 )  # fmt: skip
 

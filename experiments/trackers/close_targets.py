@@ -5,11 +5,10 @@ scene and CPU time of a scan, beside an oracle that is told which measurement is
 that follow, --seeds of them (20).
 """
 
-from collections.abc import Sequence
-from functools import partial
+from argparse import Namespace
 
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, main
+from experiments.common.command import main
 from experiments.trackers.close_scenes import SCANS, SETTINGS, simulate
 from experiments.trackers.judging import AT_ONCE, NAMES, claims_of, goal, judge, means
 
@@ -19,12 +18,13 @@ CLEARLY_BETTER = ("formations, unequal radars, P_d 0.6", "crossings", "crossings
 """Where the MHT should win: low P_d, and crossings."""
 
 
-def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = TRIED) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """Trackers of these names on all scenes."""
     claims: list[Claim] = []
+    quick, seeds = chosen.quick, range(chosen.seed, chosen.seed + (2 if chosen.quick else chosen.seeds))
     for label, setting in list(SETTINGS.items())[: 2 if quick else None]:
-        scenes = [simulate(setting, seed + k, 8 if quick else SCANS) for k in range(2 if quick else seeds)]
-        found = {name: [judge(name, scene) for scene in scenes] for name in names}
+        scenes = [simulate(setting, seed, 8 if quick else SCANS) for seed in seeds]
+        found = {name: [judge(name, scene) for scene in scenes] for name in chosen.names}
         for name, runs in found.items():
             claims += claims_of(label, name, runs)
         if not {"mht", "multi-sensor"} <= set(found):
@@ -36,8 +36,6 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] 
 
 if __name__ == "__main__":
     raise SystemExit(main(
-        "trackers.close_targets",
-        lambda chosen: experiment(chosen.quick, chosen.seed, chosen.seeds, chosen.only or TRIED), __doc__,
-        options=(partial(add_seeds, default=SEEDS, of="scenes of each kind"), partial(add_only, names=TRIED)),
+        "trackers.close_targets", experiment, __doc__, only=TRIED, seeds=(SEEDS, "scenes of each kind"),
         said=" {seeds} scenes of each kind.", seed=FIRST,
     ))  # fmt: skip

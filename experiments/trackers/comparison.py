@@ -15,7 +15,7 @@ import numpy as np
 from assoc import simulation
 from assoc.scene import Scene
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_recording, add_seeds, main
+from experiments.common.command import add_recording, main
 from experiments.trackers.judging import NAMES, claims_of, goal, judge, mean_claim, means
 
 WITHIN_ORACLE = 1.02
@@ -48,7 +48,7 @@ def compare(label: str, scenes: list[Scene], names: Sequence[str]) -> list[Claim
 
 def experiment(chosen: argparse.Namespace) -> list[Claim]:
     """Compare on the three-radar scene, and on the file's traffic."""
-    seed, names = int(np.random.default_rng(chosen.seed).integers(2**31)), chosen.only or NAMES
+    seed, names = int(np.random.default_rng(chosen.seed).integers(2**31)), chosen.names
     count, length = (2, 15) if chosen.quick else (10, 100)
     scenes = [simulation.simulate("three-radar", seed + k, scans=length) for k in range(count)]
     claims = compare("three radars", scenes, names)
@@ -61,10 +61,7 @@ def experiment(chosen: argparse.Namespace) -> list[Claim]:
 
 program = partial(
     main, "trackers.comparison", experiment, __doc__,
-    options=(
-        add_recording, partial(add_seeds, default=3, of="runs on recorded trajectories", least=1),
-        partial(add_only, names=NAMES),
-    ),
+    only=NAMES, seeds=(3, "runs on recorded trajectories", 1), options=[add_recording],
     said=" {seeds} runs on recorded trajectories.",
 )  # fmt: skip
 

@@ -6,12 +6,12 @@ import pytest
 import assoc
 from experiments import probabilities, probabilities_beside
 from experiments.common.results import Results
-from experiments.pages.measured import probabilities as table
+from experiments.pages.measured import TABLES
 
 
 def test_the_page_shows_every_kind_with_its_goal():
     results = Results("probabilities")
-    rows = table().splitlines()[2:]
+    rows = TABLES["probabilities"]().splitlines()[2:]
     assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == list(probabilities.KINDS)
     for name, (_, width, seconds) in probabilities.KINDS.items():
         assert results[f"{name}: mean width"].band == (None, width)
