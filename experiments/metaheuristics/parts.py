@@ -92,32 +92,21 @@ def _no_ants() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _no_crossover() -> Iterator[None]:
+_child, _parent = Breeding._child, Breeding._parent
+
+
+def _child_of_one(self: Any, component: Any, first: int, second: int, rng: Any) -> Any:
     """A child has one parent."""
-    child = Breeding._child
-
-    def of_one(self: Any, component: Any, first: int, second: int, rng: Any) -> Any:
-        return child(self, component, first, first, rng)
-
-    with mock.patch.object(Breeding, "_child", of_one):
-        yield
+    return _child(self, component, first, first, rng)
 
 
-@contextmanager
-def _inverted_selection() -> Iterator[None]:
+def _worst_parent(self: Any, rng: Any) -> int:
     """The worst of those drawn breed."""
-    parent = Breeding._parent
-
-    def worst(self: Any, rng: Any) -> int:
+    self.fitness = -self.fitness
+    try:
+        return _parent(self, rng)
+    finally:
         self.fitness = -self.fitness
-        try:
-            return parent(self, rng)
-        finally:
-            self.fitness = -self.fitness
-
-    with mock.patch.object(Breeding, "_parent", worst):
-        yield
 
 
 def _admit_equals(self: Any, component: Component, owner: Any, weight: float) -> None:
@@ -144,12 +133,6 @@ def _rewritten(kernel: Any, old: str, new: str, **kernels: Any) -> Any:
     return numba.njit(nogil=True, error_model="numpy")(names[function.__name__])
 
 
-@contextmanager
-def _no_aspiration() -> Iterator[None]:
-    with mock.patch.object(moves, "_moves", _moves_without_aspiration()):
-        yield
-
-
 @cache
 def _moves_without_aspiration() -> Any:
     rule = "(until[j] < clock or current + gain[j] < record - 1e-9)"
@@ -157,11 +140,9 @@ def _moves_without_aspiration() -> Any:
     return _rewritten(moves._moves, "_best_insertion(", "_without(", _without=chosen)
 
 
-@contextmanager
-def _no_moves() -> Iterator[None]:
+def _no_moves(*arguments: Any) -> int:
     """Covers are only improved, and the search begins anew from other covers."""
-    with mock.patch.object(moves, "_moves", lambda *arguments: arguments[4].clock + arguments[4].moves):
-        yield
+    return int(arguments[4].clock + arguments[4].moves)
 
 
 OWN = (
@@ -172,14 +153,14 @@ OWN = (
     Part("no pheromone laid", ("aco",), without=_replaced(max_min.Colony, "_deposit", lambda *_: None)),
     Part("no lower limit of pheromone", ("aco",), without=_replaced(max_min.Colony, "_deposit", _deposit_unlimited)),
     Part("pheromone never laid anew", ("aco",), without=_replaced(max_min, "_RENEWAL", _NEVER)),
-    Part("no crossover", ("genetic",), without=_no_crossover),
+    Part("no crossover", ("genetic",), without=_replaced(Breeding, "_child", _child_of_one)),
     Part("no selection", ("genetic",), {"tournament": 1}),
-    Part("selection inverted", ("genetic",), without=_inverted_selection),
+    Part("selection inverted", ("genetic",), without=_replaced(Breeding, "_parent", _worst_parent)),
     Part("population never renewed", ("genetic",), without=_replaced(population, "_RENEWAL", _NEVER)),
     Part("equal members admitted", ("genetic",), without=_replaced(Breeding, "_admit", _admit_equals)),
-    Part("no moves", ("tabu",), without=_no_moves),
+    Part("no moves", ("tabu",), without=_replaced(moves, "_moves", _no_moves)),
     Part("tenure 0", ("tabu",), {"tenure": 0}),
-    Part("no aspiration", ("tabu",), without=_no_aspiration),
+    Part("no aspiration", ("tabu",), without=lambda: _replaced(moves, "_moves", _moves_without_aspiration())()),
     Part("no column forced in", ("tabu",), without=_replaced(moves.TabuSearch, "_force", lambda *_: -1)),
     Part("no restarts", ("tabu",), {"restart": _NEVER}),
 )

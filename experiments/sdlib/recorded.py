@@ -34,17 +34,9 @@ class Watch(NamedTuple):
         """Make the problem from the recording."""
         if PATH not in os.environ:
             raise FileNotFoundError(f"{PATH}: names no recording; without it this instance cannot be made anew")
-        scene = simulate(
-            "from-tracks",
-            self.seed,
-            file=os.environ[PATH],
-            radars=self.radars,
-            detection_probability=self.detection_probability,
-            false_alarms=self.false_alarms,
-            noise=self.noise,
-            scans=self.scan + 1,
-        )
-        return build_problem(scene, self.scan)
+        options = self._asdict()
+        seed, scan = options.pop("seed"), options.pop("scan")
+        return build_problem(simulate("from-tracks", seed, file=os.environ[PATH], scans=scan + 1, **options), scan)
 
 
 WATCHES = {

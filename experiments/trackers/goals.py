@@ -1,12 +1,13 @@
 """What a multi-sensor tracker must reach on the three-radar scene, and its time with a thousand targets."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from assoc import simulation
 from assoc._types import Array
-from assoc.scene import Scene, Truth
+from assoc.scene import Scene
 from assoc.tracking import MultiSensorTracker, Tracker
 from experiments.trackers.running import through
 
@@ -59,13 +60,10 @@ def three_radar(seed: int, scans: int, single: bool) -> ThreeRadar:
 def _alone(scene: Scene, s: int) -> float:
     """Mean squared position error with one radar, where it has a track of the target."""
     truth = scene.truth
-    seen = Scene(
-        sensors=[scene.sensors[s]],
-        times=scene.times,
-        measurements=[[scan[s]] for scan in scene.measurements],
-        region=scene.region,
-        truth=Truth(truth.target_ids, truth.positions, [[scan[s]] for scan in truth.sources]),
-    )
+    sources = [[scan[s]] for scan in truth.sources]
+    measurements = [[scan[s]] for scan in scene.measurements]
+    known = replace(truth, sources=sources)
+    seen = replace(scene, sensors=[scene.sensors[s]], measurements=measurements, truth=known)
     run = through(MultiSensorTracker.for_scene(seen), seen)
     errors = []
     for k in range(1, seen.num_scans):
