@@ -5,12 +5,19 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from assoc._types import Array
 from assoc.filters import Gaussian, nees
 from assoc.filters.base import Filter
 from assoc.filters.motion.models import ConstantVelocity
 from assoc.sensors import Radar3D
+
+
+def radar_of(noise: ArrayLike) -> Radar3D:
+    """Return a radar at the origin that sees all directions, of this noise."""
+    everywhere = [[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]]
+    return Radar3D(position=np.zeros(3), noise=noise, field_of_view=everywhere)
 
 
 @dataclass(frozen=True)
@@ -35,11 +42,7 @@ class Setting:
     @property
     def radar(self) -> Radar3D:
         """The radar, at the origin."""
-        return Radar3D(
-            position=np.zeros(3),
-            noise=np.array([self.range_noise, self.angle_noise, self.angle_noise]),
-            field_of_view=np.array([[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]]),
-        )
+        return radar_of([self.range_noise, self.angle_noise, self.angle_noise])
 
     @property
     def motion(self) -> ConstantVelocity:

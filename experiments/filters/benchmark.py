@@ -29,17 +29,17 @@ from assoc.filters import (
     UnscentedKalmanFilter,
 )
 from assoc.filters.base import Filter
-from assoc.sensors import PositionSensor, Radar3D, Sensor
+from assoc.sensors import PositionSensor, Sensor
 from experiments.common.claims import Claim, with_goal
 from experiments.common.command import main
+from experiments.filters.b1 import radar_of
 
 NOISE, DT, MEMBERS = 1.0, 1.0, 100
 ROUNDS = 12
 
 MEAN = np.array([50e3, 40e3, 10e3, -150.0, -200.0, -10.0])
 COVARIANCE = np.diag([1e4, 1e4, 1e4, 100.0, 100.0, 100.0])
-FULL = np.array([[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]])
-RADAR = Radar3D(position=np.zeros(3), noise=np.array([30.0, 2e-3, 2e-3]), field_of_view=FULL)
+RADAR = radar_of([30.0, 2e-3, 2e-3])
 PLACE = PositionSensor(position=np.zeros(3), noise=np.full(3, 50.0), field_of_view=np.array([[-1e6, 1e6]] * 3))
 KINDS: dict[str, tuple[Callable[[ConstantVelocity], Filter[Any]], Sensor]] = {
     "Kalman": (KalmanFilter, PLACE),

@@ -10,7 +10,7 @@ from assoc._types import Array
 from assoc.filters import FixedLagSmoother, Gaussian
 from assoc.filters.base import Filter
 from assoc.sensors import Radar3D
-from experiments.filters.b1 import converted
+from experiments.filters.b1 import converted, radar_of
 
 GRAVITY = 9.81
 RANGE_NOISE = 50.0
@@ -114,11 +114,7 @@ class Batch:
         flat2 = (truth[..., :2] ** 2).sum(axis=-1)
         spread = flat2 + (truth**2).sum(axis=-1)
         angle = math.sqrt((RAW_RMSE**2 - RANGE_NOISE**2) / spread.mean())
-        radar = Radar3D(
-            position=np.zeros(3),
-            noise=np.array([RANGE_NOISE, angle, angle]),
-            field_of_view=np.array([[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]]),
-        )
+        radar = radar_of([RANGE_NOISE, angle, angle])
         exact = radar.measure(truth.reshape(-1, 3)).reshape(truth.shape)
         return cls(truth, exact + rng.standard_normal(exact.shape) * radar.noise, radar)
 

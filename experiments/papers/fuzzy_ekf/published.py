@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.errors import AssocWarning
 from assoc.filters import ConstantAcceleration, FuzzyAdaptiveEKF, FuzzyRules, FuzzyVariable, Gaussian, paper_rules
 from assoc.filters.base import Filter
-from assoc.sensors import Radar3D
+from experiments.filters.b1 import radar_of
 from experiments.filters.manoeuvres import Batch
 from experiments.filters.tune import from_steps, to_steps
 
@@ -82,11 +82,7 @@ def literal_errors(filter_: Filter[Any], batch: Batch) -> Array:
     with warnings.catch_warnings():
         # an angle's noise of 1.7 rad is what the paper prints
         warnings.simplefilter("ignore", AssocWarning)
-        radar = Radar3D(
-            position=np.zeros(3),
-            noise=np.full(3, math.sqrt(R0)),
-            field_of_view=[[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]],
-        )
+        radar = radar_of(np.full(3, math.sqrt(R0)))
     seen, truth = batch.measured / np.array([KILOMETRE, 1.0, 1.0]), batch.truth / KILOMETRE
     r, a, e = seen[0].T
     mean = np.zeros((len(r), 9))

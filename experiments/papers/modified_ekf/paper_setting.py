@@ -21,7 +21,7 @@ from assoc.filters.motion.models import Motion
 from assoc.sensors import Radar3D
 from experiments.common.claims import Claim
 from experiments.common.command import rmse, rmse_interval
-from experiments.filters.b1 import ratio_interval
+from experiments.filters.b1 import radar_of, ratio_interval
 
 START = np.array([15.0, 12.0, 5.0, -60.0, -70.0, -40.0])
 SIGMAS = np.array([0.003, 0.0261799, 0.0261799])
@@ -52,13 +52,6 @@ class Runs:
         return errors
 
 
-def radar(noise: Array) -> Radar3D:
-    """The radar at the origin."""
-    return Radar3D(
-        position=np.zeros(3), noise=noise, field_of_view=[[0, 1e6], [-np.pi, np.pi], [-np.pi / 2, np.pi / 2]]
-    )
-
-
 def motion_of(reading: str) -> Motion:
     """Return the paper's model, or for "moving" constant velocity with the process noise of 1 m/s^2."""
     return ConstantVelocity(1.0) if reading == "moving" else UnitRates(Q * np.eye(6))
@@ -75,7 +68,7 @@ def draw_truth(motion: Motion, count: int, rng: np.random.Generator) -> Array:
 
 def simulate(reading: str, count: int, rng: np.random.Generator) -> Runs:
     """Simulation 1: range, azimuth and elevation are measured."""
-    motion, by_sigmas, by_r = motion_of(reading), radar(SIGMAS), radar(np.full(3, R**0.5))
+    motion, by_sigmas, by_r = motion_of(reading), radar_of(SIGMAS), radar_of(np.full(3, R**0.5))
     true_sensor = by_r if reading == "R_k" else by_sigmas
     filters: dict[str, tuple[Filter[Gaussian], Radar3D]] = {
         "EKF": (ExtendedKalmanFilter(motion), by_sigmas if reading in ("sigmas", "moving") else by_r),
