@@ -11,7 +11,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.gaussian import GIVEN, LINEAR, PLAIN
 from assoc.filters.motion.models import Motion, differences
-from assoc.filters.state import finite, positive_definite
+from assoc.filters.state import checked_covariance, finite
 from assoc.sensors.base import Sensor
 from assoc.sensors.codes import CODES, POSITION
 
@@ -31,7 +31,7 @@ class LinearMeasurement:
     def __init__(self, matrix: Array, covariance: Array) -> None:
         self.matrix = finite(matrix, "matrix", 2)
         self.dim = len(self.matrix)
-        self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
+        self.covariance = checked_covariance(covariance, (1, self.dim, self.dim))[0]
 
     def measure(self, states: Array) -> Array:
         """Noise-free measurements (m, d) of states (m, n)."""
@@ -61,7 +61,7 @@ class FunctionMeasurement:
     ) -> None:
         covariance = finite(covariance, "covariance", 2)
         self.dim = len(covariance)
-        self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
+        self.covariance = checked_covariance(covariance, (1, self.dim, self.dim))[0]
         self._function, self._jacobian, self._residual = function, jacobian, residual
 
     def measure(self, states: Array) -> Array:

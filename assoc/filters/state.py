@@ -23,19 +23,19 @@ def finite(value: object, what: str, *dimensions: int) -> Array:
     return require_finite(array, what)
 
 
-def positive_definite(value: object, what: str, shape: tuple[int, ...]) -> Array:
+def checked_covariance(value: object, shape: tuple[int, ...]) -> Array:
     """Return a checked stack (B, n, n) of symmetric positive definite matrices, a copy."""
-    array = finite(value, what, 2, 3)
+    array = finite(value, "covariance", 2, 3)
     if array.ndim == 2:
         array = array[None]
     if array.shape != shape:
-        raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
+        raise InvalidInputError(f"covariance must have shape {shape}, got {array.shape}")
     size = np.sqrt(np.abs(np.einsum("bii->bi", array)))
     if not (np.abs(array - array.transpose(0, 2, 1)) <= 1e-9 * size[:, :, None] * size[:, None, :]).all():
-        raise InvalidInputError(f"{what} must be symmetric")
+        raise InvalidInputError("covariance must be symmetric")
     bad, _ = all_factors(array)
     if bad >= 0:
-        raise InvalidInputError(f"{what} must be positive definite, number {bad} is not")
+        raise InvalidInputError(f"covariance must be positive definite, number {bad} is not")
     return array
 
 
@@ -66,7 +66,7 @@ class Gaussian:
         if covariance.ndim == 2 and covariance.shape == shape[1:]:
             covariance = np.broadcast_to(covariance, shape)
         object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "covariance", positive_definite(covariance, "covariance", shape))
+        object.__setattr__(self, "covariance", checked_covariance(covariance, shape))
 
     def __len__(self) -> int:
         return len(self.mean)

@@ -10,7 +10,7 @@ import numpy as np
 from assoc.errors import InvalidInputError
 
 
-def as_seconds(times: Any, what: str) -> Any:
+def as_seconds(times: Any) -> Any:
     """Turn dates into seconds since 1970-01-01 UTC, and durations into seconds; anything else is returned unchanged.
 
     Taken are arrays of numpy's datetime64 and timedelta64, Python's datetimes and timedeltas, and what pandas makes of
@@ -24,11 +24,11 @@ def as_seconds(times: Any, what: str) -> Any:
         try:
             array = np.array([_plain(date) for date in array.flat]).reshape(array.shape)
         except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"{what} must be all dates or all seconds, got both") from error
+            raise InvalidInputError("times must be all dates or all seconds, got both") from error
     if array.dtype.kind not in "mM":
         return times
     if np.isnat(array).any():
-        raise InvalidInputError(f"{what} must be complete, got a date that is missing (NaT)")
+        raise InvalidInputError("times must be complete, got a date that is missing (NaT)")
     unit = np.datetime64(0, "s") if array.dtype.kind == "M" else np.timedelta64(0, "s")
     whole = array.astype("datetime64[us]" if array.dtype.kind == "M" else "timedelta64[us]") - unit
     return whole.astype(np.int64) / 1e6

@@ -96,7 +96,7 @@ class Scene:
                 raise InvalidInputError(f"sensors: number {s} is a {type(sensor).__name__}, expected a Sensor")
         if not isinstance(self.name, str):
             raise InvalidInputError(f"name must be text, got {type(self.name).__name__}")
-        times = finite_array(as_seconds(self.times, "times"), "times")
+        times = finite_array(as_seconds(self.times), "times")
         if times.ndim != 1 or not times.size:
             raise InvalidInputError(f"times must have shape (K,) with K >= 1, got {times.shape}")
         if (np.diff(times) < 0).any():

@@ -18,7 +18,7 @@ from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.turn import turn
-from assoc.filters.state import finite, positive_definite
+from assoc.filters.state import checked_covariance, finite
 
 _NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
 
@@ -312,7 +312,7 @@ class ForwardDifference(Motion):
 
     def __init__(self, covariance: Array, dim: int, position: tuple[int, ...]) -> None:
         self.dim, self.position = dim, position
-        self.covariance = positive_definite(covariance, "covariance", (1, dim, dim))
+        self.covariance = checked_covariance(covariance, (1, dim, dim))
 
     @abstractmethod
     def rates(self, states: Array) -> Array:
