@@ -61,7 +61,7 @@ def variances(
     whites = [np.linalg.inv(np.linalg.cholesky(part.covariance)) for part in parts]
     shift = np.zeros((T, 3))
     # linearised at the prediction, then at the position that all measurements give
-    for _ in range(2):
+    for last in (False, True):
         rows, information, vectors = [], np.zeros((S, T, n, n)), np.zeros((S, T, n))
         for s, (part, white, (track, z, position)) in enumerate(zip(parts, whites, seen, strict=True)):
             position = position + shift[track]
@@ -72,8 +72,8 @@ def variances(
             information[s, track] = H.transpose(0, 2, 1) @ H / noise[s]
             vectors[s, track] = _times(H.transpose(0, 2, 1), y) / noise[s]
             rows.append((track, H, y))
-        inverse = np.linalg.inv(prior + information.sum(axis=0))
-        shift[:, :n] = _times(inverse, vectors.sum(axis=0))
+        if not last:
+            shift[:, :n] = _times(np.linalg.inv(prior + information.sum(axis=0)), vectors.sum(axis=0))
     count = np.bincount(np.concatenate([track for track, _, _ in rows]), minlength=T)
     # how likely each model is by all measurements: of positions that these give, with little weight of the prediction
     spread = np.linalg.inv(information.sum(axis=0) + _BESIDE**2 * prior)
