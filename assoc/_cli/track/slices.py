@@ -105,7 +105,8 @@ class Slices:
                 values = frame[column].to_numpy()
                 arrays[f"{name}.{column}"] = values.astype(np.str_) if column == "status" else values
         arrays["odd"] = np.array(IdentityWatch(found=part.odd).text())
-        save_npz(self._path(part.number), _FORMAT, _VERSION, arrays)
+        # the process that waits for all slices saves them, each for a short time: packing would hold it up
+        save_npz(self._path(part.number), _FORMAT, _VERSION, arrays, packed=False)
 
     def load(self, number: int) -> SliceTracks | None:
         """The tracks of a slice; None if they are not there, or damaged."""
