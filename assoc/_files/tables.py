@@ -24,39 +24,40 @@ _ROWS, _TEXTS = 50_000, 10_000
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
-    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index, in less than half its time."""
-    columns: list[list[str]] = []
+    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index; much sooner with pyarrow."""
+    try:
+        import pyarrow as pa
+        import pyarrow.compute as pc
+    except ImportError:
+        return str(frame.to_csv(index=False, header=header, lineterminator="\n"))
+    columns = []
     for name in frame:
         values = frame[name]
         kind = values.dtype.kind
         if kind == "f":
-            texts = _floats(values.to_numpy())
-        elif kind in "iub":
-            texts = [*map(str, values.tolist())]
+            texts = _floats(values.to_numpy(dtype=np.float64))
+        elif kind == "b":
+            texts = pc.if_else(pa.array(values.to_numpy()), "True", "False")
+        elif kind in "iu":
+            texts = pa.array(values.to_numpy()).cast("string")
         else:
             quoted = {text: _cell(text) for text in values.unique().tolist()}
-            texts = [quoted[text] for text in values.tolist()]
+            texts = pa.array([quoted[text] for text in values.tolist()], "string")
         columns.append(texts)
-    lines = map(",".join, zip(*columns, strict=True))
     first = [",".join(map(_cell, map(str, frame.columns)))] if header else []
-    return "\n".join([*first, *lines, ""])
+    return "\n".join([*first, *pc.binary_join_element_wise(*columns, ",").to_pylist(), ""])
 
 
-def _floats(values: Array) -> list[str]:
+def _floats(values: Array) -> Any:
     """The shortest texts that are read as these numbers; empty for NaN."""
-    texts = np.empty(len(values), dtype=np.object_)
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
     size = np.abs(values)
-    # pyarrow makes these texts in a fifth of the time; its whole numbers and exponents look otherwise
-    quick = (size > 1e-3) & (size < 1e9) & (values != np.rint(values))
-    try:
-        import pyarrow as pa
-    except ImportError:
-        quick[:] = False
-    if quick.any():
-        texts[quick] = pa.array(values[quick]).cast("string").to_numpy(zero_copy_only=False)
-    texts[~quick] = [*map(repr, values[~quick].tolist())]
-    texts[np.isnan(values)] = ""
-    return list(texts.tolist())
+    # pyarrow's whole numbers and exponents look otherwise
+    odd = (size <= 1e-3) | (size >= 1e9) | (values == np.rint(values)) | np.isnan(values)
+    texts = ["" if number != number else repr(number) for number in values[odd].tolist()]
+    return pc.replace_with_mask(pa.array(values).cast("string"), odd, pa.array(texts, "string"))
 
 
 def _cell(text: str) -> str:
