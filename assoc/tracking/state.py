@@ -46,7 +46,7 @@ class TrackerState(NamedTuple):
     registration: OnlineRegistration | None = None
     identities: Identities | None = None
     watch: IdentityWatch = IdentityWatch()
-    """What identities said of tracks, and which cannot all be right."""
+    """Identities of tracks so far, and those that cannot all be right."""
     estimates: Estimates | None = None
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None

@@ -19,7 +19,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
-from assoc.tracking.live.pictures import Agreement, Heard
+from assoc.tracking.live.pictures import Agreement, SensorState
 from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
@@ -38,9 +38,9 @@ def film(scene):
 
 
 HEARD = [
-    Heard("radar 1", 29.5, 120, 0, False, (0,)),
-    Heard("radar 2", 14.0, 60, 3, True, (1,)),
-    Heard("radar 3", -np.inf, 0, 0, False, (2,)),
+    SensorState("radar 1", 29.5, 120, 0, False, (0,)),
+    SensorState("radar 2", 14.0, 60, 3, True, (1,)),
+    SensorState("radar 3", -np.inf, 0, 0, False, (2,)),
 ]
 
 

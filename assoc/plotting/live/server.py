@@ -26,7 +26,7 @@ from assoc.scene.scene import Scene
 
 if TYPE_CHECKING:
     from assoc.tracking import Picture, Track
-    from assoc.tracking.live.pictures import Agreement, Heard
+    from assoc.tracking.live.pictures import Agreement, SensorState
 
 _FOLDER = Path(__file__).parent
 _FILES = {
@@ -111,13 +111,15 @@ class LivePage:
         """URL of the page."""
         return f"http://127.0.0.1:{self._server.server_address[1]}/"
 
-    def show(self, picture: Picture, heard: Sequence[Heard] = (), counts: Mapping[str, int] | None = None) -> None:
+    def show(
+        self, picture: Picture, heard: Sequence[SensorState] = (), counts: Mapping[str, int] | None = None
+    ) -> None:
         """Push a picture to all connected browsers.
 
         Parameters
         ----------
         picture : Picture
-        heard : sequence of Heard
+        heard : sequence of SensorState
             What is known of each sensor, `LiveTracker.heard`.
         counts : mapping of str to int, optional
             Plots that were late, refused or lost, by reason.
@@ -134,7 +136,7 @@ class LivePage:
         }
         self._push(_event("picture", content | {"ended": picture.ended}))
 
-    def _row(self, track: Track, agreement: Agreement | None, heard: Sequence[Heard]) -> list[Any]:
+    def _row(self, track: Track, agreement: Agreement | None, heard: Sequence[SensorState]) -> list[Any]:
         """Id, x, y, height, vx, vy, hits, start, status, quality; with an origin latitude and longitude, too.
 
         Quality: NIS (or null), whether it is as expected, and the measurements of each sensor in `heard`; or null.

@@ -46,7 +46,7 @@ _New = tuple[TrackBatch, Array]
 
 
 class _Joint(NamedTuple):
-    """What the joint events say of T tracks and M tuples."""
+    """Sums over the joint events for T tracks and M tuples."""
 
     used: Array
     """The tuples that count in states, (K,)."""

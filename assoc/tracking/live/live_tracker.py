@@ -26,7 +26,7 @@ from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
 from assoc.tracking.live.own_positions import OwnPositions
-from assoc.tracking.live.pictures import Agreement, Antenna, Heard, Picture, SoundPlot
+from assoc.tracking.live.pictures import Agreement, Antenna, CheckedPlot, Picture, SensorState
 from assoc.tracking.live.state import LiveSettings, LiveState
 from assoc.tracking.quality import Qualities
 from assoc.tracking.stages.checking import checked
@@ -93,7 +93,7 @@ class LiveTracker:
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
-        self._told: set[tuple[object, ...]] = set()
+        self._odd_reported: set[tuple[object, ...]] = set()
         self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
         self._first: list[list[Array]] = [[] for _ in scene.sensors]
@@ -143,10 +143,10 @@ class LiveTracker:
             The file is not such a state.
         """
         self.state, self.confirmed, self.counts = state_file.restore(path, self.settings)
-        self._told = {odd.key for odd in self.state.tracker.odd_identities}
+        self._odd_reported = {odd.key for odd in self.state.tracker.odd_identities}
 
     @property
-    def heard(self) -> list[Heard]:
+    def heard(self) -> list[SensorState]:
         """What is known of each sensor."""
         found = []
         for s, antenna in enumerate(self.state.antennas):
@@ -154,7 +154,7 @@ class LiveTracker:
             if s == parts[0]:
                 refused = sum(self._refused[part] for part in parts)
                 name = str(self.settings.name_of(s))
-                found.append(Heard(name, antenna.last, antenna.plots, refused, antenna.silent, parts))
+                found.append(SensorState(name, antenna.last, antenna.plots, refused, antenna.silent, parts))
         return found
 
     def leave_out(self, kind: str, line: str, sensor: int | None = None) -> None:
@@ -220,7 +220,7 @@ class LiveTracker:
         if not abs(time) <= LARGEST:
             self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds", s)
             return []
-        plot, state = SoundPlot(s, time, z, known), self.state
+        plot, state = CheckedPlot(s, time, z, known), self.state
         # a repetition of a doubted plot does not confirm its time
         if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
             self.leave_out("repeated", f"{where} repeats a plot of {moment(time)}: left out", s)
@@ -258,7 +258,7 @@ class LiveTracker:
             where = self.settings.name_of(s)
             self.leave_out("own positions", f"own position of {where} at {moment(time)} left out: it {error}", s)
 
-    def _timed(self, plot: SoundPlot) -> list[Picture]:
+    def _timed(self, plot: CheckedPlot) -> list[Picture]:
         """Process a sound plot, unless its time is doubted or too old."""
         time, state, settings = plot.time, self.state, self.settings
         if math.isnan(state.end):
@@ -283,7 +283,7 @@ class LiveTracker:
         state.behind.clear()
         state.recent[plot.key] = None
         self.counts["plots"] += 1
-        self._hear(plot)
+        self._note_antenna(plot)
         pictures = []
         if time > state.newest:
             state.newest = time
@@ -308,7 +308,7 @@ class LiveTracker:
         """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
         self._qualities.keep(())
-        self._told.clear()
+        self._odd_reported.clear()
         late = self._begun(first_id=self.state.tracker.next_id)
         antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
         self.state = LiveState(late, antennas, self.state.own_positions)
@@ -330,7 +330,7 @@ class LiveTracker:
             pictures += self._timed(plot)
         return pictures
 
-    def _hear(self, plot: SoundPlot) -> None:
+    def _note_antenna(self, plot: CheckedPlot) -> None:
         """Update the sensor's antenna by a plot."""
         s, time, z, _ = plot
         turn, sensor = self.settings.turn_of(s), self.settings.scene.sensors[s]
@@ -389,8 +389,8 @@ class LiveTracker:
             for of_sensor in zip(step.assigned, step.confirmed, times, identities, strict=True):
                 self._kept.take(*of_sensor)
             for odd in state.tracker.odd_identities:
-                if odd.key not in self._told:
-                    self._told.add(odd.key)
+                if odd.key not in self._odd_reported:
+                    self._odd_reported.add(odd.key)
                     self.counts["odd identities"] += 1
                     settings.tell(f"warning: {odd}")
             self.counts["late"] += step.late

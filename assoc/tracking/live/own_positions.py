@@ -21,7 +21,7 @@ from assoc.sensors.base import wrap_angle
 from assoc.sensors.platform import FAST, FASTER, Platform, checked_headings
 
 OLD, SILENCE = 60.0, 15.0
-"""Seconds: a message so much older than the last one says that the clock went back; a position so old is told."""
+"""Seconds: a message so much older than the last one says that the clock went back; a position so old is reported."""
 
 
 class Pose(NamedTuple):
@@ -114,7 +114,7 @@ class OwnPositions:
                 self.platforms.append(sensor.platform)
         self.paths: dict[int, OwnPath] = {}
         """By the number of the platform; only of those that have sent a position."""
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
 
     def take(self, platform: Platform, time: float, position: Sequence[float], heading: float | None) -> None:
         """Take a position in; InvalidInputError, in one line, says why one cannot be used."""
@@ -129,7 +129,7 @@ class OwnPositions:
         path, pose = self.paths.get(number, OwnPath()), Pose(float(time), place, known)
         try:
             self.paths[number] = path.after(pose)
-            self._told.discard(number)
+            self._reported.discard(number)
         except InvalidInputError:
             self.paths[number] = path._replace(doubted=pose)
             raise
@@ -152,11 +152,11 @@ class OwnPositions:
         return Scene(sensors, np.array([end]), [empty], scene.region, origin=scene.origin)
 
     def silent(self, scene: Scene, end: float) -> list[tuple[int, float]]:
-        """Sensors (the first of each platform) whose own position has become old, with its time; each is told once."""
+        """Sensors (the first of each platform) whose own position has become old, with its time; each once."""
         found = []
         for number, path in self.paths.items():
-            if end - path.poses[-1].time > SILENCE and number not in self._told:
-                self._told.add(number)
+            if end - path.poses[-1].time > SILENCE and number not in self._reported:
+                self._reported.add(number)
                 first = next(s for s, sensor in enumerate(scene.sensors) if sensor.platform == self.platforms[number])
                 found.append((first, path.poses[-1].time))
         return found

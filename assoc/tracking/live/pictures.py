@@ -22,7 +22,7 @@ PlotKey = tuple[int, float, bytes]
 """Sensor, time, values."""
 
 
-class SoundPlot(NamedTuple):
+class CheckedPlot(NamedTuple):
     """A plot that passed all checks."""
 
     sensor: int
@@ -63,7 +63,7 @@ class Picture(NamedTuple):
     """By track id, if the tracker was made with `quality`."""
 
 
-class Heard(NamedTuple):
+class SensorState(NamedTuple):
     """What is known of a sensor; plots of one radar with heights and without count as one."""
 
     name: str

@@ -13,7 +13,7 @@ from assoc.recordings.several import NO_HEIGHT
 from assoc.scene.scene import Scene
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.own_positions import OwnPositions
-from assoc.tracking.live.pictures import Antenna, PlotKey, SoundPlot
+from assoc.tracking.live.pictures import Antenna, CheckedPlot, PlotKey
 from assoc.tracking.tracker import Tracker
 
 SHORTEST = 1e-3
@@ -80,9 +80,9 @@ class LiveState:
     """End of the open interval, seconds."""
     newest: float = -math.inf
     """Time of the newest plot, seconds."""
-    pending: list[SoundPlot] = field(default_factory=list)
+    pending: list[CheckedPlot] = field(default_factory=list)
     """Plots of the open interval, and later ones."""
-    ahead: list[SoundPlot] = field(default_factory=list)
+    ahead: list[CheckedPlot] = field(default_factory=list)
     """Plots whose times are doubted."""
     behind: set[PlotKey] = field(default_factory=set)
     """Consecutive plots that were too old."""

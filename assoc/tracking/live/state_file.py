@@ -20,7 +20,7 @@ from assoc.errors import InvalidInputError
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.own_positions import OwnPositions
-from assoc.tracking.live.pictures import Antenna, SoundPlot
+from assoc.tracking.live.pictures import Antenna, CheckedPlot
 from assoc.tracking.live.state import LiveSettings, LiveState
 
 _FIELDS = {
@@ -52,7 +52,7 @@ def save(
     inner, past = late.tracker, late.past
     width = max(sensor.dim for sensor in inner.sensors)
     plots = [
-        _row(k, SoundPlot(s, *row), width)
+        _row(k, CheckedPlot(s, *row), width)
         for k, scan in enumerate(past)
         for s, rows in enumerate(scan.by_sensor())
         for row in zip(*rows, strict=True)
@@ -98,7 +98,7 @@ def _filled(
     late.names = dict(found["live.names"].tolist())
     scan, sensor = plots[:, 0].astype(int), plots[:, 1].astype(int)
     kept = [
-        SoundPlot(s, float(row[2]), row[_BEFORE_VALUES : _BEFORE_VALUES + sensors[s].dim], row[3:5].astype(np.int64))
+        CheckedPlot(s, float(row[2]), row[_BEFORE_VALUES : _BEFORE_VALUES + sensors[s].dim], row[3:5].astype(np.int64))
         for row, s in zip(plots, sensor.tolist(), strict=True)
     ]
     known = zip(sensors, found["live.antennas"].tolist(), strict=True)
@@ -118,7 +118,7 @@ def _filled(
     return state, {*found["live.confirmed"].tolist()}, counts
 
 
-def _row(scan: int, plot: SoundPlot, width: int) -> list[float]:
+def _row(scan: int, plot: CheckedPlot, width: int) -> list[float]:
     values = [*plot.z.tolist(), *[math.nan] * (width - len(plot.z))]
     return [scan, plot.sensor, plot.time, *plot.identity.tolist(), *values]
 

@@ -87,45 +87,45 @@ class Identities(NamedTuple):
     parameters: IdentityParameters
     ids: Array = np.zeros(0, dtype=np.int64)
     """Ids of the tracks, ascending, (K,)."""
-    told: Array = np.zeros((0, MEMORY, 2), dtype=np.int64)
+    last: Array = np.zeros((0, MEMORY, 2), dtype=np.int64)
     """Code and address of each track's last plots, the newest first; 0 unknown; (K, MEMORY, 2)."""
 
     def evidence(self, track_id: Array, identities: Array) -> Evidence:
         """Weigh pairs of a track id (K,) and a plot's code and address (K, 2)."""
-        told = self._of(track_id)
+        last = self._of(track_id)
         p = self.parameters
-        code, _ = log_ratio(told[:, :, 0], identities[:, 0], CODES, p.code_garbled, p.code_shared)
-        address, likeliest = log_ratio(told[:, :, 1], identities[:, 1], ADDRESSES, p.address_garbled, p.address_shared)
+        code, _ = log_ratio(last[:, :, 0], identities[:, 0], CODES, p.code_garbled, p.code_shared)
+        address, likeliest = log_ratio(last[:, :, 1], identities[:, 1], ADDRESSES, p.address_garbled, p.address_shared)
         both = (identities[:, 1] != UNKNOWN) & (likeliest != UNKNOWN)
         return Evidence(np.where(both, address, code), ~both | (likeliest == identities[:, 1]))
 
     def after(self, taken: Sequence[Array], identities: Sequence[Array], living: Array) -> Identities:
         """Add plots and their tracks (0: none), by sensor; tracks that are not in `living` are forgotten."""
         ids = np.unique(living)
-        told = self._of(ids)
+        last = self._of(ids)
         for owners, pairs in zip(taken, identities, strict=True):
             for track, pair in zip(np.asarray(owners).tolist(), pairs, strict=True):
                 row = int(np.searchsorted(ids, track))
                 if pair.any() and row < len(ids) and ids[row] == track:
-                    told[row, 1:] = told[row, :-1].copy()
-                    told[row, 0] = pair
-        known = told.any(axis=(1, 2))
-        return Identities(self.parameters, ids[known], told[known])
+                    last[row, 1:] = last[row, :-1].copy()
+                    last[row, 0] = pair
+        known = last.any(axis=(1, 2))
+        return Identities(self.parameters, ids[known], last[known])
 
     def of_tracks(self, old: Array, new: Array) -> tuple[Array, Array]:
-        """What the last plots of new tracks (K,) say for their being old ones (K,); see `evidence`."""
+        """Evidence, by their last plots, that new tracks (K,) are these old ones (K,); see `evidence`."""
         return self.evidence(old, self._of(new)[:, 0])
 
     def _of(self, track_id: Array) -> Array:
         """Codes and addresses of tracks' last plots, (K, MEMORY, 2)."""
         rows = np.searchsorted(self.ids, track_id)
         found = np.append(self.ids, -1)[rows] == track_id
-        told = np.concatenate([self.told, np.zeros((1, MEMORY, 2), dtype=np.int64)])
-        return told[np.where(found, rows, len(self.ids))]
+        last = np.concatenate([self.last, np.zeros((1, MEMORY, 2), dtype=np.int64)])
+        return last[np.where(found, rows, len(self.ids))]
 
     def arrays(self) -> dict[str, Array]:
         """The state as arrays; `restored` reads it."""
-        return {f"{PREFIX}ids": self.ids, f"{PREFIX}told": self.told}
+        return {f"{PREFIX}ids": self.ids, f"{PREFIX}told": self.last}
 
     def restored(self, arrays: Mapping[str, Array]) -> Identities:
         """Read a state that `arrays` returned.
@@ -135,19 +135,19 @@ class Identities(NamedTuple):
         InvalidInputError
             The arrays do not hold such a state.
         """
-        ids, told = arrays[f"{PREFIX}ids"], arrays[f"{PREFIX}told"]
-        good = ids.ndim == 1 and told.shape == (len(ids), MEMORY, 2) and bool((np.diff(ids) > 0).all())
-        if not good or (told < 0).any() or (told > LARGEST).any():
+        ids, last = arrays[f"{PREFIX}ids"], arrays[f"{PREFIX}told"]
+        good = ids.ndim == 1 and last.shape == (len(ids), MEMORY, 2) and bool((np.diff(ids) > 0).all())
+        if not good or (last < 0).any() or (last > LARGEST).any():
             raise InvalidInputError(f"the fields '{PREFIX}...' are no identities of tracks")
-        return Identities(self.parameters, ids, told)
+        return Identities(self.parameters, ids, last)
 
 
-def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:
+def log_ratio(last: Array, given: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:
     """Log likelihood ratios of plots' codes, and the likeliest code of each track (0 where its plots have none).
 
     Parameters
     ----------
-    told : int array (K, M)
+    last : int array (K, M)
         Codes of the last plots of each track, 0 unknown.
     given : int array (K,)
         Code of the plot, 0 unknown.
@@ -156,20 +156,20 @@ def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: flo
     garbled, shared : float
         g and s; see the module's description.
     """
-    known = told != UNKNOWN
+    known = last != UNKNOWN
     # how often each code occurs among the last plots; a code that occurs k times counts k times with weight 1/k
-    times = ((told[:, :, None] == told[:, None, :]) & known[:, None, :]).sum(axis=2)
+    times = ((last[:, :, None] == last[:, None, :]) & known[:, None, :]).sum(axis=2)
     each = np.where(known, 1.0 / np.maximum(times, 1), 0.0)
     vote = np.log1p(-garbled + garbled / count) - np.log(garbled / count)
     votes = np.where(known, times, 0)
     top = vote * votes.max(axis=1, initial=0)
     scaled = (each * np.exp(vote * votes - top[:, None])).sum(axis=1) + (count - each.sum(axis=1)) * np.exp(-top)
-    same = ((told == given[:, None]) & known).sum(axis=1)
+    same = ((last == given[:, None]) & known).sum(axis=1)
     weight = np.exp(vote * same - top) / scaled
     same_aircraft = (1.0 - garbled) * weight + garbled / count
     other = shared * weight + (1.0 - shared) / count
     informative = (given != UNKNOWN) & known.any(axis=1)
-    best = np.take_along_axis(told, np.argmax(np.where(known, times, -1), axis=1)[:, None], axis=1)[:, 0]
+    best = np.take_along_axis(last, np.argmax(np.where(known, times, -1), axis=1)[:, None], axis=1)[:, 0]
     return np.where(informative, np.log(same_aircraft / other), 0.0), np.where(known.any(axis=1), best, UNKNOWN)
 
 
