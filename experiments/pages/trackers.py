@@ -50,12 +50,6 @@ def _tenths(claim: Claim) -> str:
     return f"{claim.ours:.1f}".removesuffix(".0")
 
 
-def _hota(results: Results, start: str) -> str:
-    """HOTA in three decimals; a dash where the file was written before it was measured."""
-    what = f"{start}: HOTA"
-    return f"{results[what].ours:.3f}" if what in results else "-"
-
-
 def labels(results: Results, words: str) -> list[str]:
     """Kinds of scenes in the order of the file, by the claims that end so."""
     found = [c.quantity.removesuffix(words) for c in results.claims if c.quantity.endswith(words)]
@@ -109,7 +103,7 @@ def close_times() -> str:
 
     def cell(start: str) -> str:
         time = number(r[f"{start}: CPU time of a scan"].ours, 2)
-        return f"{number(r[f'{start}: OSPA(2)'].ours)} / {_hota(r, start)} / {time}"
+        return f"{number(r[f'{start}: OSPA(2)'].ours)} / {r[f'{start}: HOTA'].ours:.3f} / {time}"
 
     rows = [[label, *(cell(f"{label}, {name}") for name in CLOSE)] for label in labels(r, ", oracle: GOSPA")]
     return table(["OSPA(2), m / HOTA / time of a scan, ms", *CLOSE.values()], rows)
@@ -167,7 +161,7 @@ def comparison() -> str:
             parts = " / ".join(number(r[start + part].ours) for part in ("localisation", "missed", "false"))
             rows.append(
                 [label, shown, mean(r[start + "GOSPA"]), parts, _tenths(r[start + "switches"]),
-                 number(r[start + "OSPA(2)"].ours), _hota(r, start.removesuffix(": ")),
+                 number(r[start + "OSPA(2)"].ours), f"{r[start + 'HOTA'].ours:.3f}",
                  number(r[start + "CPU time of a scan"].ours, 2)]
             )  # fmt: skip
     heads = ["GOSPA, m", "localisation / missed / false, m", "switches", "OSPA(2), m", "HOTA", "time, ms"]

@@ -1,6 +1,7 @@
 """How the trackers of all experiments are judged: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -73,12 +74,11 @@ def means(runs: Sequence[Judged]) -> Array:
 
 def claims_of(label: str, name: str, runs: Sequence[Judged]) -> list[Claim]:
     """What a tracker did on the scenes of one kind."""
-    gospa, switches = means(runs), np.array([float(run.switches) for run in runs])
     return [
-        mean_claim(f"{label}, {name}: GOSPA", "m", gospa),
+        mean_claim(f"{label}, {name}: GOSPA", "m", means(runs)),
         mean_claim(f"{label}, {name}: OSPA(2)", "m", np.array([run.ospa2 for run in runs])),
         mean_claim(f"{label}, {name}: HOTA", "", np.array([run.hota for run in runs])),
-        mean_claim(f"{label}, {name}: switches", "", switches),
+        mean_claim(f"{label}, {name}: switches", "", np.array([float(run.switches) for run in runs])),
         Claim(f"{label}, {name}: CPU time of a scan", "ms", ours=float(np.median([run.milliseconds for run in runs]))),
     ]
 
@@ -93,7 +93,4 @@ def goal(quantity: str, unit: str, values: Array, most: float, *, surely: bool =
     """A goal for a mean over scenes: at most so much, with the whole interval, or if not `surely` with a part of it."""
     claim = mean_claim(f"goal: {quantity}", unit, values)
     low, high = claim.interval or (claim.ours, claim.ours)
-    holds = (high if surely else low) <= most
-    return Claim(
-        claim.quantity, unit, ours=claim.ours, interval=claim.interval, band=(None, most), holds=holds, source=GOAL
-    )
+    return replace(claim, band=(None, most), holds=(high if surely else low) <= most, source=GOAL)
