@@ -23,12 +23,13 @@ from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
-from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values
-from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
-from assoc.packing.simplex.program import all_allowed, make_feasible, program_of, weight_limit
+from assoc.packing.simplex.basis import primal_values
+from assoc.packing.simplex.dual import Effort
+from assoc.packing.simplex.program import all_allowed, program_of
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
+from tests.packings import all_covers, finished, is_cover, relaxed, weights_of
 
 
 def feasible(count, seed):
@@ -42,20 +43,11 @@ def search_of(packing, incumbent=np.inf):
     return BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9)
 
 
-def covers(packing, columns):
-    """Whether the columns are disjoint and cover every row that must be covered."""
-    used = packing.cols[columns]
-    count = np.bincount(used[used >= 0], minlength=packing.num_rows)
-    return count.max(initial=0) <= 1 and bool((packing.slack | (count == 1)).all())
-
-
 def test_the_optimum_is_that_of_enumeration():
     for problem, optimum in feasible(60, 71):
         prepared = prepare(problem)
-        search = search_of(prepared.packing)
-        while not search.done:
-            search.run(7)
-        assert search.columns is not None and covers(prepared.packing, search.columns)
+        search = finished(search_of(prepared.packing), 7)
+        assert search.columns is not None and is_cover(prepared.packing, search.columns)
         weight = prepared.packing.weights[search.columns].sum()
         assert weight == pytest.approx(search.weight, abs=1e-9)
         assert weight + prepared.offset == pytest.approx(optimum, abs=1e-8)
@@ -174,18 +166,6 @@ def test_the_two_children_of_a_node_partition_its_solutions():
             assert inside == [not together, together]
 
 
-def relaxed(packing):
-    """The linear program of a packing and its optimal basis."""
-    program = program_of(packing.arrays)
-    allowed = all_allowed(program, packing.slack)
-    basis = new_basis(program)
-    duals = dual_bound(packing)
-    make_feasible(program, allowed, duals)
-    begin_from_duals(program, allowed, duals, basis)
-    assert solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))[0] == OPTIMAL
-    return program, allowed, basis
-
-
 def test_a_verdict_on_a_pair_is_true():
     """Pairs are fractional by the LP's values; an excluded side has no solution below the cutoff."""
     rng = np.random.default_rng(77)
@@ -208,7 +188,7 @@ def test_a_verdict_on_a_pair_is_true():
             continue
         asked += 1
         solutions = all_covers(packing)
-        best = min(packing.weights[list(cover)].sum() for cover in solutions)
+        best = weights_of(packing, solutions).min()
         cutoff = best + 0.01 * abs(best)
         which, verdict = decide(program, packing.cols, allowed, basis, trials, count, Effort(cutoff, 0, np.inf))
         if verdict == NEITHER:
@@ -237,24 +217,6 @@ def test_an_open_pair_is_answered_both_ways_by_columns():
             assert all(a == b or not a & b for a in rows for b in rows)
 
 
-def all_covers(packing):
-    """Every choice of disjoint columns that covers the rows without slack."""
-    masks = [sum(1 << r for r in cols if r >= 0) for cols in packing.cols.tolist()]
-    must = sum(1 << r for r in range(packing.num_rows) if not packing.slack[r])
-    found = []
-
-    def extend(first, covered, chosen):
-        if len(found) < 2000:
-            if not must & ~covered:
-                found.append(chosen)
-            for j in range(first, len(masks)):
-                if not masks[j] & covered:
-                    extend(j + 1, covered | masks[j], (*chosen, j))
-
-    extend(0, 0, ())
-    return found
-
-
 def must_be_covered(packing, slack, solution):
     used = packing.cols[list(solution)]
     covered = np.zeros(packing.num_rows, dtype=bool)
@@ -268,7 +230,7 @@ def test_first_solution_is_one_or_there_is_none():
         packing = prepare(problem).packing
         columns = first_solution(packing, Run(0))
         if all_solutions(problem):
-            assert columns is not None and covers(packing, columns)
+            assert columns is not None and is_cover(packing, columns)
             found += 1
         else:
             assert columns is None

@@ -9,51 +9,14 @@ from assoc.packing.branching import counts
 from assoc.packing.branching.counts import USUAL, Splitting, split_on_counts
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.program import weight_limit
 from experiments.common.instances.synthetic import axial_random
 from tests.oracles import small_problems
-from tests.packing.test_branching import covers
-from tests.packing.test_passes import ghosts, optimum
+from tests.packings import all_covers, finished, ghosts, is_cover, random_packing, weights_of
 
 # split whenever it can be, and at once
 ALWAYS = Splitting(after=1, raised=-np.inf, pays=np.inf)
-
-
-def random_packing(seed, rigid=0.0):
-    """Three sensors with three rows each, a third of all columns; a share of the rows must be covered."""
-    rng = np.random.default_rng(seed)
-    ids = np.stack(np.meshgrid(*[np.arange(-1, 3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    ids = ids[((ids >= 0).sum(axis=1) >= 1) & (rng.random(len(ids)) < 0.35)]
-    cols = np.where(ids >= 0, ids + 3 * np.arange(3), -1).astype(np.int32)
-    weights = 0.5 - (cols >= 0).sum(axis=1) - 0.3 * rng.random(len(cols))
-    packing = assemble(cols, weights, rng.random(9) >= rigid, np.arange(len(cols), dtype=np.int32))
-    return packing.component(0)
-
-
-def solutions(packing):
-    """All sets of columns that are a solution."""
-    found = []
-
-    def choose(row, taken, columns):
-        while row < packing.num_rows and taken[row]:
-            row += 1
-        if row == packing.num_rows:
-            found.append(columns)
-            return
-        if packing.slack[row]:
-            choose(row + 1, taken, columns)
-        for j in packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]:
-            rows = packing.cols[j][packing.cols[j] >= 0]
-            # earlier rows are covered or left uncovered
-            if (rows >= row).all() and not taken[rows].any():
-                now = taken.copy()
-                now[rows] = True
-                choose(row + 1, now, [*columns, int(j)])
-
-    choose(0, np.zeros(packing.num_rows, dtype=bool), [])
-    return found
 
 
 def inside(leaf, size, used):
@@ -68,27 +31,39 @@ def inside(leaf, size, used):
     return ((value <= most) & (value >= most - program.sides[size + half :])).all(axis=1)
 
 
+def columns_used(packing):
+    """Which columns each solution has, shape (solutions, N)."""
+    every = all_covers(packing)
+    used = np.zeros((len(every), packing.num_columns), dtype=np.int64)
+    for row, one in zip(used, every, strict=True):
+        row[list(one)] = 1
+    return used
+
+
+def times_in(leaves, packing, used):
+    """In how many parts each solution is; in each it weighs no less than the bound."""
+    weights, times = used @ packing.weights, np.zeros(len(used), dtype=np.int64)
+    for leaf in leaves:
+        part = inside(leaf, packing.num_rows, used)
+        times += part
+        assert (weights[part] >= leaf.bound - 1e-9).all()
+    return times
+
+
 @pytest.mark.parametrize("rigid", [0.0, 0.3])
 def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(rigid):
     split = dropped = 0
     for seed in range(24):
         packing = random_packing(seed, rigid)
         root = plain_root(packing, dual_bound(packing))
-        every = solutions(packing)
-        if not every:
+        used = columns_used(packing)
+        if not len(used):
             continue
-        used = np.zeros((len(every), packing.num_columns), dtype=np.int64)
-        for row, one in zip(used, every, strict=True):
-            row[one] = 1
         weights = used @ packing.weights
         for cutoff in (np.inf, weights.min() + 0.8, weights.min()):
             leaves = split_on_counts(packing, root, cutoff, cutoff, np.inf, np.inf)
             split += len(leaves) > 1
-            times = np.zeros(len(every), dtype=np.int64)
-            for leaf in leaves:
-                part = inside(leaf, packing.num_rows, used)
-                times += part
-                assert (weights[part] >= leaf.bound - 1e-9).all()
+            times = times_in(leaves, packing, used)
             assert times.max() <= 1 and (weights[times == 0] >= cutoff - 1e-9).all()
             dropped += int((times == 0).sum())
     assert split > 8 and dropped > 0
@@ -98,8 +73,7 @@ def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(rigid):
 def test_a_search_of_parts_ends_at_the_optimum(rigid):
     for seed in range(20):
         packing = random_packing(seed, rigid)
-        every = solutions(packing)
-        best = min((packing.weights[one].sum() for one in every), default=np.inf)
+        best = weights_of(packing, all_covers(packing)).min(initial=np.inf)
         for incumbent in (np.inf, -1.0, best - 0.5, best + 0.3):
             one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True, splitting=ALWAYS)
             while not one.done:
@@ -107,7 +81,7 @@ def test_a_search_of_parts_ends_at_the_optimum(rigid):
                 assert one.lower_bound <= max(best, min(best, incumbent)) + 1e-8
             assert one.weight == pytest.approx(min(best, incumbent), abs=1e-9)
             if one.columns is not None:
-                assert covers(packing, one.columns)
+                assert is_cover(packing, one.columns)
                 assert packing.weights[one.columns].sum() == pytest.approx(best, abs=1e-9)
 
 
@@ -116,7 +90,7 @@ def test_bounds_of_parts_hold_and_rise():
     made = 0
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
-        best = optimum(packing, duals, 1e-9 * abs(bound))
+        best = finished(BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))).weight
         for incumbent in (0.95 * bound, best + 1e-3 * abs(best)):
             one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
             bounds = []
@@ -141,9 +115,7 @@ def test_axial_packings_and_problems_without_dummies():
         found = []
         for to_the_end in (False, True):
             one = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, to_the_end=to_the_end, splitting=ALWAYS)
-            while not one.done:
-                one.run(5)
-            found.append(one.weight)
+            found.append(finished(one, 5).weight)
         assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
@@ -176,24 +148,10 @@ def test_fewer_nodes_are_needed_where_the_gap_is_wide():
         # the second and the third from the same incumbent, a little above the optimum
         incumbent = min(0.95 * bound, weight + 1e-3 * abs(weight)) if nodes else 0.95 * bound
         one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=Splitting(after))
-        while not one.done:
-            one.run(1000)
-        assert not nodes or one.weight == pytest.approx(weight, abs=1e-8)
-        weight = one.weight
+        before, weight = weight, finished(one).weight
+        assert not nodes or weight == pytest.approx(before, abs=1e-8)
         nodes.append(one.nodes)
     assert nodes[2] < 0.7 * nodes[1]
-
-
-def test_what_a_pass_has_not_searched_yet_bounds_the_whole():
-    """Between two parts, whatever the aim."""
-    packing, duals, bound = ghosts(10, 16)
-    one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
-    one._begin()
-    leaves = split_on_counts(packing, one._root, np.inf, np.inf, np.inf, np.inf)
-    one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
-    one._open.count, one._aim = 0, np.inf
-    assert len(leaves) > 1 and not one.done
-    assert one.lower_bound == min(leaf.bound for leaf in leaves)
 
 
 def test_a_long_first_pass_is_split_before_it_ends():

@@ -9,7 +9,8 @@ from assoc.packing.branching.counts import split_on_counts
 from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
-from tests.packing.test_counts import ALWAYS, inside, random_packing, solutions
+from tests.packing.test_counts import ALWAYS, columns_used, times_in
+from tests.packings import all_covers, random_packing, weights_of
 
 
 @pytest.fixture(params=[3, 26])
@@ -24,21 +25,11 @@ def split(packing, cutoff=np.inf):
 
 
 def test_every_solution_is_of_one_part(packing):
-    every = solutions(packing)
-    used = np.zeros((len(every), packing.num_columns), dtype=np.int64)
-    for row, one in zip(used, every, strict=True):
-        row[one] = 1
-    weights = used @ packing.weights
-    times = np.zeros(len(every), dtype=np.int64)
-    for leaf in split(packing):
-        part = inside(leaf, packing.num_rows, used)
-        times += part
-        assert (weights[part] >= leaf.bound - 1e-9).all()
-    assert (times == 1).all()
+    assert (times_in(split(packing), packing, columns_used(packing)) == 1).all()
 
 
 def test_a_search_in_parts_ends_at_the_optimum(packing):
-    best = min(packing.weights[one].sum() for one in solutions(packing))
+    best = weights_of(packing, all_covers(packing)).min()
     for incumbent in (-1.0, best + 0.3):
         one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True, splitting=ALWAYS)
         while not one.done:
@@ -81,13 +72,13 @@ def test_columns_of_many_rows_are_counted():
 
 
 def test_a_split_without_time_is_one_part_and_its_bound_holds(packing):
-    best = min(packing.weights[one].sum() for one in solutions(packing))
+    best = weights_of(packing, all_covers(packing)).min()
     (leaf,) = split_on_counts(packing, plain_root(packing, dual_bound(packing)), np.inf, np.inf, -1.0, np.inf)
     assert leaf.bound <= best + 1e-9
 
 
 def test_parts_that_there_is_no_time_to_solve_again_stay_as_they_were(packing):
-    best = min(packing.weights[one].sum() for one in solutions(packing))
+    best = weights_of(packing, all_covers(packing)).min()
     root, everything = plain_root(packing, dual_bound(packing)), counts._counts_of(packing)
     counted = counts._Counted(root, everything, np.inf, np.inf)
     parts = counts._split(counted, everything, counted.effort.cutoff, np.inf)

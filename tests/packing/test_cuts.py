@@ -13,8 +13,7 @@ from assoc.packing.simplex.basis import primal_values
 from assoc.packing.simplex.cuts import odd_sets
 from assoc.packing.simplex.program import all_allowed, certified, make_feasible
 from tests.oracles import gated_problem
-from tests.packing.test_branching import all_covers, relaxed
-from tests.packing.test_passes import ghosts
+from tests.packings import all_covers, finished, ghosts, matrix_of_program, relaxed, weights_of
 
 
 def odd_packings(count, seed):
@@ -43,14 +42,6 @@ def pairs_covered(packing, rows):
     return np.array([len(rows & set(cols)) // 2 for cols in packing.cols.tolist()])
 
 
-def matrix_of(program):
-    matrix = np.zeros((program.sides.size, program.weights.size))
-    for j in range(program.weights.size):
-        for r in program.rows[program.start[j] : program.start[j + 1]]:
-            matrix[r, j] += 1.0
-    return matrix
-
-
 def test_sets_are_odd_violated_and_spare_every_solution():
     found = 0
     for packing in odd_packings(150, 1):
@@ -72,13 +63,13 @@ def test_the_root_is_tighter_and_below_every_solution():
     """Its program is the LP with those cuts, by HiGHS; its multipliers prove a bound that holds."""
     tighter, closed = 0, 0
     for packing in odd_packings(150, 2):
-        best = min(packing.weights[list(cover)].sum() for cover in all_covers(packing))
+        best = weights_of(packing, all_covers(packing)).min()
         plain = plain_root(packing, dual_bound(packing))
         root = root_with_cuts(packing, dual_bound(packing), np.inf, np.inf)
         size = packing.num_rows
         assert root.slack[size:].all() and np.array_equal(root.slack[:size], packing.slack)
-        matrix = matrix_of(root.program)
-        assert np.array_equal(matrix[:size], matrix_of(plain.program))
+        matrix = matrix_of_program(root.program)
+        assert np.array_equal(matrix[:size], matrix_of_program(plain.program))
         weights, sides = packing.weights, root.program.sides
         optimum = linprog(weights, A_ub=matrix, b_ub=sides).fun
         without = linprog(weights, A_ub=matrix[:size], b_ub=sides[:size]).fun
@@ -94,11 +85,9 @@ def test_the_root_is_tighter_and_below_every_solution():
 
 def test_a_search_with_cuts_ends_at_the_same_optimum():
     for packing in odd_packings(100, 3):
-        best = min(packing.weights[list(cover)].sum() for cover in all_covers(packing))
+        best = weights_of(packing, all_covers(packing)).min()
         for incumbent in (np.inf, best + 0.5):
-            search = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True)
-            while not search.done:
-                search.run(1)
+            search = finished(BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True), 1)
             assert search.weight == pytest.approx(best, abs=1e-9) and search.lower_bound <= best + 1e-9
             assert search.columns is not None
             assert packing.weights[search.columns].sum() == pytest.approx(best, abs=1e-9)
@@ -106,7 +95,7 @@ def test_a_search_with_cuts_ends_at_the_same_optimum():
 
 def test_only_better_solutions_are_looked_for_with_cuts():
     for packing in odd_packings(50, 4):
-        best = min(packing.weights[list(cover)].sum() for cover in all_covers(packing))
+        best = weights_of(packing, all_covers(packing)).min()
         search = BranchAndBound(packing, dual_bound(packing), best, 1e-9, to_the_end=True)
         search.run(10_000)
         assert search.done and search.columns is None
@@ -116,10 +105,7 @@ def test_passes_need_no_good_incumbent(monkeypatch):
     """A search to the end from a poor incumbent takes few nodes more than one from the optimum."""
 
     def searched(incumbent):
-        search = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
-        while not search.done:
-            search.run(1000)
-        return search
+        return finished(BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True))
 
     nodes = np.zeros(3)
     for seed in (4, 5, 6):

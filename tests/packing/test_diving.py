@@ -5,8 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import coo_matrix
 
 import assoc
 from assoc._system import memory
@@ -26,6 +24,7 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 from experiments.common.instances.synthetic import axial_known_optimum, wide_gates
+from tests.packings import optimum
 from tests.solvers.pieces import columns_of, component, cover_of, open_problem
 
 # no cover is known
@@ -142,7 +141,7 @@ def test_dives_begin_in_a_program_with_cuts(priced, plain):
     root = plain._relaxed
     diver = Diver(priced, NONE, np.inf)
     core = diver._core
-    best = _milp(core, np.ones(core.num_columns, dtype=bool), [])
+    best = optimum(core, whole=True)
     assert root.bound + 0.01 < diver._relaxed.bound <= best + 1e-7
     assert len(diver._root.sets) > 0
 
@@ -310,17 +309,17 @@ def test_what_leaves_nothing_better_is_not_fixed(plain):
     assert refused > 2 and fixed > 2
 
 
-def test_the_rest_is_covered_as_well_as_can_be(priced):
+def test_the_rest_is_covered_as_well_as_can_be(plain):
     """The completion of the fixed columns is optimal by scipy's MILP; empty if that is not below the cutoff."""
-    diver = Diver(priced, NONE, np.inf)
-    core = diver._core
+    diver, core = plain, plain._core
     for cutoff in (np.inf, -1.0):
         diver._program.back()
         at = _Descent(core, diver._program, diver._relaxed, np.inf)
         assert at.fix(at.open_columns()[::3], 15.0, np.inf)
         fixed = list(at._fixed)
+        assert len(fixed) > 1
         columns = np.logical_and.reduce([_left(core, j) for j in fixed])
-        best = _milp(core, columns, fixed)
+        best = optimum(core, columns, fixed=fixed, whole=True)
         at._cutoff = min(cutoff, best - 1e-6) if cutoff < 0.0 else cutoff
         found, done = at.completed(Limits(1e-9, np.inf, 10_000, np.inf))
         assert done and at.fixed.tolist() == fixed
@@ -331,25 +330,6 @@ def test_the_rest_is_covered_as_well_as_can_be(priced):
             # no row twice
             cover_of(core, found)
             assert core.weights[found].sum() == pytest.approx(best, abs=1e-7)
-
-
-def _milp(core, columns, fixed):
-    """Least weight of a cover of these columns, some of them fixed."""
-    rows, places = [], []
-    for j in range(core.num_columns):
-        for r in core.cols[j][core.cols[j] >= 0]:
-            rows.append(r)
-            places.append(j)
-    matrix = coo_matrix((np.ones(len(rows)), (rows, places)), shape=(core.num_rows, core.num_columns))
-    lower = np.zeros(core.num_columns)
-    lower[fixed] = 1.0
-    found = milp(
-        core.weights,
-        integrality=np.ones(core.num_columns),
-        bounds=Bounds(lower, columns.astype(float)),
-        constraints=LinearConstraint(matrix, np.where(core.slack, 0.0, 1.0), 1.0),
-    )
-    return float(found.fun)
 
 
 def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, plain):

@@ -3,37 +3,20 @@
 import numpy as np
 import pytest
 
-from assoc.costs import build_problem
-from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from experiments.common.instances.scenes import ghost
 from experiments.common.instances.synthetic import axial_random
-
-
-def ghosts(targets, seed):
-    """The largest component of a scene of ghosts, multipliers, and a bound that they give."""
-    packing = prepare(build_problem(ghost(targets, seed), 0)).packing
-    packing = max((packing.component(c) for c in range(packing.num_components)), key=lambda one: one.num_columns)
-    duals = dual_bound(packing)
-    return packing, duals, certified_bound(packing, duals)
-
-
-def optimum(packing, duals, tolerance):
-    """Weight of the best solution, by one search without passes."""
-    search = BranchAndBound(packing, duals, np.inf, tolerance)
-    while not search.done:
-        search.run(1000)
-    return search.weight
+from tests.packings import finished, ghosts
 
 
 def test_bounds_of_passes_hold_and_rise():
     """From poor incumbents, checked after every node: the bound is never above the optimum, and never falls."""
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
-        best = optimum(packing, duals, 1e-9 * abs(bound))
+        best = finished(BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))).weight
         for floor in (-np.inf, best - 0.5 * (best - bound)):
             search = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, floor=floor)
             bounds = []
@@ -56,9 +39,7 @@ def test_passes_over_whole_numbers_end_at_the_optimum_itself():
         found = []
         for above in (np.inf, 0.0, 1.0, 5.0, 20.0):
             incumbent = above if not found else found[0] + above
-            search = BranchAndBound(packing, duals, incumbent, 0.9, to_the_end=True)
-            while not search.done:
-                search.run(1)
+            search = finished(BranchAndBound(packing, duals, incumbent, 0.9, to_the_end=True), 1)
             assert search.lower_bound == search.weight
             found.append(search.weight)
             nodes += search.nodes

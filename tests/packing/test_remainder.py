@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.root import root_with_cuts
@@ -13,20 +12,7 @@ from assoc.packing.simplex.dual import OPTIMAL, Effort, bound_of, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, weight_limit
 from tests.oracles import axial_problem
 from tests.packing.test_trial import packings, program_with_cuts, solved
-
-
-def optimum(program, slack, columns, fixed):
-    """The optimum by HiGHS of a program with these columns, of which some are fixed; infinite without a solution."""
-    matrix = np.zeros((program.sides.size, program.weights.size))
-    for j in range(program.weights.size):
-        np.add.at(matrix[:, j], program.rows[program.start[j] : program.start[j + 1]], 1.0)
-    least, most = np.zeros(program.weights.size), np.where(columns, np.inf, 0.0)
-    least[fixed], most[fixed] = 1.0, 1.0
-    answer = linprog(
-        program.weights, A_ub=matrix[slack], b_ub=program.sides[slack], A_eq=matrix[~slack],
-        b_eq=program.sides[~slack], bounds=np.column_stack([least, most]),
-    )  # fmt: skip
-    return answer.fun if answer.status == 0 else np.inf
+from tests.packings import by_highs, matrix_of_program
 
 
 def with_random_cuts():
@@ -69,7 +55,8 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
         both = open_columns.copy()
         both[fixed] = True
         fixed = np.array(fixed, dtype=np.int64)
-        least = optimum(program, may_stay, open_columns, fixed)
+        matrix = matrix_of_program(program)
+        least = by_highs(program.weights, matrix, program.sides, may_stay, open_columns, fixed)
         effort = Effort(weight_limit(program), 10_000, np.inf)
         status, _ = solve_dual(program, Allowed(np.flatnonzero(both).astype(np.int32), both, may_stay), basis, effort)
         rest = remainder_of(program, basis, fixed, np.flatnonzero(open_columns), may_stay)

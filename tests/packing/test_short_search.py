@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import Bounds, LinearConstraint, milp
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.depth_first import Limits
@@ -12,6 +11,7 @@ from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import all_allowed
 from tests.packing.test_trial import packings
+from tests.packings import is_cover, optimum
 
 NO_LIMITS = Limits(1e-9, np.inf, 100_000, np.inf)
 NONE = np.zeros(0, dtype=np.int64)
@@ -43,21 +43,6 @@ def part_of(packing, rng, share, most):
     return Part(columns, packing.slack & ~covered[:-1], np.array(fixed, dtype=np.int64))
 
 
-def best_of(packing, part):
-    """Least weight of a cover of these columns with those that are fixed."""
-    matrix = np.zeros((packing.num_rows, packing.num_columns))
-    for j in range(packing.num_columns):
-        matrix[packing.cols[j][packing.cols[j] >= 0], j] = 1.0
-    least = np.zeros(packing.num_columns)
-    least[part.fixed] = 1.0
-    rows = LinearConstraint(matrix, np.where(packing.slack, 0.0, 1.0), 1.0)
-    answer = milp(
-        packing.weights, integrality=np.ones(packing.num_columns), bounds=Bounds(least, part.columns.astype(float)),
-        constraints=rows,
-    )  # fmt: skip
-    return answer.fun if answer.status == 0 else np.inf
-
-
 def test_what_is_found_is_the_best_of_its_part():
     """And empty, if that is not below the cutoff."""
     rng = np.random.default_rng(3)
@@ -68,7 +53,7 @@ def test_what_is_found_is_the_best_of_its_part():
             part = part_of(packing, rng, share, most)
             linear.back()
             linear.solve(columns=part.columns, slack=part.slack)
-            best = best_of(packing, part)
+            best = optimum(packing, part.columns, fixed=part.fixed, whole=True)
             found, done = search_shortly(packing, linear, part, np.inf, NO_LIMITS)
             assert done
             if best == np.inf:
@@ -76,9 +61,7 @@ def test_what_is_found_is_the_best_of_its_part():
                 continue
             feasible += 1
             assert part.columns[found].all() and np.isin(part.fixed, found).all()
-            rows = packing.cols[found]
-            rows = rows[rows >= 0]
-            assert np.unique(rows).size == rows.size and np.isin(np.flatnonzero(~packing.slack), rows).all()
+            assert is_cover(packing, found)
             assert packing.weights[found].sum() == pytest.approx(best, abs=1e-8)
             found, done = search_shortly(packing, linear, part, best - 1e-6, NO_LIMITS)
             assert done and not found.size

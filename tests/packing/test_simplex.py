@@ -5,7 +5,6 @@ import time
 import numpy as np
 import pytest
 from scipy.optimize import linprog
-from scipy.sparse import csr_array
 
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.prepare import prepare
@@ -15,7 +14,7 @@ from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, program_of, weight_limit
 from assoc.problem import AssignmentProblem
 from tests.oracles import axial_problem, gated_problem
-from tests.packing.test_branching import relaxed
+from tests.packings import matrix_of, optimum, relaxed
 from tests.sizes import few_or_all
 
 
@@ -28,34 +27,6 @@ def random_packing(rng, number):
     if number % 2:
         return prepare(gated_problem(rng, sizes, float(rng.uniform(0.05, 0.6)), style)).packing
     return prepare(axial_problem(rng, sizes, float(rng.uniform(0.5, 1.0)), style)).packing
-
-
-def optimum(packing, columns=None, slack=None):
-    """The linear program's optimum by HiGHS; infinite where there is no solution."""
-    columns = np.ones(packing.num_columns, dtype=bool) if columns is None else columns
-    slack = packing.slack if slack is None else slack
-    if not packing.num_columns:
-        return 0.0 if slack.all() else np.inf
-    matrix, must = matrix_of(packing), ~slack
-    answer = linprog(
-        packing.weights,
-        A_ub=matrix[slack] if slack.any() else None,
-        b_ub=np.ones(slack.sum()) if slack.any() else None,
-        A_eq=matrix[must] if must.any() else None,
-        b_eq=np.ones(must.sum()) if must.any() else None,
-        bounds=np.column_stack([np.zeros(columns.size), np.where(columns, np.inf, 0.0)]),
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    assert answer.status in (0, 2)
-    return answer.fun if answer.status == 0 else np.inf
-
-
-def matrix_of(packing):
-    used = packing.cols >= 0
-    column = np.repeat(np.arange(packing.num_columns), used.sum(axis=1))
-    return csr_array(
-        (np.ones(column.size), (packing.cols[used], column)), shape=(packing.num_rows, packing.num_columns)
-    )
 
 
 def close(packing, bound, expected):

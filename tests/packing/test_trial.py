@@ -12,6 +12,7 @@ from assoc.packing.simplex.pricing import list_columns, new_pricing, price, sum_
 from assoc.packing.simplex.program import Allowed, all_allowed, certified, make_feasible, program_of, weight_limit
 from assoc.packing.simplex.trial import begin_trials, new_trial, try_dual
 from tests.oracles import axial_problem, gated_problem
+from tests.packings import matrix_of_program
 
 
 def packings(count, seed):
@@ -55,9 +56,7 @@ def test_prices_are_weights_less_the_multipliers_of_the_rows():
     rng = np.random.default_rng(11)
     for packing in packings(10, 12):
         for program in (program_of(packing.arrays), program_with_cuts(packing, rng)):
-            matrix = np.zeros((program.sides.size, program.weights.size))
-            for j in range(program.weights.size):
-                np.add.at(matrix[:, j], program.rows[program.start[j] : program.start[j + 1]], 1.0)
+            matrix = matrix_of_program(program)
             allowed = part(program, all_allowed(program, np.ones(program.sides.size, bool)), rng, 0.6)
             pricing = new_pricing(program)
             list_columns(program, allowed, pricing)

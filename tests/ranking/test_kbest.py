@@ -30,6 +30,7 @@ from tests.oracles import (
     gated_problem,
     small_problems,
 )
+from tests.packings import all_covers, finished, weights_of
 from tests.sizes import few_or_all
 from tests.solvers.test_against_brute_force import blackman_popoli
 
@@ -156,7 +157,7 @@ def test_branching_instead_of_enumeration(count, budget):
         for c in range(packing.num_components):
             piece = packing.component(c)
             own = duals[packing.row_start[c] : packing.row_start[c + 1]]
-            expected = _solutions_of(piece)
+            expected = np.sort(weights_of(piece, all_covers(piece)))
             k = (1, 5, 400)[number % 3]
             ranking = ComponentRanking(piece, own, k, np.inf, 1e-12, budget=budget)
             while not ranking.done:
@@ -166,39 +167,15 @@ def test_branching_instead_of_enumeration(count, budget):
             weights, chosen = ranking.solutions()
             branched += ranking.nodes > 1
             assert len(weights) == min(k, len(expected))
-            assert np.allclose(weights, [weight for weight, _ in expected[:k]], rtol=0.0, atol=1e-9)
+            assert np.allclose(weights, expected[:k], rtol=0.0, atol=1e-9)
             assert len({tuple(columns.tolist()) for columns in chosen}) == len(chosen)
             for weight, columns in zip(weights, chosen, strict=True):
                 assert piece.weights[columns].sum() == pytest.approx(weight, abs=1e-9)
             if len(expected) < k:
                 assert ranking.proven == np.inf
             else:
-                assert ranking.proven == pytest.approx(expected[k - 1][0], abs=1e-9)
+                assert ranking.proven == pytest.approx(expected[k - 1], abs=1e-9)
     assert branched > count // 6
-
-
-def _solutions_of(piece):
-    """All choices of columns of a component, by recursion over its rows in plain Python."""
-    found = []
-    by_row = [[] for _ in range(piece.num_rows)]
-    for j, rows in enumerate(piece.cols.tolist()):
-        used = [r for r in rows if r >= 0]
-        by_row[min(used)].append((j, set(used)))
-
-    def extend(row, covered, chosen, weight):
-        while row < piece.num_rows and row in covered:
-            row += 1
-        if row == piece.num_rows:
-            found.append((weight, chosen))
-            return
-        if piece.slack[row]:
-            extend(row + 1, covered, chosen, weight)
-        for j, used in by_row[row]:
-            if not used & covered:
-                extend(row + 1, covered | used, (*chosen, j), weight + piece.weights[j])
-
-    extend(0, frozenset(), (), 0.0)
-    return sorted(found)
 
 
 @pytest.mark.slow
@@ -208,9 +185,7 @@ def test_scenes_full_of_ghosts_in_parts_and_without(seed):
     lists = []
     for after in (1, 10**9):
         ranking = ComponentRanking(packing, dual_bound(packing), 20, np.inf, 1e-12, splitting=Splitting(after))
-        while not ranking.done:
-            ranking.run(1000)
-        lists.append(ranking.solutions())
+        lists.append(finished(ranking).solutions())
         assert (ranking.parts_begun > 0) == (after == 1)
     (one, first), (two, second) = lists
     assert one == pytest.approx(two, abs=1e-11)

@@ -9,7 +9,7 @@ from assoc.packing.packing import assemble
 from assoc.packing.run import never
 from assoc.ranking import component_ranking
 from assoc.ranking.component_ranking import ComponentRanking
-from tests.packing.test_counts import random_packing, solutions
+from tests.packings import all_covers, finished, random_packing, weights_of
 
 # their kernel compiles for a quarter of a minute
 pytestmark = pytest.mark.slow
@@ -25,9 +25,16 @@ def test_none_is_left_out_and_none_listed_twice(seed, rigid, k, budget):
     check_list(random_packing(seed, rigid), k, budget)
 
 
+def ranked(packing, **options):
+    """The weights of all solutions, and a ranking of the four lightest."""
+    every = np.sort(weights_of(packing, all_covers(packing)))
+    duals = dual_bound(packing)
+    return every, ComponentRanking(packing, duals, 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS, **options)
+
+
 def check_list(packing, k, budget):
     """The lightest k by recursion, and the bound at any moment."""
-    weight_of = {frozenset(one): float(packing.weights[one].sum()) for one in solutions(packing)}
+    weight_of = {frozenset(one): float(packing.weights[one].sum()) for one in map(list, all_covers(packing))}
     every = sorted(weight_of.values())
     ranking = ComponentRanking(packing, dual_bound(packing), k, every[-1] + 1.0, 1e-12, budget=budget, splitting=ALWAYS)
     while not ranking.done:
@@ -49,20 +56,9 @@ def check_list(packing, k, budget):
 
 def test_without_memory_for_parts_the_search_goes_on_as_it_was():
     packing = random_packing(3)
-    every = sorted(packing.weights[one].sum() for one in solutions(packing))
     room = component_ranking.work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
-    ranking = ComponentRanking(
-        packing,
-        dual_bound(packing),
-        4,
-        every[-1] + 1.0,
-        1e-12,
-        budget=0,
-        memory_allows=lambda needed: needed <= room,
-        splitting=ALWAYS,
-    )
-    while not ranking.done:
-        ranking.run(1)
+    every, ranking = ranked(packing, memory_allows=lambda needed: needed <= room)
+    finished(ranking, 1)
     assert not ranking.parts_begun
     assert not ranking.out_of_memory
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
@@ -70,8 +66,7 @@ def test_without_memory_for_parts_the_search_goes_on_as_it_was():
 
 def test_what_was_given_up_in_one_part_is_remembered_in_the_next():
     packing = random_packing(149)
-    every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
+    every, ranking = ranked(packing)
     while not ranking.parts_begun:
         ranking.run(1)
     assert ranking._open.count
@@ -85,8 +80,7 @@ def test_what_was_given_up_in_one_part_is_remembered_in_the_next():
 
 def test_a_split_that_time_ends_leaves_a_bound_that_holds():
     packing = random_packing(26)
-    every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
+    every, ranking = ranked(packing)
     ranking.run(1)
     before = ranking.proven
     # time is over as soon as the search for cuts begins
@@ -94,15 +88,13 @@ def test_a_split_that_time_ends_leaves_a_bound_that_holds():
     ranking._split()
     assert before <= ranking.proven <= every[0] + 1e-9
     ranking._deadline = never
-    while not ranking.done:
-        ranking.run(1)
+    finished(ranking, 1)
     assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
 
 
 def test_parts_that_show_nothing_new_are_not_begun():
     packing = random_packing(149)
-    every = sorted(packing.weights[one].sum() for one in solutions(packing))
-    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, splitting=ALWAYS)
+    every, ranking = ranked(packing)
     while not ranking._split():
         assert not ranking.done
         ranking.run(1)
