@@ -8,6 +8,7 @@ from assoc.registration import OnlineRegistration, RegistrationParameters, regis
 from assoc.tracking import MultiSensorTracker
 from tests.registration.common import BIASES, REGION, biased_scene, radars, scene_of
 from tests.sizes import sample
+from tests.tracking.stepping import stepped
 
 
 def went_through(online, scene):
@@ -50,14 +51,12 @@ def test_drift_is_followed():
 def test_tracker_saved_and_restored(tmp_path, saved_after):
     scene = biased_scene(scans=saved_after + 3)
     one = MultiSensorTracker.for_scene(scene, registration="online")
-    for k in range(saved_after):
-        one.step(scene.times[k], scene.measurements[k])
+    stepped(one, scene, 0, saved_after)
     one.save(tmp_path / "tracker.npz")
     other = MultiSensorTracker.for_scene(scene, registration="online")
     other.restore(tmp_path / "tracker.npz")
-    for k in range(saved_after, saved_after + 3):
-        one.step(scene.times[k], scene.measurements[k])
-        other.step(scene.times[k], scene.measurements[k])
+    for tracker in (one, other):
+        stepped(tracker, scene, saved_after)
     assert np.array_equal(one.registration.biases, other.registration.biases)
     assert all(np.array_equal(a.mean, b.mean) for a, b in zip(one.tracks, other.tracks, strict=True))
     with pytest.raises(InvalidInputError, match="other settings"):
@@ -78,8 +77,7 @@ def test_tracker_with_biases_tracks_as_without():
     counts = {}
     for name, scene, how in (("plain", plain, None), ("wrong", wrong, None), ("online", wrong, "online")):
         tracker = MultiSensorTracker.for_scene(scene, registration=how)
-        for k in range(25):
-            tracker.step(scene.times[k], scene.measurements[k])
+        stepped(tracker, scene)
         truth = plain.scan(24).truth_positions
         confirmed = np.array([track.position for track in tracker.tracks if track.confirmed])
         apart = np.linalg.norm(truth[:, None] - confirmed[None], axis=2).min(axis=1)

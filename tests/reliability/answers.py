@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import AssocWarning
+from tests.tracking.stepping import stepped
 
 SOLVERS = ("exact", "greedy", "aco", "genetic", "tabu", "lagrangian")
 
@@ -73,8 +74,7 @@ def tracks() -> list[Any]:
     for kind, filter_name in (("multi-sensor", "ekf"), ("nearest-neighbour", "ukf"), ("mht", "imm")):
         filter_ = make_filter(filter_name, scene.sensors, 20.0, 0)
         tracker = TRACKERS[kind](scene.sensors, filter_, region=scene.region, time_limit=None)
-        for k in range(scene.num_scans):
-            tracker.step(float(scene.times[k]), scene.measurements[k])
+        stepped(tracker, scene)
         found.append([[one.track_id, one.mean.tolist(), one.covariance.tolist()] for one in tracker.tracks])
     return found
 

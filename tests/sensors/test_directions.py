@@ -11,6 +11,7 @@ from assoc.costs import positions_and_covariances, tuple_costs
 from assoc.sensors import DirectionSensor
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import two_speeds
+from tests.tracking.stepping import stepped
 
 SITES = [[0, 0, 0], [900, 0, 50], [200, 1000, 20]]
 NOISE = np.array([[4e-6, 1e-6], [1e-6, 2e-6]])
@@ -54,8 +55,7 @@ def test_directions_find_targets_and_tracks():
     found = associate(scene).scans[0].positions
     assert np.linalg.norm(found[:, None] - paths[0], axis=2).min(axis=0).max() < 10.0
     tracker = TRACKERS["multi-sensor"].for_scene(scene, two_speeds(5.0))
-    for k in range(scene.num_scans):
-        tracker.step(scene.times[k], scene.measurements[k])
+    stepped(tracker, scene)
     last = np.array([track.position for track in tracker.tracks if track.confirmed])
     assert len(last) == 3 and np.linalg.norm(last[:, None] - paths[-1], axis=2).min(axis=0).max() < 10.0
 

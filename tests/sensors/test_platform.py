@@ -14,6 +14,7 @@ from assoc.simulation import observe
 from assoc.tracking import TRACKERS, smoothed
 from assoc.tracking.filter_choice import two_speeds
 from tests.sizes import sample
+from tests.tracking.stepping import stepped
 
 TURN = [-math.pi, math.pi]
 # a ship on a circle, its bow along the circle
@@ -157,7 +158,7 @@ def test_a_moving_sensors_scan_costs_that_of_one_standing_there():
 def test_smoothed_tracks_of_a_ship():
     scene = scene_of(["radar2d", "position"])
     tracker = TRACKERS["multi-sensor"].for_scene(scene, two_speeds(2.0, 2))
-    decisions = [tracker.step(scan.time, scan.measurements).final for scan in map(scene.scan, range(scene.num_scans))]
+    decisions = [step.final for step in stepped(tracker, scene)]
     table = smoothed(tracker, scene, [one for final in decisions for one in final])
     times, _, places = table.arrays()
     last = places[times == scene.times[-1]]

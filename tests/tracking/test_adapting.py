@@ -23,6 +23,7 @@ from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from tests.sizes import sample
+from tests.tracking.stepping import stepped
 
 REGION = np.array([[-30e3, 30e3], [-30e3, 30e3], [0.0, 12e3]])
 TARGETS = 8
@@ -57,9 +58,7 @@ def scene_of(sensors, seed, scans=30, turn=0.0):
 def tracked(scene, sensors, name="nearest-neighbour", **options):
     """A tracker that adapts, after a scene of which it is told these sensors."""
     tracker = TRACKERS[name].for_scene(replace(scene, sensors=sensors), adapt=True, **options)
-    for k in range(scene.num_scans):
-        scan = scene.scan(k)
-        tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    stepped(tracker, scene, times=True)
     return tracker
 
 
@@ -198,15 +197,12 @@ def test_a_restored_tracker_goes_on_identically(name, tmp_path):
     scene = scene_of(radars(160.0), 5, scans=20)
     declared = replace(scene, sensors=radars())
     tracker, again = (TRACKERS[name].for_scene(declared, adapt=True) for _ in range(2))
-    for k in range(scene.num_scans):
-        scan = scene.scan(k)
-        if k == 12:
-            assert tracker.state.estimates.used[0, 0] > 1.5
-            tracker.save(tmp_path / "state.npz")
-            again.restore(tmp_path / "state.npz")
-        tracker.step(scan.time, scan.measurements)
-        if k >= 12:
-            again.step(scan.time, scan.measurements)
+    stepped(tracker, scene, 0, 12)
+    assert tracker.state.estimates.used[0, 0] > 1.5
+    tracker.save(tmp_path / "state.npz")
+    again.restore(tmp_path / "state.npz")
+    for one in (tracker, again):
+        stepped(one, scene, 12)
     assert [t.score for t in tracker.tracks] == [t.score for t in again.tracks]
     assert str(tracker.health) == str(again.health)
 
@@ -278,8 +274,7 @@ def in_patch(tracker):
 def test_no_track_stays_where_clutter_is_dense(name):
     scene = with_returns(scene_of(radars(), 7, scans=15), 10, 1)
     told = TRACKERS[name].for_scene(scene)
-    for k in range(scene.num_scans):
-        told.step(scene.times[k], scene.measurements[k])
+    stepped(told, scene)
     assert in_patch(told) > 4
     tracker = tracked(scene, radars(), name)
     assert in_patch(tracker) == 0
@@ -327,8 +322,7 @@ def test_no_track_starts_in_a_closed_area():
     scene = with_returns(scene_of(radars(), 7, scans=10), 10, 1)
     patch = [[13e3, -18e3], [18e3, -18e3], [18e3, -13e3], [13e3, -13e3]]
     tracker = TRACKERS["nearest-neighbour"].for_scene(scene, initiation=Initiation(closed=[patch]))
-    for k in range(scene.num_scans):
-        tracker.step(scene.times[k], scene.measurements[k])
+    stepped(tracker, scene)
     assert in_patch(tracker) == 0
     assert sum(track.reported for track in tracker.tracks) == TARGETS
 

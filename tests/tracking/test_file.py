@@ -16,6 +16,7 @@ from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.filter_choice import two_speeds
 from tests.reliability.mutations import MARKER, spoil
 from tests.sizes import few_or_all, sample
+from tests.tracking.stepping import stepped
 
 SCENE = simulation.simulate("three-radar", 4, scans=7)
 SCANS = 5
@@ -23,9 +24,7 @@ SCANS = 5
 
 def saved(kind, path, filter_=None):
     tracker = kind.for_scene(SCENE, filter_)
-    for k in range(SCANS):
-        scan = SCENE.scan(k)
-        tracker.step(scan.time, scan.measurements)
+    stepped(tracker, SCENE, 0, SCANS)
     tracker.save(path)
     return tracker
 
@@ -35,8 +34,7 @@ def arrays_of(tracker):
 
 
 def step(tracker):
-    scan = SCENE.scan(SCANS)
-    return tracker.step(scan.time, scan.measurements)
+    return stepped(tracker, SCENE, SCANS, SCANS + 1)[0]
 
 
 @few_or_all("count", 10, 40)

@@ -13,6 +13,7 @@ from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, LifeCycle
 from assoc.tracking.filter_choice import height_note, make_filter
 from assoc.tracking.offline.plots import track_plots
+from tests.tracking.stepping import stepped
 
 CIRCLE = [-math.pi, math.pi]
 REGION = np.array([[-20e3, 20e3], [-20e3, 20e3], [0.0, 12e3]])
@@ -64,9 +65,7 @@ def flight(sensors, height, seed=0, scans=30):
 def tracked(scene):
     made = make_filter("imm-cv", scene.sensors, pace=4.0, region=scene.region)
     tracker = TRACKERS["multi-sensor"].for_scene(scene, made)
-    for k in range(scene.num_scans):
-        scan = scene.scan(k)
-        tracker.step(scan.time, scan.measurements)
+    stepped(tracker, scene)
     return [track for track in tracker.tracks if track.reported]
 
 

@@ -8,6 +8,7 @@ from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.simulation import simulate
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
 from tests.tracking import plain
+from tests.tracking.stepping import stepped
 
 SEEDS = (0, 4)
 
@@ -136,9 +137,7 @@ def test_a_single_hypothesis_is_saved_and_restored(tmp_path):
 def test_a_hundred_aircraft_are_confirmed_within_five_scans():
     scene = simulate("crowd", 3, targets=100, scans=5, interval=4.0, width=40_000.0, height=10_000.0)
     own = HypothesisOrientedMHT.for_scene(scene)
-    for k in range(5):
-        scan = scene.scan(k)
-        own.step(scan.time, scan.measurements)
+    stepped(own, scene)
     confirmed = np.array([track.position for track in own.tracks if track.confirmed])
-    away = np.linalg.norm(confirmed[:, None] - scan.truth_positions[None], axis=2)
+    away = np.linalg.norm(confirmed[:, None] - scene.scan(4).truth_positions[None], axis=2)
     assert (away.min(axis=0) < 400).all() and (away.min(axis=1) < 500).all()

@@ -10,6 +10,7 @@ from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LatePlots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
+from tests.tracking.stepping import stepped
 
 KINDS = ["multi-sensor", "mht", "nearest-neighbour", "joint-probabilistic"]
 
@@ -70,12 +71,8 @@ def test_tracks_are_those_of_measurements_in_order(scene, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_late_measurements_nothing_changes(scene, kind):
     plain, wrapped = TRACKERS[kind].for_scene(scene), LatePlots(TRACKERS[kind].for_scene(scene))
-    final = []
-    for k in range(10):
-        scan = scene.scan(k)
-        given = scan.time, scan.measurements, scan.times, scan.sectors
-        plain.step(*given)
-        final += wrapped.step(*given).final
+    stepped(plain, scene, 0, 10, times=True)
+    final = [one for step in stepped(wrapped, scene, 0, 10, times=True) for one in step.final]
     mine, theirs = sorted(states(plain.tracks).values(), key=list), sorted(states(wrapped.tracks).values(), key=list)
     np.testing.assert_array_equal(mine, theirs)
     final += wrapped.flush()
@@ -84,9 +81,7 @@ def test_without_late_measurements_nothing_changes(scene, kind):
 
 def test_what_is_too_old_is_refused_and_counted(scene):
     late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), horizon=6.0)
-    for k in range(10):
-        scan = scene.scan(k)
-        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    stepped(late, scene, 0, 10, times=True)
     before = states(late.tracks)
     one = scene.measurements[0][0][:1]
     nothing = [np.zeros((0, 3))] * 2
@@ -100,9 +95,7 @@ def test_what_is_too_old_is_refused_and_counted(scene):
 
 def test_a_step_that_fails_leaves_all_as_it_was(scene):
     late = LatePlots(TRACKERS["multi-sensor"].for_scene(scene, max_tuples=200))
-    for k in range(6):
-        scan = scene.scan(k)
-        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    stepped(late, scene, 0, 6, times=True)
     before, scans = states(late.tracks), late.scans
     many = np.repeat(scene.measurements[0][0][:1], 300, axis=0)
     nothing = [np.zeros((0, 3))] * 2
@@ -156,10 +149,7 @@ def test_late_plots_keep_their_identities():
 def test_what_is_final_is_told_once(scene, kind):
     """The oldest scan that is kept is taken in anew, and with it what it says of scans before."""
     late = LatePlots(TRACKERS[kind].for_scene(scene), horizon=6.0)
-    final = []
-    for k in range(9):
-        scan = scene.scan(k)
-        final += late.step(scan.time, scan.measurements, scan.times, scan.sectors).final
+    final = [one for step in stepped(late, scene, 0, 9, times=True) for one in step.final]
     one, nothing = scene.measurements[0][0][:1], [np.zeros((0, 3))] * 2
     times = [np.array([late.scans[0]]), *[np.zeros(0)] * 2]
     step = late.step(late.time + 1.0, [one, *nothing], times, np.zeros((3, 2)))
@@ -172,8 +162,7 @@ def test_tracks_of_the_past_keep_their_ids_when_names_are_forgotten(scene):
     late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), many=0)
     known = []
     for k in range(6):
-        scan = scene.scan(k)
-        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+        stepped(late, scene, k, k + 1, times=True)
         known.append([track.track_id for track in late.tracks])
         assert [[track.track_id for track in late.past_tracks(j)] for j in range(k + 1)] == known
     assert not set(known[0]) <= set(known[-1])

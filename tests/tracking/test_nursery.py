@@ -15,20 +15,13 @@ from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.track import Step
 from tests.sizes import sample
+from tests.tracking.stepping import stepped
 
 NURSING = ["multi-sensor", "static", "nearest-neighbour", "joint-probabilistic"]
 
 
 def bearings(seed, scans=10):
     return simulation.simulate("bearing-only", seed, targets=4, scans=scans)
-
-
-def stepped(tracker, scene, first=0, last=None):
-    steps = []
-    for k in range(first, scene.num_scans if last is None else last):
-        scan = scene.scan(k)
-        steps.append(tracker.step(scan.time, scan.measurements))
-    return steps
 
 
 def found(tracker, truth):

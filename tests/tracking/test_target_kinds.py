@@ -10,6 +10,7 @@ from assoc.tracking import Initiation, MultiSensorTracker, NearestNeighbourTrack
 from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise
 from assoc.tracking.target_kinds import TARGETS, target_kind
+from tests.tracking.stepping import stepped
 
 
 def harbour(seed=0, scans=20):
@@ -29,8 +30,7 @@ def harbour(seed=0, scans=20):
 
 def confirmed(scene, **options):
     tracker = MultiSensorTracker.for_scene(scene, **options)
-    for k in range(scene.num_scans):
-        tracker.step(scene.times[k], scene.measurements[k])
+    stepped(tracker, scene)
     return [track for track in tracker.tracks if track.confirmed]
 
 

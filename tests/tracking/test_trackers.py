@@ -20,6 +20,7 @@ from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.stages.life_cycle import count_bits
 from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
+from tests.tracking.stepping import stepped
 
 KINDS = list(TRACKERS.values())
 
@@ -27,14 +28,6 @@ KINDS = list(TRACKERS.values())
 @cache
 def scene(scans=8, seed=1):
     return simulation.simulate("three-radar", seed, scans=scans)
-
-
-def run(tracker, one, start=0, stop=None):
-    steps = []
-    for k in range(start, stop or one.num_scans):
-        scan = one.scan(k)
-        steps.append(tracker.step(scan.time, scan.measurements))
-    return steps
 
 
 def same(one, other):
@@ -48,7 +41,7 @@ def same(one, other):
 def test_targets_are_found_and_decisions_are_complete(kind):
     one = scene()
     tracker = kind.for_scene(one)
-    steps = run(tracker, one)
+    steps = stepped(tracker, one)
     last = one.scan(one.num_scans - 1)
     confirmed = np.array([t.position for t in tracker.tracks if t.confirmed])
     away = np.linalg.norm(confirmed[:, None] - last.truth_positions[None], axis=2)
@@ -108,7 +101,7 @@ def test_the_order_of_the_sensors_matters_little(kind):
 def test_a_target_is_no_formula_in_a_spreadsheet(tmp_path):
     table = TrackTable()
     tracker = MultiSensorTracker.for_scene(scene())
-    run(tracker, scene())
+    stepped(tracker, scene())
     table.add(tracker.tracks[:1])
     table.targets = {tracker.tracks[0].track_id: "=1+1"}
     table.to_csv(tmp_path / "tracks.csv")
@@ -124,10 +117,10 @@ def test_memory_does_not_grow(kind):
     def size():
         return sum(value.nbytes for value in file_arrays(tracker.settings, tracker.state).values())
 
-    run(tracker, one, 0, 10)
+    stepped(tracker, one, 0, 10)
     sizes = [size()]
     for k in range(10, 30):
-        run(tracker, one, k, k + 1)
+        stepped(tracker, one, k, k + 1)
         sizes.append(size())
     assert np.median(sizes[-10:]) < 1.5 * np.median(sizes[:10])
 
@@ -139,7 +132,7 @@ def test_scans_without_measurements_and_time_standing_still(kind):
     tracker = kind.for_scene(one)
     assert tracker.tracks == [] and tracker.time is None
     tracker.step(0.0, empty)
-    run(tracker, one)
+    stepped(tracker, one)
     before = len([t for t in tracker.tracks if t.confirmed])
     tracker.step(one.times[-1], empty)
     assert len([t for t in tracker.tracks if t.confirmed]) == before > 0
@@ -156,7 +149,7 @@ def test_known_targets_are_taken_over(kind):
     tracker = kind.for_scene(one)
     ids = tracker.begin(first.time, filters.Gaussian(mean, np.diag([1e3] * 3 + [1e2] * 3)))
     assert ids.tolist() == [1, 2, 3] and all(track.confirmed for track in tracker.tracks)
-    run(tracker, one, 1)
+    stepped(tracker, one, 1)
     places = {track.track_id: track.position for track in tracker.tracks if track.confirmed}
     assert set(places) == {1, 2, 3}
     for target, i in zip(last.truth_ids, ids, strict=True):
@@ -185,16 +178,16 @@ def some_filters():
 def test_any_filter(kind, name, filter_, tmp_path):
     one = scene(6)
     tracker = kind.for_scene(one, filter_)
-    run(tracker, one, 0, 5)
+    stepped(tracker, one, 0, 5)
     tracker.save(tmp_path / "state.npz")
-    run(tracker, one, 5)
+    stepped(tracker, one, 5)
     confirmed = np.array([t.position for t in tracker.tracks if t.confirmed])
     away = np.linalg.norm(confirmed[:, None] - one.scan(5).truth_positions[None], axis=2)
     assert away.min(axis=0).max() < 400
     ends = [t.mean for t in tracker.tracks]
     again = kind.for_scene(one, filter_)
     again.restore(tmp_path / "state.npz")
-    run(again, one, 5)
+    stepped(again, one, 5)
     assert all(np.array_equal(a, t.mean) for a, t in zip(ends, again.tracks, strict=True))
 
 
@@ -202,7 +195,7 @@ def test_any_filter(kind, name, filter_, tmp_path):
 def test_any_solver(solver):
     one = scene(4)
     tracker = MultiSensorTracker.for_scene(one, solver=solver)
-    run(tracker, one)
+    stepped(tracker, one)
     assert sum(t.confirmed for t in tracker.tracks) == 3
 
 
@@ -335,8 +328,7 @@ def test_count_bits():
 @pytest.mark.parametrize("name", sorted(TRACKERS))
 def test_columns_of_tracks_are_copies(name):
     tracker = TRACKERS[name].for_scene(scene())
-    for k in range(scene().num_scans):
-        tracker.step(scene().times[k], scene().measurements[k])
+    stepped(tracker, scene())
     before, columns = str(tracker.tracks), tracker.track_columns()
     for values in columns:
         values[...] = 0
