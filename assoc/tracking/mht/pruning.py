@@ -27,15 +27,17 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
         end = begin + 1
         while end < order.size and tree[order[end]] == tree[order[begin]]:
             end += 1
-        sort_by(order, loss, begin, end)
         best = -np.inf
         for k in range(begin, end):
             best = max(best, score[order[k]])
         limit = drop + max(0.0, -best)
-        for k in range(begin, min(begin + most, end)):
+        first = count
+        for k in range(begin, end):
             if loss[order[k]] <= limit:
                 kept[count] = order[k]
                 count += 1
+        sort_by(kept, loss, first, count)
+        count = min(count, first + most)
         begin = end
     return kept[:count].copy()
 
