@@ -2,9 +2,12 @@
 
 import copy
 import json
+import operator
 import subprocess
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -166,37 +169,28 @@ def valid(tmp_path_factory):
     return exact_problem(problem), proof
 
 
-def replaced(*keys: object, by: object):
+def changed(keys: tuple[object, ...], change: Callable[[Any, Any], None]):
+    """A change of what these keys lead to: `change` of what holds it, and the last key."""
 
-    def change(proof):
+    def at(proof):
         *path, last = keys
         for key in path:
             proof = proof[key]
-        proof[last] = by
+        change(proof, last)
 
-    return change
+    return at
+
+
+def replaced(*keys: object, by: object):
+    return changed(keys, lambda part, key: operator.setitem(part, key, by))
 
 
 def raised(*keys: object, by: float):
-
-    def change(proof):
-        *path, last = keys
-        for key in path:
-            proof = proof[key]
-        proof[last] = proof[last] + by
-
-    return change
+    return changed(keys, lambda part, key: operator.setitem(part, key, part[key] + by))
 
 
 def removed(*keys: object):
-
-    def change(proof):
-        *path, last = keys
-        for key in path:
-            proof = proof[key]
-        del proof[last]
-
-    return change
+    return changed(keys, operator.delitem)
 
 
 TREE = ("trees", 0, "nodes")

@@ -31,6 +31,15 @@ def enumerable(count, seed, limit=4000):
             yield problem, found
 
 
+def check_intervals(found, truth, room=1e-9):
+    """The truth is in each interval, and so is the estimate."""
+    true = np.array([truth[tuple(key)] for key in found.tuples.tolist()])
+    assert len(true) == len(truth)
+    assert (found.lower - room <= true).all() and (true <= found.upper + room).all()
+    assert (found.lower - 1e-12 <= found.probability).all() and (found.probability <= found.upper + 1e-12).all()
+    assert (found.lower >= 0.0).all() and (found.upper <= 1.0).all()
+
+
 @few_or_all("count", 16, 160)
 def test_intervals_contain_the_truth(count):
     widths = []
@@ -39,14 +48,8 @@ def test_intervals_contain_the_truth(count):
         # listed, left to few open measurements, and summed exactly
         result = bounded(problem, k, Run(0), "auto", widest := (0, 2, 4, 22)[number // 4 % 4])
         assert widest < 22 or (len(problem.sizes) == 2 and problem.dummy) or result.listed == 0
-        truth = exact_marginals(problem)
-        assert len(result.tuples) == len(truth)
-        for key, p, low, high in zip(
-            result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
-        ):
-            assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
-            assert low - 1e-12 <= p <= high + 1e-12
-            assert 0.0 <= low <= high <= 1.0
+        check_intervals(result, exact_marginals(problem))
+        assert (result.lower <= result.upper).all()
         if k >= len(found):
             assert result.unseen < 1e-8
             assert np.allclose(result.lower, result.upper)
@@ -69,8 +72,8 @@ def test_estimates_are_calibrated():
     for problem, _ in enumerable(16, 71, limit=500):
         truth = exact_marginals(problem)
         found = marginals(problem, method="estimate")
+        check_intervals(found, truth)
         true = np.array([truth[tuple(key)] for key in found.tuples.tolist()])
-        assert (found.lower - 1e-9 <= true).all() and (true <= found.upper + 1e-9).all()
         assert np.abs(found.probability - true).max() < 1e-6 + found.error
         columns = price_all_columns(problem, Run(0))
         number = {tuple(problem.tuples[i].tolist()): j for j, i in enumerate(columns.origin.tolist())}
@@ -146,9 +149,7 @@ def test_intervals_hold_where_large_costs_cancel():
     tuples = [[1, 0, 0], [1, 1, 0], [1, 0, 1]]
     result = marginals(AssignmentProblem(tuples, [1e18, 1e18 - 128.0, 1e18 - 256.0], (1, 1, 1)), 1)
     near = AssignmentProblem(tuples, [1e15, 1e15 - 0.125, 1e15 - 0.5], (1, 1, 1))
-    truth, found = exact_marginals(near), marginals(near, 1)
-    for key, low, high in zip(found.tuples.tolist(), found.lower, found.upper, strict=True):
-        assert low <= truth[tuple(key)] <= high
+    check_intervals(marginals(near, 1), exact_marginals(near), 0.0)
     assert (result.upper - result.lower)[(result.tuples > 0).sum(axis=1) > 1].max() > 0.5
 
 
@@ -156,9 +157,7 @@ def test_intervals_hold_where_one_tuple_outweighs_the_others():
     """Small terms beside a large one: their sum may not be a difference of sums."""
     tuples = [[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1], [0, 2, 1], [2, 0, 1], [1, 2, 0]]
     problem = AssignmentProblem(tuples, [-40.0, -200.0, -130.0, -90.0, -150.0, -60.0, -170.0], (2, 2, 1))
-    truth, found = exact_marginals(problem), marginals(problem, 1)
-    for key, low, high in zip(found.tuples.tolist(), found.lower, found.upper, strict=True):
-        assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
+    check_intervals(marginals(problem, 1), exact_marginals(problem))
 
 
 def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
@@ -170,10 +169,8 @@ def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
             # the greedy choice cannot be completed without a longer search
             assert not problem.dummy
             continue
-        for key, p, low, high in zip(
-            result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
-        ):
-            assert low <= truth[tuple(key)] <= high and low <= p <= high
+        check_intervals(result, truth, 0.0)
+        assert (result.lower <= result.probability).all() and (result.probability <= result.upper).all()
         # the probabilities are those of one solution
         for s, n in enumerate(problem.sizes):
             if problem.dummy or n == problem.sizes.min():
@@ -305,10 +302,7 @@ def test_two_sensors_without_duals_of_the_packing():
         )
         if not all_solutions(problem):
             continue
-        truth = exact_marginals(problem)
-        result = marginals(problem, 2)
-        for key, low, high in zip(result.tuples.tolist(), result.lower, result.upper, strict=True):
-            assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
+        check_intervals(marginals(problem, 2), exact_marginals(problem))
 
 
 @pytest.mark.parametrize(("sizes", "share", "width"), [((40, 40), 0.3, 1e-6), ((8, 8, 8, 8), 0.1, 1e-12)])
