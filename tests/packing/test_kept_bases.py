@@ -37,12 +37,25 @@ def assert_basis(program, basis):
         assert basis.slack_position[r] == (np.flatnonzero(basis.variable == num + r).tolist() or [-1])[0]
 
 
+def ready(packing):
+    """The program of a packing, its optimal basis, and no basis kept yet."""
+    program = plain_root(packing, dual_bound(packing)).program
+    return program, solved(packing, program)[0], no_kept_bases(program)
+
+
+def at_root(packing):
+    """A search whose root is relaxed: the root, its stack, its work and the number of its columns."""
+    root = plain_root(packing, dual_bound(packing))
+    stack = OpenNodes(root).arrays
+    work = new_work(packing.arrays, root.program, root.slack)
+    num = open_node(work, stack, 0, -1)
+    relax(work, num, np.inf, np.inf)
+    return root, stack, work, num
+
+
 def test_what_is_taken_back_is_the_basis_that_was_kept():
     for packing in packings(6, 21):
-        root = plain_root(packing, dual_bound(packing))
-        program = root.program
-        basis, _ = solved(packing, program)
-        kept = no_kept_bases(program)
+        program, basis, kept = ready(packing)
         keep_basis(kept, basis)
         other = new_basis(program)
         other.variable[:] = basis.variable
@@ -56,23 +69,17 @@ def test_what_is_taken_back_is_the_basis_that_was_kept():
 
 
 def test_a_basis_that_was_not_kept_is_not_taken():
-    packing = next(packings(1, 22))
-    root = plain_root(packing, dual_bound(packing))
-    basis, _ = solved(packing, root.program)
-    kept = no_kept_bases(root.program)
+    program, basis, kept = ready(next(packings(1, 22)))
     before = basis.inverse.copy()
-    assert not take_kept(kept, root.program, basis, False)
+    assert not take_kept(kept, program, basis, False)
     keep_basis(kept, basis)
     basis.variable[[0, 1]] = basis.variable[[1, 0]]
-    assert not take_kept(kept, root.program, basis, False)
+    assert not take_kept(kept, program, basis, False)
     np.testing.assert_array_equal(basis.inverse, before)
 
 
 def test_the_oldest_makes_room_and_what_came_later_is_done():
-    packing = next(packings(1, 23))
-    root = plain_root(packing, dual_bound(packing))
-    basis, _ = solved(packing, root.program)
-    kept = no_kept_bases(root.program)
+    program, basis, kept = ready(next(packings(1, 23)))
     count = kept.age.size
     first = basis.variable.copy()
     # the kept ones differ in the order of their variables
@@ -80,24 +87,20 @@ def test_the_oldest_makes_room_and_what_came_later_is_done():
         basis.variable[:] = np.roll(first, turn)
         keep_basis(kept, basis)
     basis.variable[:] = first
-    assert not take_kept(kept, root.program, basis, False)
+    assert not take_kept(kept, program, basis, False)
     basis.variable[:] = np.roll(first, 3)
-    assert take_kept(kept, root.program, basis, False)
+    assert take_kept(kept, program, basis, False)
     # the next one replaces it, and not the oldest
     basis.variable[:] = np.roll(first, -1)
     keep_basis(kept, basis)
     basis.variable[:] = np.roll(first, 1)
-    assert take_kept(kept, root.program, basis, False)
+    assert take_kept(kept, program, basis, False)
 
 
 def test_the_other_side_of_a_branching_starts_from_its_basis():
     rng = np.random.default_rng(24)
     for packing in packings(6, 25):
-        root = plain_root(packing, dual_bound(packing))
-        stack = OpenNodes(root).arrays
-        work = new_work(packing.arrays, root.program, root.slack)
-        num = open_node(work, stack, 0, -1)
-        relax(work, num, np.inf, np.inf)
+        root, stack, work, num = at_root(packing)
         at_first = work.basis.variable.copy()
         one, two = packing.cols[0][packing.cols[0] >= 0][:2]
         assert branch(work, stack, 0, num, (one, two), True, -np.inf) == 2
@@ -120,11 +123,7 @@ def test_the_other_side_of_a_branching_starts_from_its_basis():
 
 def test_a_search_that_goes_on_at_the_first_side_keeps_the_basis_of_the_other_one():
     packing = next(packings(1, 28))
-    root = plain_root(packing, dual_bound(packing))
-    stack = OpenNodes(root).arrays
-    work = new_work(packing.arrays, root.program, root.slack)
-    num = open_node(work, stack, 0, -1)
-    relax(work, num, np.inf, np.inf)
+    _, stack, work, num = at_root(packing)
     pairs = [cols[cols >= 0][:2] for cols in packing.cols]
     branch(work, stack, 0, num, tuple(pairs[0]), False, -np.inf)
     work.kept.age[work.kept.latest[0]] = 7

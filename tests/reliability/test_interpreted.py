@@ -136,20 +136,21 @@ def test_the_process_beside_leaves_the_cores_to_the_program():
         process.wait(600)
 
 
+def is_kernel(node: ast.AST, mark: str = "njit") -> bool:
+    return isinstance(node, ast.FunctionDef) and any(mark in ast.unparse(one) for one in node.decorator_list)
+
+
+def all_kernels():
+    """The definitions of the package's kernels."""
+    files = Path(assoc.__file__).parent.rglob("*.py")
+    return [node for path in files for node in ast.walk(ast.parse(path.read_text())) if is_kernel(node)]
+
+
 @pytest.mark.slow
 def test_kernels_ask_for_nothing_that_numpy_does_otherwise():
-    kernels = [
-        node
-        for path in Path(assoc.__file__).parent.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.FunctionDef) and any("njit" in ast.unparse(mark) for mark in node.decorator_list)
-    ]
+    kernels = all_kernels()
     assert len(kernels) > 100
     assert [call for kernel in kernels for call in doubtful_calls(kernel)] == []
-
-
-def is_kernel(node: ast.stmt, mark: str = "njit") -> bool:
-    return isinstance(node, ast.FunctionDef) and any(mark in ast.unparse(one) for one in node.decorator_list)
 
 
 def test_inner_kernels_are_called_by_kernels_alone():
@@ -176,12 +177,7 @@ def test_inner_kernels_are_called_by_kernels_alone():
 
 def test_lean_kernels_make_and_return_no_arrays():
     # they count no references: an array that is returned would never be freed, or too early
-    kernels = [
-        node
-        for path in Path(assoc.__file__).parent.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
-        if is_kernel(node)
-    ]
+    kernels = all_kernels()
     plain = {"None", "bool", "int", "float", "tuple", "Three"}
     other = {node.name for node in kernels if not set(re.findall(r"\w+", ast.unparse(node.returns))) <= plain}
     lean = [node for node in kernels if is_kernel(node, "lean_inner_njit") or is_kernel(node, "literal_njit")]
