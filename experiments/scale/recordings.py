@@ -2,11 +2,11 @@
 
 500 aircraft at a time within 250 km, each for half an hour, turns of 4 s, P_d 0.9, 5 % false plots, altitudes and
 codes: a CSV file, tracked by the program `assoc track` in a process of its own. Plots a second of processor time, all
-of it: reading, grouping, tracking, writing. A first run on a short recording loads the kernels. Memory at the peak is
-that of the process; that of the longer recording says whether it grows. Two processes track slices of 400 s of the
-longest recording (a short one has too few to share them out evenly): the wall time of one process without slices over
-theirs, and their processor time over its. A day of three radars, each tracked from its own files, is extrapolated from
-these slices.
+of it: reading, grouping, tracking, writing. A first run on a short recording compiles modules and kernels. Memory at
+the peak is that of the process; that of the longer recording says whether it grows. Two processes track slices of 400 s
+of the longest recording (a short one has too few to share them out evenly): the wall time of one process without slices
+over theirs, and their processor time over its. A day of three radars, each tracked from its own files, is extrapolated
+from these slices.
 """
 
 import os
@@ -74,8 +74,11 @@ class Run(NamedTuple):
 def track(recording: Path, tracker: str, *more: str) -> Run:
     """Track a recording in a process of its own."""
     words = [sys.executable, "-m", "assoc.track", str(recording), "--tracker", tracker, "-q", *WORDS, *more]
+    words += ["-o", str(recording.with_suffix(".tracks.csv"))]
+    # as usual, Python keeps modules that it has compiled
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.perf_counter()
-    with subprocess.Popen([*words, "-o", str(recording.with_suffix(".tracks.csv"))]) as process:
+    with subprocess.Popen(words, env=environment) as process:
         _, code, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(code)
     if process.returncode:
