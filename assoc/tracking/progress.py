@@ -85,7 +85,7 @@ class Progress(NamedTuple):
     scan: Scan
     work: Work
     timed: TimedScan | None = None
-    """Set for measurements with times of their own; None if all sensors looked everywhere at one instant."""
+    """Set for measurements with times of their own; None if all sensors covered everything at one instant."""
     before: TrackBatch | None = None
     """The tracks that association began with, of a tracker that adapts."""
     dense: Sequence[Array] = ()

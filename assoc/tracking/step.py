@@ -28,8 +28,8 @@ from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, tak
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
+from assoc.tracking.stages.coverage import count_out_of_view, keep_pace
 from assoc.tracking.stages.identity_evidence import checked_identities
-from assoc.tracking.stages.looks import count_out_of_view, keep_pace
 from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.taking_up import take_up
@@ -99,7 +99,7 @@ def check(
     when, sensors = checked_time(time, state.time), settings.sensors
     checked = checked_measurements(measurements, sensors)
     stamps = None if times is None else _checked_stamps(times, checked, when, state.time)
-    looks = None if sectors is None else checked_sectors(sectors, len(sensors), "sectors")
+    passed = None if sectors is None else checked_sectors(sectors, len(sensors), "sectors")
     if settings.registration is not None and stamps is not None:
         raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
     codes = None
@@ -108,7 +108,7 @@ def check(
         if stamps is None and settings.identity is not None:
             # only the functions for measurements with times of their own weigh identities
             stamps = tuple(np.full(len(z), when) for z in checked)
-    scan = Scan(state.scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
+    scan = Scan(state.scan, when, tuple(checked), times=stamps, sectors=passed, identities=codes)
     return scan.aligned(sensors)
 
 

@@ -44,7 +44,7 @@ class Track(Shown):
     existence : float
         Probability that the target is still there.
     missed : int
-        Scans in a row in which sensors looked and none detected it.
+        Scans in a row in which dwells covered it and none detected it.
     hidden : float
         Seconds since the last detection for which no sensor could see it.
     parent : int

@@ -140,13 +140,13 @@ class TrackBatch:
         numbers[:, HIDDEN] += seconds
         return TrackBatch(self.states, numbers, self.counts)
 
-    def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
+    def counted(self, detected: Array, covered: Array | None = None) -> TrackBatch:
         """Count the scan's detections and misses: `detected`, bool (T,), by any sensor.
 
-        With `looked`, bool (T,), the scan counts only for tracks that some sensor looked at.
+        With `covered`, bool (T,), the scan counts only for tracks that a dwell of some sensor covered.
         """
-        if looked is not None and not looked.all():
-            rows = np.flatnonzero(looked | detected)
+        if covered is not None and not covered.all():
+            rows = np.flatnonzero(covered | detected)
             counts = self.counts.copy()
             counts[rows] = self[rows].counted(detected[rows]).counts
             return TrackBatch(self.states, self.numbers, counts)

@@ -16,7 +16,7 @@ from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import misses
+from assoc.tracking.stages.coverage import misses
 from assoc.tracking.track_batch import TrackBatch
 
 

@@ -48,7 +48,7 @@ class AssocTracker(Tracker):  # type: ignore[misc]
         doc="Seconds: detections that are late by less are put into their scan. Default: none may be late.",
     )
     asynchronous: bool = Property(
-        default=False, doc="Whether a set is a look of those sensors alone of which it has detections."
+        default=False, doc="Whether a set is a dwell of those sensors alone of which it has detections."
     )
     region: Any = Property(default=None, doc="Bounds of x, y, z, shape (3, 2), as of a scene.")
     velocity_mapping: Sequence[int] = Property(
@@ -116,12 +116,12 @@ class AssocTracker(Tracker):  # type: ignore[misc]
             raise InvalidInputError(
                 f"detector: detections come after those of {self._now}, expected a horizon in seconds"
             )
-        looked = np.array([time == now and (len(part) > 0 or not self.asynchronous) for part in parts])
+        covered = np.array([time == now and (len(part) > 0 or not self.asynchronous) for part in parts])
         step = self.tracker.step(
             seconds,
             self._frame.measurements(parts),
             None if all((part == seconds).all() for part in stamps) else stamps,
-            None if looked.all() else np.where(looked[:, None], [-np.pi, np.pi], 0.0),
+            None if covered.all() else np.where(covered[:, None], [-np.pi, np.pi], 0.0),
         )
         self._now = now
         found: dict[int, list[Any]] = {}

@@ -18,7 +18,7 @@ from assoc.tracking.adapting.estimates import ALARMS, declared_values
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.progress import Progress
-from assoc.tracking.stages.looks import dwells
+from assoc.tracking.stages.coverage import dwells
 from assoc.tracking.track_batch import TrackBatch
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
@@ -56,14 +56,14 @@ def learn(progress: Progress) -> Progress:
     late = tracks
     if progress.timed is not None and len(tracks):
         late = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
-    looks = dwells(progress, late.states)
+    dwelled = dwells(progress, late.states)
     rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
     if len(tracks):
-        _seek(progress, late, rows, looks)
+        _seek(progress, late, rows, dwelled)
     # tracks in dense clutter say little about sensors
     plain = ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
     hits = (rows > 0) & plain[:, None]
-    looks = hits | (looks & plain[:, None])
+    dwelled = hits | (dwelled & plain[:, None])
     turns = _turns(progress)
     # where false alarms are dense they are no part of the usual ones
     usual = zip(step.confirmed, progress.dense, strict=True)
@@ -73,7 +73,7 @@ def learn(progress: Progress) -> Progress:
         estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
     where = places_of(settings.filter, late.states)[0]
     bands = np.stack([bands_of(sensor, where) for sensor in settings.sensors], axis=1)
-    estimates = estimates.counted(tracks.track_id, looks, hits, bands)
+    estimates = estimates.counted(tracks.track_id, dwelled, hits, bands)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
     if len(fresh):
         estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
@@ -102,12 +102,12 @@ def _rows(progress: Progress, ids: Array) -> Array:
     return rows
 
 
-def _seek(progress: Progress, late: TrackBatch, rows: Array, looks: Array) -> None:
+def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> None:
     """Add measurements outside of the gates of tracks that were missed: without them, noise would seem smaller."""
     settings, step = progress.settings, progress.step
     assert step is not None
     for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
-        missed = np.flatnonzero((rows[:, s] == 0) & looks[:, s] & (late.missed == 0))
+        missed = np.flatnonzero((rows[:, s] == 0) & dwelled[:, s] & (late.missed == 0))
         free = np.flatnonzero(~np.isin(step.assigned[s], late.track_id))
         if not len(missed) or not len(free):
             continue

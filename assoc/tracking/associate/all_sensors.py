@@ -12,7 +12,7 @@ from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.filters.base import predict_each
 from assoc.tracking.progress import Association, Progress
-from assoc.tracking.stages.looks import looked
+from assoc.tracking.stages.coverage import covered
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import ID, STARTED, TrackBatch
 
@@ -33,7 +33,7 @@ def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: 
     born : int array (K, S)
         Tuples that belong to no track.
     missed : array (T, S)
-        Scores of a miss of the tracks; see `assoc.tracking.stages.looks.misses`.
+        Scores of a miss of the tracks; see `assoc.tracking.stages.coverage.misses`.
     """
     tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
     old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh(progress, tuples))
@@ -60,7 +60,7 @@ def _joined(
     stay = np.setdiff1d(np.arange(len(tracks)), old) if len(old) else slice(None)
     fresh = np.ones(len(begun) + len(born[0]), dtype=np.bool_)
     hit = np.concatenate([rows[stay].any(axis=1), fresh])
-    at_all = np.concatenate([looked(progress, missed[stay]), fresh])
+    at_all = np.concatenate([covered(progress, missed[stay]), fresh])
     batch = TrackBatch.concatenate([tracks[stay], begun, born[0]]).counted(hit, at_all)
     taken = np.concatenate([rows[stay], rows[old], born[1]])
     return Association(batch, owners(taken, batch.track_id, progress.scan.sizes))

@@ -48,7 +48,7 @@ from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
+from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
@@ -212,7 +212,7 @@ class JointProbabilistic(Method):
         new = TrackBatch.new(states[old:], track_id[old:], odds[old:], when[old:])
         new.numbers[:, STARTED] = started[old:]
         known_before = tracks.scored(states[:old], odds[:old] - tracks.existence, when[:old])
-        at_all = np.concatenate([looked(progress, misses[:old]), np.ones(len(new), dtype=np.bool_)])
+        at_all = np.concatenate([covered(progress, misses[:old]), np.ones(len(new), dtype=np.bool_)])
         batch = TrackBatch.concatenate([known_before, new]).counted(seen, at_all)
         return Association(batch, [assigned[s] for s in sensors], tuple(found[s] for s in sensors))
 

@@ -27,7 +27,7 @@ from assoc.ranking.pairs.tuple_permutations import without_tuple_permutations
 from assoc.tracking.associate.all_sensors import begin, begin_in_order
 from assoc.tracking.associate.multi_sensor import new_targets
 from assoc.tracking.progress import Association, Progress
-from assoc.tracking.stages.looks import looked, misses
+from assoc.tracking.stages.coverage import covered, misses
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import TrackBatch
 
@@ -171,7 +171,7 @@ def _associated(
         states = merged(states, track, joint.weight, len(tracks))
         tracks = tracks.scored(states, joint.odds - tracks.existence, when)
     fresh = np.ones(len(begun), dtype=np.bool_)
-    at_all = np.concatenate([looked(progress, missed), fresh])
+    at_all = np.concatenate([covered(progress, missed), fresh])
     batch = TrackBatch.concatenate([tracks, begun]).counted(np.concatenate([joint.hit, fresh]), at_all)
     assigned = owners(rows, begun.track_id, progress.scan.sizes)
     for ids, own in zip(assigned, joint.owner, strict=True):

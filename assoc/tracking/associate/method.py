@@ -21,7 +21,7 @@ from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import to_delete
+from assoc.tracking.stages.coverage import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import TrackBatch

@@ -34,7 +34,7 @@ from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import to_delete
+from assoc.tracking.stages.coverage import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
@@ -104,7 +104,7 @@ class TrackTrees(DeferringMethod):
         if timed is not None:
             new = np.flatnonzero(growth.origin < 0)
             tables.numbers[new, STARTED] = grown.first[new]
-        count_scan(tables.counts, tables.history, count, grown.looked)
+        count_scan(tables.counts, tables.history, count, grown.covered)
         tracks = TrackBatch(grown.states, tables.numbers, tables.counts)
         if progress.settings.solver != "exact" or progress.settings.solver_parameters:
             other = _solved(progress, tracks.track_id, tracks.score, tables.history)

@@ -35,7 +35,7 @@ from assoc.tracking.mht.growth import AtOnce, Grown, Growth, Offers, growth_of
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import to_delete
+from assoc.tracking.stages.coverage import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
@@ -124,7 +124,7 @@ class ClusteredHypotheses(DeferringMethod):
                 taken(0, crossed, with_births(clusters, growth.rows, crossed.births, progress.scan.sizes, *limits))
         grown = growth.finished()
         batch = _batch(tracks, growth, grown, ids, gained)
-        batch = batch.counted(np.asarray(growth.rows.any(axis=1)), grown.looked)
+        batch = batch.counted(np.asarray(growth.rows.any(axis=1)), grown.covered)
         older = np.concatenate(
             [hypotheses.window.history, np.zeros((1, hypotheses.window.history.shape[1]), dtype=np.int32)]
         )

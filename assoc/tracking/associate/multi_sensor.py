@@ -13,7 +13,7 @@ from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
-from assoc.tracking.stages.looks import misses
+from assoc.tracking.stages.coverage import misses
 from assoc.tracking.tracker import Tracker
 
 

@@ -17,7 +17,7 @@ from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
-from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
+from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
@@ -106,7 +106,7 @@ class NearestNeighbour(Method):
         new = TrackBatch.new(states[order], progress.work.new_ids(len(order)), gain[order], when[order])
         new.numbers[:, STARTED] = followed.first[order]
         batch = TrackBatch.concatenate([tracks.scored(states[:old], gain[:old], when[:old]), new])
-        at_all = np.concatenate([looked(progress, misses[:old]), np.ones(len(order), dtype=np.bool_)])
+        at_all = np.concatenate([covered(progress, misses[:old]), np.ones(len(order), dtype=np.bool_)])
         assigned = owners(np.concatenate([rows[:old], rows[order]]), batch.track_id, progress.scan.sizes)
         return Association(batch.counted(np.asarray(seen), at_all), assigned)
 

@@ -29,18 +29,18 @@ class Unseen(NamedTuple):
         """No track."""
         return Unseen(np.zeros(0, dtype=np.int64), np.zeros((0, sensors)))
 
-    def after(self, ids: Array, detected: Array, looked: Array) -> Unseen:
+    def after(self, ids: Array, detected: Array, covered: Array) -> Unseen:
         """The state after a scan, of the living tracks' ids (T,); others are forgotten.
 
-        `detected` (T, S) is the probability with which each sensor has detected each track, `looked` (T, S) whether it
-        could see it.
+        `detected` (T, S) is the probability with which each sensor has detected each track, `covered` (T, S) whether a
+        dwell of it covered the track.
         """
         order = np.argsort(ids)
         known = np.append(self.misses, np.zeros((1, self.misses.shape[1])), axis=0)
         rows = np.searchsorted(self.ids, ids)
         same = np.append(self.ids, -1)[rows] == ids
         before = known[np.where(same, rows, len(self.ids))]
-        misses = np.where(looked, (before + 1.0) * (1.0 - detected), before)
+        misses = np.where(covered, (before + 1.0) * (1.0 - detected), before)
         return Unseen(ids[order], misses[order])
 
     def ghosts(self, miss: Array) -> Array:

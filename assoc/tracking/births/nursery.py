@@ -22,7 +22,7 @@ from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.looks import in_view
+from assoc.tracking.stages.coverage import in_view
 from assoc.tracking.state import Nursery, TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import TrackBatch

@@ -159,16 +159,16 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
 
 
 @njit
-def count_scan(counts: NDArray[np.int64], history: NDArray[np.int32], sensors: int, looked: NDArray[np.bool_]) -> None:
+def count_scan(counts: NDArray[np.int64], history: NDArray[np.int32], sensors: int, covered: NDArray[np.bool_]) -> None:
     """Update, in place, the counts of detections and misses by the scan, the first columns of the history.
 
-    The scan counts only for branches that some sensor looked at: `looked`, bool (B,).
+    The scan counts only for branches that a dwell of some sensor covered: `covered`, bool (B,).
     """
     for i in range(counts.shape[0]):
         seen = False
         for s in range(sensors):
             seen = seen or history[i, s] > 0
-        if not (seen or looked[i]):
+        if not (seen or covered[i]):
             continue
         counts[i, BITS] = (counts[i, BITS] << 1) & MASK | seen
         counts[i, MISSED] = 0 if seen else counts[i, MISSED] + 1

@@ -19,7 +19,7 @@ from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_
 from assoc.filters.base import Filter
 from assoc.filters.batches import placed
 from assoc.tracking.progress import Progress
-from assoc.tracking.stages.looks import detected_or_in_view, looked, misses_of
+from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100
@@ -65,8 +65,8 @@ class Grown(NamedTuple):
     """Time of the first measurement in the scan, seconds; not finite where there is none; (B,)."""
     last: Array
     """Time of the last measurement in the scan, seconds; NaN where there is none; (B,)."""
-    looked: Array
-    """Whether a sensor looked at it, bool (B,)."""
+    covered: Array
+    """Whether a dwell of a sensor covered it, bool (B,)."""
 
 
 class Growth(ABC):
@@ -116,7 +116,7 @@ class Growth(ABC):
 
 
 class AtOnce(Growth):
-    """All sensors looked everywhere at one instant: predicted branches are updated sensor by sensor.
+    """All sensors covered everything at one instant: predicted branches are updated sensor by sensor.
 
     Where no sensor measures velocities only positions are: the whole states of those that are left in the end follow.
     """
@@ -214,7 +214,7 @@ class AtOnce(Growth):
 
 
 class InOrder(Growth):
-    """Measurements have times of their own, or sensors looked at sectors: each branch is filtered in their order."""
+    """Measurements have times of their own, or sensors covered sectors: each branch is filtered in their order."""
 
     def __init__(self, progress: Progress, timed: TimedScan) -> None:
         super().__init__(progress)
@@ -250,7 +250,7 @@ class InOrder(Growth):
         """The branches at the end of the scan."""
         followed = self._timed.follow(self.origin, self.rows)
         last = np.where(self.rows.any(axis=1), followed.when, np.nan)
-        at_all = looked(self._progress, self._misses[self._anchor])
+        at_all = covered(self._progress, self._misses[self._anchor])
         return Grown(self._timed.at_end(followed, self.origin), followed.first, last, at_all)
 
 

@@ -1,1 +1,1 @@
-"""Stages of a step and what they need: checks, looks, lives of tracks, identities, lost tracks taken up."""
+"""Stages of a step and what they need: checks, coverage, lives of tracks, identities, lost tracks taken up."""

@@ -10,7 +10,7 @@ from scipy.special import betaln
 
 from assoc._types import Array
 
-# a declared detection probability counts as much as this many looks; sums take it to lie between the two bounds
+# a declared detection probability counts as much as this many dwells; sums take it to lie between the two bounds
 _LOOKS, _LEAST, _MOST = 5.0, 0.05, 0.95
 
 

@@ -2,7 +2,7 @@
 
 After a manoeuvre an old and a new track may share the measurements of one target: each scan some sensors feed the one,
 some the other. No score ends that. But a sensor detects one target once in a scan, and two targets often twice. For
-each pair of confirmed tracks that may be in one place, the scans are counted in which a sensor that looked at both fed
+each pair of confirmed tracks that may be in one place, the scans are counted in which a sensor that covered both fed
 the one, the other, or none; a scan in which a sensor fed both begins the count anew. The counts are weighed as "one
 target, detected with P" against "two targets, each detected with P, independently", averaged over P, whose prior is
 about the declared detection probability.
@@ -20,8 +20,8 @@ from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
 from assoc.filters.base import Expected
 from assoc.tracking.progress import Progress
+from assoc.tracking.stages.coverage import dwells
 from assoc.tracking.stages.doubles import Doubles
-from assoc.tracking.stages.looks import dwells
 from assoc.tracking.track import renamed
 from assoc.tracking.track_batch import TrackBatch
 
@@ -43,12 +43,12 @@ def merge(progress: Progress) -> Progress:
     first, second = _near(progress, tracks)
     if not len(first):
         return progress.with_state(doubles=Doubles.none(len(progress.settings.sensors)))
-    fed, looks = method.detected(state._replace(tracks=tracks), step), dwells(progress, tracks.states)
-    a, b, looked = fed[first], fed[second], looks[first] & looks[second]
+    fed, dwelled = method.detected(state._replace(tracks=tracks), step), dwells(progress, tracks.states)
+    a, b, covered = fed[first], fed[second], dwelled[first] & dwelled[second]
     total = np.maximum(a + b, 1.0)
     new = np.stack([a / total, b / total, 1.0 - (a + b) / total], axis=2)
     # where no sensor detects either, both may be out of sight
-    new *= (looked & (a + b > 0.5).any(axis=1)[:, None])[..., None]
+    new *= (covered & (a + b > 0.5).any(axis=1)[:, None])[..., None]
     doubles = state.doubles.of(np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1))
     counts = np.where((a + b > _BOTH).any(axis=1)[:, None, None], 0.0, doubles.counts + new)
     doubles = doubles._replace(counts=counts)

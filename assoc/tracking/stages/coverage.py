@@ -1,4 +1,4 @@
-"""Where sensors looked: how often in a scan, what a miss of each track says, and which were missed for too long.
+"""What the dwells of sensors covered: how often in a scan, what a miss of a track says, which were missed too long.
 
 A sensor that cannot see a track has not missed it: its detection probability counts times the share of the track's
 predicted density in its view (`assoc.costs.views`).
@@ -21,7 +21,7 @@ _FORGETTING = 0.05
 # turns in a scan; with fewer all sensors are taken to be off, and no track is deleted
 _LEAST_TURN = 1e-3
 # a scan counts for a track if this share of it is in view of a sensor
-_LOOKED = 0.5
+_COVERED = 0.5
 
 
 def keep_pace(progress: Progress) -> Progress:
@@ -71,7 +71,7 @@ def detected_or_in_view(progress: Progress, states: Any, detected: Array) -> Arr
 
 
 def dwells(progress: Progress, states: Any) -> Array:
-    """Which sensors looked at which tracks in this scan by their means, bool (T, S)."""
+    """Which tracks the dwells of which sensors covered in this scan, by their means, bool (T, S)."""
     sectors, seen = progress.scan.sectors, in_view(progress, states)
     if sectors is None:
         return seen
@@ -93,10 +93,10 @@ def misses_of(progress: Progress, states: Any, s: int, positions: bool = False) 
     return log_missed(progress.settings.terms.miss[s], share)
 
 
-def looked(progress: Progress, misses: Array) -> Array:
-    """Whether any sensor looked at tracks, by their scores of a miss (T, S); bool (T,)."""
+def covered(progress: Progress, misses: Array) -> Array:
+    """Whether dwells of any sensor covered tracks, by their scores of a miss (T, S); bool (T,)."""
     terms = progress.settings.terms
-    least = _LOOKED * (np.array(1.0) if terms.by_range is None else terms.by_range.min(axis=1))
+    least = _COVERED * (np.array(1.0) if terms.by_range is None else terms.by_range.min(axis=1))
     return np.asarray((misses <= log_missed(terms.miss, least)).any(axis=1))
 
 
