@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
+from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.short_search import Part, arrays_within, remainder_within, search_shortly
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, bound_of
@@ -82,16 +84,18 @@ def test_it_searches_what_is_left_alone():
         assert arrays.slack.size == program.sides.size <= packing.num_rows - covered
 
 
-def test_it_begins_where_the_program_of_the_whole_is():
+def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
     """Its root needs no pivot: its bound plus the fixed columns' weight is the whole program's bound."""
-    rng, warm = np.random.default_rng(6), 0
+    rng, warm, roots = np.random.default_rng(6), 0, []
+    monkeypatch.setattr(short_search, "OpenNodes", lambda root: roots.append(root) or OpenNodes(root))
     for packing in packings(6, 45):
         linear = begun(packing)
         part = part_of(packing, rng, 1.0, 2)
         relaxed = linear.solve(columns=part.columns, slack=part.slack)
         if relaxed.status != OPTIMAL:
             continue
-        root = remainder_within(packing, linear, part)
+        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
+        root = roots.pop()
         begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         fixed = float(packing.weights[part.fixed].sum())
         assert bound_of(root.program, begin) + fixed == pytest.approx(relaxed.bound, abs=1e-6)
