@@ -123,8 +123,8 @@ class Sensor(ABC):
                     f"{self._label}: field_of_view of elevation is {low:.4g} to {high:.4g} rad, but nothing is seen "
                     "beyond pi/2: degrees? radians are expected"
                 )
-        if self.platform is not None and self.platform.doubt:
-            found.append(f"{self._label}: {self.platform.doubt}")
+        if self.platform is not None and self.platform.warning:
+            found.append(f"{self._label}: {self.platform.warning}")
         return tuple(found)
 
     def label(self, number: int) -> str:

@@ -54,7 +54,7 @@ class Platform:
             put(self, "headings", checked_headings(finite_array(self.headings, "platform: headings", times.shape)))
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """One line if a step is much faster than the others, "" else; sensors warn of it."""
         speeds = np.linalg.norm(np.diff(self.positions, axis=0), axis=1) / np.diff(self.times)
         k = int(np.argmax(speeds)) if len(speeds) else 0

@@ -24,7 +24,7 @@ from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.births.ghosts import Unseen
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.doubles import Doubles
-from assoc.tracking.state import Nursery, TrackerState
+from assoc.tracking.state import Starter, TrackerState
 from assoc.tracking.track_batch import one_state
 
 FORMAT = "assoc.tracker"
@@ -110,9 +110,9 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= {f"estimates.{name}": np.array(value) for name, value in state.estimates._asdict().items()}
     if state.clutter is not None:
         found |= {f"clutter.{name}": value for name, value in state.clutter.arrays().items()}
-    if settings.nursery is not None and state.nursery is not None:
-        inner, unseen = state.nursery
-        found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, inner).items()}
+    if settings.starter is not None and state.starter is not None:
+        inner, unseen = state.starter
+        found |= {f"nursery.{name}": value for name, value in _arrays(settings.starter, inner).items()}
         found |= {"unseen_ids": unseen.ids, "unseen": unseen.misses}
     return found
 
@@ -144,15 +144,15 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         clutter=None if model.clutter is None else _clutter(model.clutter, saved.part("clutter.")),
     )  # fmt: skip
     state = state._replace(method_state=settings.method.restored(settings, saved, state))
-    if settings.nursery is None or model.nursery is None:
+    if settings.starter is None or model.starter is None:
         return state
-    inner = _state(settings.nursery, model.nursery.state, saved.part("nursery."))
+    inner = _state(settings.starter, model.starter.state, saved.part("nursery."))
     saved.require(inner.time in (None, state.time), "nursery.time", "the tracker's time")
     ids, misses = saved["unseen_ids"], saved["unseen"]
     saved.require((np.diff(ids) > 0).all(), "unseen_ids", "ids that ascend")
     good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
     saved.require(good, "unseen", "how often each sensor has missed each track")
-    return state._replace(nursery=Nursery(inner, Unseen(ids, misses)))
+    return state._replace(starter=Starter(inner, Unseen(ids, misses)))
 
 
 def _watch(saved: Saved) -> IdentityWatch:

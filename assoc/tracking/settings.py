@@ -54,8 +54,8 @@ class TrackerSettings:
     """Whether to estimate what is declared of the sensors, and the manoeuvres."""
     by_range: Any = None
     """(S, B): see `assoc.costs.tracks.scores.ScoreTerms`."""
-    nursery: TrackerSettings | None = None
-    """If all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
+    starter: TrackerSettings | None = None
+    """If all sensors measure angles alone; see `assoc.tracking.births.starter`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):
@@ -95,7 +95,7 @@ class TrackerSettings:
         """The settings with the sensors of another scene; themselves if it is the same."""
         if scene is self.scene:
             return self
-        return replace(self, scene=scene, nursery=None if self.nursery is None else self.nursery.with_scene(scene))
+        return replace(self, scene=scene, starter=None if self.starter is None else self.starter.with_scene(scene))
 
     @cached_property
     def angles_alone(self) -> bool:

@@ -51,27 +51,27 @@ class TrackerState(NamedTuple):
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None
     """Where false alarms come from; None where the tracker does not adapt."""
-    nursery: Nursery | None = None
+    starter: Starter | None = None
     rng: Any = None
     """State of the filter's random generator, if it has one."""
     warned: bool = False
     """Whether the tracker has warned that the measurements can start no track."""
 
 
-class Nursery(NamedTuple):
-    """Tentative tracks of bearings alone; see `assoc.tracking.births.nursery`."""
+class Starter(NamedTuple):
+    """Tentative tracks of bearings alone; see `assoc.tracking.births.starter`."""
 
     state: TrackerState
     unseen: Unseen
-    """Misses in a row of the tracks that have left the nursery."""
+    """Misses in a row of the tracks that have left the starter."""
 
 
 def first_state(settings: TrackerSettings) -> TrackerState:
     """The state of a tracker before its first scan."""
-    tracks, count, nursery = empty_batch(settings.filter), len(settings.sensors), None
-    if settings.nursery is not None:
+    tracks, count, starter = empty_batch(settings.filter), len(settings.sensors), None
+    if settings.starter is not None:
         # the random generator is the tracker's
-        nursery = Nursery(first_state(settings.nursery)._replace(rng=None), Unseen.none(count))
+        starter = Starter(first_state(settings.starter)._replace(rng=None), Unseen.none(count))
     return TrackerState(
         tracks,
         np.ones(count),
@@ -82,7 +82,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,
         clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
-        nursery=nursery,
+        starter=starter,
         rng=rng_of(settings),
     )
 

@@ -24,7 +24,7 @@ from assoc.filters.batches import concatenate
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimates
-from assoc.tracking.births.nursery import current, end_ghosts, step_nursery, take_over
+from assoc.tracking.births.starter import current, end_ghosts, step_starter, take_over
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
@@ -42,22 +42,22 @@ Stage = Callable[[Progress], Progress]
 
 def stages_of(settings: TrackerSettings) -> list[Stage]:
     """The stages of a step after its input has been checked, in order."""
-    nursing = settings.nursery is not None
+    starting = settings.starter is not None
     return [
         *([register] if settings.registration is not None else []),
         *([use_estimates] if settings.adapt else []),
         keep_pace,
-        *([take_over] if nursing else []),
+        *([take_over] if starting else []),
         predict,
         *([remember_tracks] if settings.adapt else []),
         count_out_of_view,
         associate,
         live,
         *([within_heights] if settings.height is not None else []),
-        *([end_ghosts, grow_nursery] if nursing else []),
+        *([end_ghosts, grow_starter] if starting else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
-        *([] if nursing else [take_up, merge, name_parents]),
+        *([] if starting else [take_up, merge, name_parents]),
         watch_identities,
         report,
     ]
@@ -234,6 +234,6 @@ def report(progress: Progress) -> Progress:
     )
 
 
-def grow_nursery(progress: Progress) -> Progress:
-    """Step the nursery with the measurements that no track took."""
-    return step_nursery(progress, [keep_pace, predict, count_out_of_view, associate, live, report])
+def grow_starter(progress: Progress) -> Progress:
+    """Step the starter with the measurements that no track took."""
+    return step_starter(progress, [keep_pace, predict, count_out_of_view, associate, live, report])

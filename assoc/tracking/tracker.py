@@ -25,7 +25,7 @@ from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.associate.method import Method
 from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.nursery import current, with_nursery
+from assoc.tracking.births.starter import current, with_starter
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_time
@@ -131,10 +131,10 @@ class Tracker:
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
             max_tuples=max_tuples, registration=online, identity=identity, adapt=bool(adapt),
         )  # fmt: skip
-        doubt = settings.initiation.doubt(scene.region)
-        if doubt:
-            warn(doubt)
-        self.settings = with_nursery(settings)
+        text = settings.initiation.warning(scene.region)
+        if text:
+            warn(text)
+        self.settings = with_starter(settings)
         self.state = first_state(self.settings)
 
     @classmethod

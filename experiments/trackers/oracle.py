@@ -24,7 +24,7 @@ from assoc.tracking.track_batch import TrackBatch
 class Oracle(Method):
     """The targets of all measurements, scan by scan; its own part of a state is the target of each track."""
 
-    nursery = TrackTrees()
+    starter = TrackTrees()
 
     sources: Any
 

@@ -12,7 +12,7 @@ from assoc.tracking import TRACKERS, IdentityParameters
 from assoc.tracking.file import FORMAT, file_arrays
 from tests.sizes import sample
 
-# scenes of one instant, of own times and sectors, and of bearings alone, where tracks grow up in a nursery
+# scenes of one instant, of own times and sectors, and of bearings alone, where a starter begins tracks
 SCENES = {
     "three-radar": {"scans": 6},
     "rotating-radars": {"aircraft": 3, "duration": 12.0},

@@ -50,8 +50,8 @@ def test_a_clock_that_is_asked_for_counts(scene, options, expected):
 
 def test_the_work_is_less_for_large_problems(scene):
     settings = MultiSensorTracker.for_scene(scene).settings
-    # the nursery of tracks asks the solver, too
-    for one in (settings, settings.nursery):
+    # the starter of tracks asks the solver, too
+    for one in (settings, settings.starter):
         found = [solver_options(one, count) for count in (0, 10, 10_000, 10_000_000)]
         assert [each.pop("nodes") for each in found] == [500_000, 50_000, 50, 10]
         assert [solver_options(one, count, 0.05)["nodes"] for count in (0, 10_000, 10_000_000)] == [25_000, 2, 1]

@@ -129,15 +129,15 @@ def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
                     mass[row, other] = 0.0
                     if not WHOLE < value < 1.0 - WHOLE:
                         continue
-                    doubt = value * (1.0 - value)
+                    variance = value * (1.0 - value)
                     position = count
                     if count < values.size:
                         count += 1
-                    elif doubt <= values[count - 1] * (1.0 - values[count - 1]):
+                    elif variance <= values[count - 1] * (1.0 - values[count - 1]):
                         continue
                     else:
                         position = count - 1
-                    while position > 0 and values[position - 1] * (1.0 - values[position - 1]) < doubt:
+                    while position > 0 and values[position - 1] * (1.0 - values[position - 1]) < variance:
                         values[position] = values[position - 1]
                         pairs[position, 0], pairs[position, 1] = pairs[position - 1, 0], pairs[position - 1, 1]
                         position -= 1

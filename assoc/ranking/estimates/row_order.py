@@ -1,8 +1,8 @@
-"""An order of measurements (rows) in which few are in doubt at a time.
+"""An order of measurements (rows) in which few are uncertain at a time.
 
-Tuples are decided in the order of their first rows. A row is *in doubt* at a time when some of its tuples are decided
+Tuples are decided in the order of their first rows. A row is *uncertain* at a time when some of its tuples are decided
 and it has not had its turn: with the chance m that one of those decided covers it, its entropy is
--m log m - (1 - m) log(1 - m). The sum over the rows in doubt, H, estimates the logarithm of how many sets of covered
+-m log m - (1 - m) log(1 - m). The sum over the uncertain rows, H, estimates the logarithm of how many sets of covered
 rows matter at that time (`assoc.ranking.estimates.truncated_sweep`).
 
 Orders along the first eigenvectors of the graph's Laplacian begin (Fiedler, 1973), whose edges weigh as much as their
@@ -34,7 +34,7 @@ _ENTROPY = np.concatenate([[0.0], -_SHARES * np.log(_SHARES) - (1.0 - _SHARES) *
 """Entropy of the shares 0, 1 / 1024, ..., 1."""
 
 
-class _Doubts(NamedTuple):
+class _Decided(NamedTuple):
     """Tuples over rows, and what is decided of them."""
 
     cols: Ints
@@ -59,37 +59,37 @@ def row_order(cols: Ints, share: Floats, rows: int, most: float) -> tuple[Ints, 
     order that begins above ``most`` is not improved.
     """
     likely = share >= _LEAST_LIKELY
-    doubts = _doubts(cols[likely], share[likely], rows)
+    decided = _undecided(cols[likely], share[likely], rows)
     least = np.inf
     best: Ints = np.arange(rows)
     for order in _starts(cols, share, rows):
-        found = _total(_doubt(doubts, order))
-        doubts.turns[:], doubts.covered[:] = 0, 0.0
+        found = _total(_entropies(decided, order))
+        decided.turns[:], decided.covered[:] = 0, 0.0
         if found < least:
             best, least = order, found
     if least > most:
         return best, least
     best = best.copy()
     for _ in range(_ROUNDS):
-        doubt = _doubt(doubts, best)
-        moved = _moved_left(doubts, best, doubt)
-        moved += _moved_right(doubts, best, doubt)
-        doubts.turns[:], doubts.covered[:] = 0, 0.0
+        entropy = _entropies(decided, best)
+        moved = _moved_left(decided, best, entropy)
+        moved += _moved_right(decided, best, entropy)
+        decided.turns[:], decided.covered[:] = 0, 0.0
         if not moved:
             break
-    return best, _total(_doubt(doubts, best))
+    return best, _total(_entropies(decided, best))
 
 
-def _total(doubt: Floats) -> float:
-    return float(np.logaddexp.reduce(doubt[1:]))
+def _total(entropy: Floats) -> float:
+    return float(np.logaddexp.reduce(entropy[1:]))
 
 
-def _doubts(cols: Ints, share: Floats, rows: int) -> _Doubts:
+def _undecided(cols: Ints, share: Floats, rows: int) -> _Decided:
     column, sensor = np.nonzero(cols >= 0)
     row = cols[column, sensor]
     ptr = np.append(0, np.cumsum(np.bincount(row, minlength=rows)))
     row_cols = column[np.argsort(row, kind="stable")]
-    return _Doubts(cols, share, ptr, row_cols, _ENTROPY, np.zeros(len(share), np.int64), np.zeros(rows))
+    return _Decided(cols, share, ptr, row_cols, _ENTROPY, np.zeros(len(share), np.int64), np.zeros(rows))
 
 
 def _starts(cols: Ints, share: Floats, rows: int) -> list[Ints]:
@@ -112,35 +112,35 @@ def _starts(cols: Ints, share: Floats, rows: int) -> list[Ints]:
 
 
 @inner_njit
-def _uncertain(doubts: _Doubts, r: int) -> float:
+def _uncertain(decided: _Decided, r: int) -> float:
     """Entropy of a row that has not had its turn."""
-    return float(doubts.entropy[min(max(int(doubts.covered[r] * _STEPS + 0.5), 0), _STEPS)])
+    return float(decided.entropy[min(max(int(decided.covered[r] * _STEPS + 0.5), 0), _STEPS)])
 
 
 @inner_njit
-def _turn(doubts: _Doubts, r: int, step: int) -> float:
+def _turn(decided: _Decided, r: int, step: int) -> float:
     """Give a row its turn (``step`` 1) or take it back (-1); return by how much H rises."""
-    rise = -step * _uncertain(doubts, r)
-    for x in range(doubts.row_ptr[r], doubts.row_ptr[r + 1]):
-        j = doubts.row_cols[x]
-        doubts.turns[j] += step
-        if doubts.turns[j] != (1 if step > 0 else 0):
+    rise = -step * _uncertain(decided, r)
+    for x in range(decided.row_ptr[r], decided.row_ptr[r + 1]):
+        j = decided.row_cols[x]
+        decided.turns[j] += step
+        if decided.turns[j] != (1 if step > 0 else 0):
             continue
-        for u in doubts.cols[j]:
+        for u in decided.cols[j]:
             if u >= 0 and u != r:
-                rise -= _uncertain(doubts, u)
-                doubts.covered[u] += step * doubts.share[j]
-                rise += _uncertain(doubts, u)
+                rise -= _uncertain(decided, u)
+                decided.covered[u] += step * decided.share[j]
+                rise += _uncertain(decided, u)
     return rise
 
 
 @njit
-def _doubt(doubts: _Doubts, order: Ints) -> Floats:
+def _entropies(decided: _Decided, order: Ints) -> Floats:
     """Give all rows their turns; return H before the first and after each of them, (R + 1,)."""
-    doubt = np.zeros(order.size + 1)
+    entropy = np.zeros(order.size + 1)
     for t in range(order.size):
-        doubt[t + 1] = doubt[t] + _turn(doubts, order[t], 1)
-    return doubt
+        entropy[t + 1] = entropy[t] + _turn(decided, order[t], 1)
+    return entropy
 
 
 @inner_njit
@@ -149,20 +149,20 @@ def _work(h: float) -> float:
 
 
 @njit
-def _moved_left(doubts: _Doubts, order: Ints, doubt: Floats) -> int:
+def _moved_left(decided: _Decided, order: Ints, entropy: Floats) -> int:
     """Move rows to the left, the last one first; return how many. All turns are taken back."""
     moved = 0
     for t in range(order.size - 1, -1, -1):
         r = order[t]
-        _turn(doubts, r, -1)
+        _turn(decided, r, -1)
         gain = most = 0.0
         best = i = t
         while i > max(t - _FURTHEST, 0):
             i -= 1
-            _turn(doubts, order[i], -1)
-            after = doubt[i] + _turn(doubts, r, 1)
-            _turn(doubts, r, -1)
-            gain += _work(doubt[i + 1]) - _work(after)
+            _turn(decided, order[i], -1)
+            after = entropy[i] + _turn(decided, r, 1)
+            _turn(decided, r, -1)
+            gain += _work(entropy[i + 1]) - _work(after)
             if gain > most * (1.0 + 1e-9):
                 most, best = gain, i
         if best < t:
@@ -170,37 +170,37 @@ def _moved_left(doubts: _Doubts, order: Ints, doubt: Floats) -> int:
             order[best + 1 : t + 1] = order[best:t].copy()
             order[best] = r
         while i < t:
-            doubt[i + 1] = doubt[i] + _turn(doubts, order[i], 1)
+            entropy[i + 1] = entropy[i] + _turn(decided, order[i], 1)
             i += 1
     return moved
 
 
 @njit
-def _moved_right(doubts: _Doubts, order: Ints, doubt: Floats) -> int:
+def _moved_right(decided: _Decided, order: Ints, entropy: Floats) -> int:
     """Move rows to the right, the first one first; return how many. All rows get their turns."""
     moved = 0
     for t in range(order.size):
         r = order[t]
         gain = most = 0.0
         best = i = t
-        after = doubt[t]
+        after = entropy[t]
         while i < min(t + _FURTHEST, order.size - 1):
             i += 1
-            after += _turn(doubts, order[i], 1)
-            gain += _work(doubt[i]) - _work(after)
+            after += _turn(decided, order[i], 1)
+            gain += _work(entropy[i]) - _work(after)
             if gain > most * (1.0 + 1e-9):
                 most, best = gain, i
         while i > t:
-            _turn(doubts, order[i], -1)
+            _turn(decided, order[i], -1)
             i -= 1
         if best > t:
             moved += 1
             order[t:best] = order[t + 1 : best + 1].copy()
             order[best] = r
             for k in range(t, best):
-                doubt[k + 1] = doubt[k] + _turn(doubts, order[k], 1)
+                entropy[k + 1] = entropy[k] + _turn(decided, order[k], 1)
             for k in range(best - 1, t, -1):
-                _turn(doubts, order[k], -1)
+                _turn(decided, order[k], -1)
         else:
-            doubt[t + 1] = doubt[t] + _turn(doubts, r, 1)
+            entropy[t + 1] = entropy[t] + _turn(decided, r, 1)
     return moved

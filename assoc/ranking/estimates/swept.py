@@ -34,8 +34,8 @@ def swept(columns: AllColumns, deadline: float, states: float = 1.0, dropped: fl
     # weights reduced by multipliers are at most 1
     weights, alone = np.exp(-columns.reduced), np.exp(-columns.slack_reduced)
     share, _ = mean_field(columns.rows, weights, np.where(columns.slack, alone, _MUST))
-    order, doubt = row_order(columns.rows, share, rows, _MOST + _IMPROVED)
-    if doubt > _MOST:
+    order, work = row_order(columns.rows, share, rows, _MOST + _IMPROVED)
+    if work > _MOST:
         return None
     found = []
     for part in (1.0, _FEWER):

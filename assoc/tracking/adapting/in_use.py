@@ -41,13 +41,13 @@ def _with(settings: TrackerSettings, used: bytes, bands: bytes | None, manoeuvre
         values[:, DETECTION] = by_range.max(axis=1)
         by_range = np.maximum(by_range / values[:, DETECTION, None], _LEAST)
     sensors = [_seen(*both) for both in zip(settings.sensors, values.tolist(), strict=True)]
-    nursery = settings.nursery
+    starter = settings.starter
     changed: dict[str, Any] = {"scene": _scene(sensors, settings.scene), "filter": noisier(settings.filter, manoeuvres)}
     changed["by_range"] = by_range
-    if nursery is not None:
-        nursery = replace(nursery, **changed)
+    if starter is not None:
+        starter = replace(starter, **changed)
     # registration goes on with the sensors as declared
-    return replace(settings, **changed, nursery=nursery, registration=None)
+    return replace(settings, **changed, starter=starter, registration=None)
 
 
 def _seen(sensor: Sensor, used: Sequence[float]) -> Sensor:

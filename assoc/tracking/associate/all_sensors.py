@@ -116,7 +116,7 @@ def begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
     """New tracks of tuples that determine a position, with ids in the order of positions."""
     settings = progress.settings
     tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
-    if not len(tuples) or settings.nursery is not None:
+    if not len(tuples) or settings.starter is not None:
         return progress.state.tracks[:0], tuples[:0]
     batch, order = _fresh(progress, tuples)
     batch.counts[:, ID] = progress.work.new_ids(len(order))

@@ -110,7 +110,7 @@ class JointProbabilistic(Method):
     Its own part of a state: the `PairProbabilities` of each sensor in the last scan.
     """
 
-    nursery = TrackTrees()
+    starter = TrackTrees()
 
     max_events: int = 4096
     permutations: Permutations = "best"

@@ -153,8 +153,8 @@ def _begun(progress: Progress, taken: list[Array], tuples: Array, costs: Array, 
     """New tracks of measurements that probably belong to no track, by the best of these tuples of new targets."""
 
     def most(rows: Array) -> Array:
-        doubt = [np.append(0.0, probability)[rows[:, s]] for s, probability in enumerate(taken)]
-        return np.asarray(np.max(doubt, axis=0, initial=0.0))
+        shares = [np.append(0.0, probability)[rows[:, s]] for s, probability in enumerate(taken)]
+        return np.asarray(np.max(shares, axis=0, initial=0.0))
 
     good = most(tuples) < _FREE
     solution = progress.work.assign(AssignmentProblem(tuples[good], costs[good], progress.scan.sizes))

@@ -31,8 +31,8 @@ from assoc.tracking.track_batch import TrackBatch
 class Method(ABC):
     """The method of association of a kind of tracker."""
 
-    nursery: ClassVar[Method | None] = None
-    """Method of the nursery where all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
+    starter: ClassVar[Method | None] = None
+    """Method of the starter where all sensors measure angles alone; see `assoc.tracking.births.starter`."""
 
     def arranged(self, scan: Scan) -> Scan:
         """The scan with its measurements in the order in which the method numbers them."""

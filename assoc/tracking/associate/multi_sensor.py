@@ -20,7 +20,7 @@ from assoc.tracking.tracker import Tracker
 class MultiSensor(Method):
     """The method of `MultiSensorTracker`."""
 
-    nursery = TrackTrees()
+    starter = TrackTrees()
 
     def at_once(self, progress: Progress) -> Association:
         """Tracks are the first list of the problem, the sensors the others."""

@@ -29,7 +29,7 @@ Rule = Literal["greedy", "assignment"]
 class NearestNeighbour(Method):
     """The method of `NearestNeighbourTracker`."""
 
-    nursery = TrackTrees()
+    starter = TrackTrees()
 
     rule: Rule = "greedy"
 

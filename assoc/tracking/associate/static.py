@@ -25,7 +25,7 @@ from assoc.tracking.tracker import Tracker
 class StaticFusion(Method):
     """The method of `StaticFusionTracker`."""
 
-    nursery = TrackTrees()
+    starter = TrackTrees()
 
     def at_once(self, progress: Progress) -> Association:
         """Fuse the scan, then assign the fused tuples to tracks."""

@@ -63,7 +63,7 @@ class Initiation:
         if not isinstance(self.speed, (int, float, tuple, list)):
             object.__setattr__(self, "speed", float(self.speed))  # a number of numpy's
 
-    def doubt(self, region: Array) -> str:
+    def warning(self, region: Array) -> str:
         """One line if a closed area lies outside of the region, "" else."""
         for number, area in enumerate(self.closed, 1):
             low, high = np.min(area, axis=0), np.max(area, axis=0)

@@ -20,7 +20,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.adapting.identity_watch import OddIdentity
-from assoc.tracking.births.nursery import current
+from assoc.tracking.births.starter import current
 from assoc.tracking.stages.checking import checked_measurements
 from assoc.tracking.stages.identity_evidence import checked_identities, no_identities
 from assoc.tracking.state import TrackerState
@@ -327,14 +327,14 @@ class LatePlots:
 
 
 def _ids(state: TrackerState) -> set[int]:
-    """Ids of the tracks that live or may be taken up again, those in the nursery included."""
+    """Ids of the tracks that live or may be taken up again, those in the starter included."""
     ids = set(state.tracks.track_id.tolist()) | set(state.lost.track_id.tolist())
-    return ids if state.nursery is None else ids | set(state.nursery.state.tracks.track_id.tolist())
+    return ids if state.starter is None else ids | set(state.starter.state.tracks.track_id.tolist())
 
 
 def _tentative(state: TrackerState) -> set[int]:
-    """Ids of the living tracks that are not confirmed, those in the nursery included."""
-    young = [] if state.nursery is None else [state.nursery.state.tracks]
-    batches = [state.tracks, *young]
+    """Ids of the living tracks that are not confirmed, those in the starter included."""
+    begun = [] if state.starter is None else [state.starter.state.tracks]
+    batches = [state.tracks, *begun]
     sure = {i for batch in batches for i in batch.track_id[batch.confirmed].tolist()}
     return {i for batch in batches for i in batch.track_id.tolist()} - sure

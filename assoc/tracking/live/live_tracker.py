@@ -347,9 +347,9 @@ class LiveTracker:
         if len(first) >= _LOOKS[-1]:
             return
         first.append(z)
-        doubts = implausible([sensor], [[np.array(first)]]) if len(first) in _LOOKS else ()
-        if doubts:
-            self.settings.tell(f"warning: {'; '.join(doubts)}")
+        odd = implausible([sensor], [[np.array(first)]]) if len(first) in _LOOKS else ()
+        if odd:
+            self.settings.tell(f"warning: {'; '.join(odd)}")
             self._first[s] = [z] * _LOOKS[-1]
 
     def _step(self) -> Picture:

@@ -118,8 +118,8 @@ def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int,
     chosen, doubtful, gap = choose(score, wide, known, limits.visits)
     grown = _Grown(tree, score, known.loss, chosen)
     kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, hits, roots, grown, column, scan, limits)
-    told = (tree, score, known.loss, chosen)
-    return wide, np.flatnonzero(doubtful), gap, told, kept, ours, new_numbers, new_counts, new_history, new_born
+    fields = (tree, score, known.loss, chosen)
+    return wide, np.flatnonzero(doubtful), gap, fields, kept, ours, new_numbers, new_counts, new_history, new_born
 
 
 @njit

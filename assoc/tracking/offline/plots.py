@@ -209,7 +209,7 @@ def known_of(window: Window) -> Array:
 def may_return(tracker: Tracker) -> set[int]:
     """Ids of the tracks that live, in the best hypothesis or another one, or that may be taken up again."""
     state = tracker.state
-    batches = [state.tracks, state.lost, *([state.nursery.state.tracks] if state.nursery is not None else [])]
+    batches = [state.tracks, state.lost, *([state.starter.state.tracks] if state.starter is not None else [])]
     return {track for batch in batches for track in batch.track_id.tolist()}
 
 

@@ -20,7 +20,7 @@ class Doubles(NamedTuple):
     ids: Array
     """The older track, then the younger, int64 (K, 2)."""
     counts: Array
-    """Looks of each sensor that fed the older one, the younger one, none; (K, S, 3)."""
+    """Dwells of each sensor that fed the older one, the younger one, none; (K, S, 3)."""
 
     @staticmethod
     def none(sensors: int) -> Doubles:

@@ -8,7 +8,7 @@ from assoc._text.plain import one_line
 from assoc.costs.gating import chi_square_quantiles
 from assoc.recordings.several import NO_HEIGHT
 from assoc.tracking.adapting.identity_watch import TrackLookup
-from assoc.tracking.births.nursery import current
+from assoc.tracking.births.starter import current
 from assoc.tracking.progress import Progress
 from assoc.tracking.track_batch import TrackBatch
 

@@ -1,4 +1,4 @@
-"""Trackers that decide each scan at once, of bearings alone: their tracks grow up in a nursery of hypotheses."""
+"""Trackers that decide each scan at once, of bearings alone: a starter that keeps hypotheses begins their tracks."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ from assoc.filters import Gaussian
 from assoc.scene import Scan
 from assoc.tracking import TRACKERS, LatePlots
 from assoc.tracking.births.ghosts import Unseen
-from assoc.tracking.births.nursery import partners
+from assoc.tracking.births.starter import partners
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.track import Step
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
-NURSING = ["multi-sensor", "static", "nearest-neighbour", "joint-probabilistic"]
+STARTING = ["multi-sensor", "static", "nearest-neighbour", "joint-probabilistic"]
 
 
 def bearings(seed, scans=10):
@@ -31,7 +31,7 @@ def found(tracker, truth):
     return near.any(axis=1).sum(), (~near.any(axis=0)).sum()
 
 
-@sample("name", NURSING, every=2)
+@sample("name", STARTING, every=2)
 def test_targets_in_line_with_a_sensor_do_not_become_ghosts(name):
     """In the second scans two targets are in line with a sensor: whoever decides then has two ghosts, for ten scans."""
     # in 1000 and 1005 the joint assignment believed them, in 1015 nearest neighbours a crossing of false alarms
@@ -42,7 +42,7 @@ def test_targets_in_line_with_a_sensor_do_not_become_ghosts(name):
         assert found(tracker, scene.truth.positions[-1]) == (len(scene.truth.positions[-1]), 0), seed
 
 
-@sample("name", NURSING, every=2)
+@sample("name", STARTING, every=2)
 def test_ids_and_decisions_go_on_when_tracks_are_taken_over(name):
     scene = bearings(1000, 12)
     tracker = TRACKERS[name].for_scene(scene)
@@ -63,7 +63,7 @@ def test_ids_and_decisions_go_on_when_tracks_are_taken_over(name):
     assert all(track.hits >= 8 for track in tracker.tracks if track.confirmed)
 
 
-def test_a_nursery_of_another_time_is_refused(tmp_path):
+def test_a_starter_of_another_time_is_refused(tmp_path):
     scene, path = bearings(1002, 2), tmp_path / "state.npz"
     one, two = (TRACKERS["static"].for_scene(scene) for _ in range(2))
     stepped(one, scene)
@@ -123,7 +123,7 @@ def test_ghosts_are_what_a_sensor_does_not_see():
 
 
 # static fuses each scan by itself, and so never feeds it
-@sample("name", [name for name in NURSING if name != "static"], every=2)
+@sample("name", [name for name in STARTING if name != "static"], every=2)
 def test_a_ghost_that_a_sensor_never_sees_ends(name):
     """A track is set where bearings of two targets cross: two sensors feed it for ever, the third never does."""
     scene = bearings(0, 2)
@@ -160,7 +160,7 @@ def test_partners_of_a_ghost_are_those_that_swapped():
     assert partners(progress, step, np.array([67])).tolist() == []
 
 
-def test_sensors_that_start_tracks_have_no_nursery():
+def test_sensors_that_start_tracks_have_no_starter():
     scene = simulation.simulate("three-radar", 0, scans=2)
-    assert not any(TRACKERS[name].for_scene(scene).settings.nursery for name in NURSING)
-    assert all(TRACKERS[name].for_scene(bearings(0, 2)).settings.nursery for name in NURSING)
+    assert not any(TRACKERS[name].for_scene(scene).settings.starter for name in STARTING)
+    assert all(TRACKERS[name].for_scene(bearings(0, 2)).settings.starter for name in STARTING)

@@ -1,10 +1,10 @@
-"""A nursery: starts tracks where all sensors measure angles alone, for trackers that decide each scan at once.
+"""A starter: starts tracks where all sensors measure angles alone, for trackers that decide each scan at once.
 
 A bearing determines no position. Where bearings of several sensors cross, most crossings are ghosts, and one scan
 cannot distinguish them from targets. A tracker that decides each scan at once chooses a wrong crossing whenever it
 scores better by chance, and such ghosts keep the bearings that the targets need. So it passes the measurements that its
-tracks do not use to a nursery: the state of a multiple hypothesis tracker inside its own state, which defers decisions
-for some scans and then hands its tracks over. Tracks in the nursery are reported as soon as they are confirmed.
+tracks do not use to a starter: the state of a multiple hypothesis tracker inside its own state, which defers decisions
+for some scans and then hands its tracks over. Tracks in the starter are reported as soon as they are confirmed.
 Tracks of a tracker that decides at once may still swap bearings and become ghosts; `assoc.tracking.births.ghosts` ends
 those.
 """
@@ -23,7 +23,7 @@ from assoc.scene.scan import Scan
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import in_view
-from assoc.tracking.state import Nursery, TrackerState
+from assoc.tracking.state import Starter, TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import TrackBatch
 
@@ -31,41 +31,41 @@ _GROWN = 5
 """Age in scans at which a track is taken over: confirmation takes two or three, decisions three more."""
 
 
-def with_nursery(settings: TrackerSettings) -> TrackerSettings:
-    """The same settings, with those of a nursery if the tracker needs one."""
-    method = settings.method.nursery
+def with_starter(settings: TrackerSettings) -> TrackerSettings:
+    """The same settings, with those of a starter if the tracker needs one."""
+    method = settings.method.starter
     if method is None or not settings.angles_alone:
         return settings
-    return replace(settings, nursery=replace(settings, method=method, registration=None, identity=None, adapt=False))
+    return replace(settings, starter=replace(settings, method=method, registration=None, identity=None, adapt=False))
 
 
 def current(settings: TrackerSettings, state: TrackerState) -> TrackBatch:
-    """The tracks that users see, those in the nursery included, sorted by id."""
+    """The tracks that users see, those in the starter included, sorted by id."""
     tracks: TrackBatch = settings.method.current(state)
-    if settings.nursery is None or state.nursery is None:
+    if settings.starter is None or state.starter is None:
         return tracks
-    both = TrackBatch.concatenate([tracks, settings.nursery.method.current(state.nursery.state)])
+    both = TrackBatch.concatenate([tracks, settings.starter.method.current(state.starter.state)])
     return both[np.argsort(both.track_id, kind="stable")]
 
 
 def take_over(progress: Progress) -> Progress:
-    """Stage: take over the tracks that are old enough from the nursery."""
-    settings = progress.settings.nursery
-    assert settings is not None and progress.state.nursery is not None
-    rest, grown = settings.method.hand_over(progress.state.nursery.state, _GROWN)
+    """Stage: take over the tracks that are old enough from the starter."""
+    settings = progress.settings.starter
+    assert settings is not None and progress.state.starter is not None
+    rest, grown = settings.method.hand_over(progress.state.starter.state, _GROWN)
     tracks = TrackBatch.concatenate([progress.state.tracks, grown])
-    return progress.with_state(tracks=tracks, nursery=progress.state.nursery._replace(state=rest))
+    return progress.with_state(tracks=tracks, starter=progress.state.starter._replace(state=rest))
 
 
 def end_ghosts(progress: Progress) -> Progress:
     """Stage: delete ghosts; their bearings are free again."""
     state, step, miss = progress.state, progress.step, progress.settings.terms.miss
-    assert state.nursery is not None and step is not None
+    assert state.starter is not None and step is not None
     if progress.timed is not None:
         return progress
     detected = progress.settings.method.detected(state, step)
-    unseen = state.nursery.unseen.after(state.tracks.track_id, detected, in_view(progress, state.tracks.states))
-    progress = progress.with_state(nursery=state.nursery._replace(unseen=unseen))
+    unseen = state.starter.unseen.after(state.tracks.track_id, detected, in_view(progress, state.tracks.states))
+    progress = progress.with_state(starter=state.starter._replace(unseen=unseen))
     ghosts = unseen.ghosts(miss)
     if not len(ghosts):
         return progress
@@ -102,15 +102,15 @@ def partners(progress: Progress, step: Step, ghosts: Array) -> Array:
     return np.intersect1d(touched, [track for track in apart if track > 0])
 
 
-def step_nursery(progress: Progress, stages: Iterable[Callable[[Progress], Progress]]) -> Progress:
-    """Take the nursery through these stages with the measurements that no track took."""
+def step_starter(progress: Progress, stages: Iterable[Callable[[Progress], Progress]]) -> Progress:
+    """Take the starter through these stages with the measurements that no track took."""
     settings, state, step, scan = progress.settings, progress.state, progress.step, progress.scan
-    assert settings.nursery is not None and state.nursery is not None and step is not None
+    assert settings.starter is not None and state.starter is not None and step is not None
     free = [ids == 0 for ids in step.assigned]
     z = tuple(array[mask] for array, mask in zip(scan.measurements, free, strict=True))
     times = None if scan.times is None else tuple(array[mask] for array, mask in zip(scan.times, free, strict=True))
     left = Scan(scan.index, scan.time, z, times=times, sectors=scan.sectors, paths=scan.paths)
-    inner = Progress(settings.nursery, state.nursery.state, left, progress.work)
+    inner = Progress(settings.starter, state.starter.state, left, progress.work)
     for stage in stages:
         inner = stage(inner)
     assert inner.step is not None
@@ -120,4 +120,4 @@ def step_nursery(progress: Progress, stages: Iterable[Callable[[Progress], Progr
     now = Decision(scan.index, scan.time, tuple(assigned), tuple(confirmed))
     ended = np.sort(np.concatenate([step.ended, inner.step.ended]))
     step = replace(step, assigned=now.assigned, confirmed=now.confirmed, final=(now,), ended=ended)
-    return progress.with_state(nursery=Nursery(inner.state, state.nursery.unseen))._replace(step=step)
+    return progress.with_state(starter=Starter(inner.state, state.starter.unseen))._replace(step=step)
