@@ -29,7 +29,7 @@ from assoc.packing.packing import PackingArrays, assembled
 
 # temperatures of the smoothed ascent, in nats: the branches of a tree differ by about ten, however high their scores,
 # and losses must be exact enough to tell the best hypothesis from the second best
-_HOTTEST, _COLDEST, _PASSES = 4.0, 0.05, 40
+_HOTTEST, _COLDEST, _PASSES = 2.0, 0.05, 40
 
 
 class Priced(NamedTuple):
