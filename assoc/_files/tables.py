@@ -24,7 +24,7 @@ _ROWS, _TEXTS = 50_000, 10_000
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
-    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index; much sooner with pyarrow."""
+    """What `pandas.DataFrame.to_csv` makes of numbers and texts without an index; faster with pyarrow."""
     try:
         import pyarrow as pa
         import pyarrow.compute as pc
@@ -41,7 +41,10 @@ def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
         elif kind in "iu":
             texts = pa.array(values.to_numpy()).cast("string")
         else:
-            quoted = {text: _cell(text) for text in values.unique().tolist()}
+            # half characters, as from names of files that are not UTF-8, are none for pyarrow
+            quoted = {
+                text: _cell(text).encode("utf-8", "backslashreplace").decode() for text in values.unique().tolist()
+            }
             texts = pa.array([quoted[text] for text in values.tolist()], "string")
         columns.append(texts)
     first = [",".join(map(_cell, map(str, frame.columns)))] if header else []

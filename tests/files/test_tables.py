@@ -39,3 +39,12 @@ def test_numbers_have_their_shortest_text(with_pyarrow, monkeypatch):
     values = np.concatenate([edges, every[np.isfinite(every)], *spread, *np.round(spread, 3)])
     values = np.concatenate([values, -values])
     assert csv_text(pd.DataFrame({"value": values})).split() == ["value", *map(repr, values.tolist())]
+
+
+@pytest.mark.parametrize("with_pyarrow", [True, False])
+def test_half_characters_are_escaped(with_pyarrow, monkeypatch):
+    """As from names of files that are not UTF-8."""
+    if not with_pyarrow:
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+    frame = pd.DataFrame({"name": pd.Series(["\udc80,x", "y"], dtype=object), "n": [1.5, 2.5]})
+    assert csv_text(frame).encode("utf-8", "backslashreplace") == b'name,n\n"\\udc80,x",1.5\ny,2.5\n'
