@@ -98,7 +98,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
 
 @lean_inner_njit
 def _first(along: Array, least: float, begin: int, end: int) -> int:
-    """Where in this part of a sorted array numbers from `least` on begin."""
+    """The first index of a sorted array's part begin .. end - 1 whose number is at least `least`; else end."""
     while begin < end:
         middle = (begin + end) // 2
         if along[middle] < least:
