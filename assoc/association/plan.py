@@ -17,7 +17,7 @@ from assoc.association.association import Association
 from assoc.association.gate_loss import bound_without_gates
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
-from assoc.association.tiles import solve_in_tiles, targets_of
+from assoc.association.tiles import solve_in_tiles, targets_of, without_scans
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.costs.range_rates import SPEED
 from assoc.errors import InvalidInputError
@@ -89,15 +89,15 @@ class Plan:
         chosen: Any = registry.make_parameters(self.solver, self.parameters)
         return {field.name: getattr(chosen, field.name) for field in fields(chosen)}
 
-    def __call__(self, item: tuple[int, int]) -> ScanAssociation:
-        """Associate scan ``item[1]`` of source ``item[0]``."""
-        source = self.sources[item[0]]
+    def __call__(self, item: tuple[int, int | Scan]) -> ScanAssociation:
+        """Associate scan ``item[1]``, or the scan of that number, of source ``item[0]``."""
+        source, scan = self.sources[item[0]], item[1]
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
             solutions, history = self._solve(source, self.seed, 0)
             found = [_of_problem(source, solution) for solution in solutions]
             return self._best(self._with_probabilities(source, found), history, compiled)
-        return self.associate(source, source.scan(item[1]))
+        return self.associate(source, scan if isinstance(scan, Scan) else source.scan(scan))
 
     def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
         """Associate a scan of the sensors of a scene."""
@@ -179,7 +179,17 @@ class Plan:
         together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
         # what other processes do is not watched
         plan = self if jobs == 1 and scheduler is None else replace(self, watch=None)
-        return spread(plan, items, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
+        work: Sequence[tuple[int, int | Scan]] = items
+        if jobs > 1 and scheduler is None and self.gating.get("target_density") != "auto":
+            # a process is sent the scans that it solves; "auto" is found from all of them
+            bare = [without_scans(source) if isinstance(source, Scene) else source for source in self.sources]
+            plan = replace(plan, sources=tuple(bare))
+            work = [(number, self._scan(number, k)) for number, k in items]
+        return spread(plan, work, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
+
+    def _scan(self, number: int, k: int) -> int | Scan:
+        source = self.sources[number]
+        return source.scan(k) if isinstance(source, Scene) else k
 
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""

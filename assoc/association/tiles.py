@@ -70,7 +70,7 @@ class SolveTile:
 
     def __init__(self, plan: Any, scene: Scene) -> None:
         # the other scans are not needed
-        self._plan, self._scene = replace(plan, sources=(), watch=None), _without_scans(scene)
+        self._plan, self._scene = replace(plan, sources=(), watch=None), without_scans(scene)
 
     def __call__(self, tile: Tile) -> TileAnswer:
         """Solve it."""
@@ -102,7 +102,8 @@ def _solved(plan: Any, problem: AssignmentProblem) -> Solution:
     return assign(problem, plan.solver, **common, **plan.parameters)
 
 
-def _without_scans(scene: Scene) -> Scene:
+def without_scans(scene: Scene) -> Scene:
+    """The sensors and the region of a scene."""
     empty = [[np.zeros((0, sensor.dim)) for sensor in scene.sensors]]
     return Scene(scene.sensors, scene.times[:1], empty, region=scene.region)
 

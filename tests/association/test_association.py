@@ -2,6 +2,7 @@
 
 import json
 
+import cloudpickle
 import numpy as np
 import pytest
 
@@ -127,6 +128,25 @@ def test_processes_do_not_change_the_answer():
         assert a.scan == b.scan and np.array_equal(a.solution.tuples, b.solution.tuples)
         assert a.solution.cost == b.solution.cost and a.solution.lower_bound == b.solution.lower_bound
         assert np.array_equal(a.positions, b.positions)
+
+
+def test_processes_are_sent_the_scans_that_they_solve(monkeypatch):
+    scene = simulate("three-radar", scans=40)
+    sent = []
+
+    def spread(task, items, **rest):
+        sent.extend([task, *items])
+        return map(task, items)
+
+    monkeypatch.setattr("assoc.association.plan.spread", spread)
+    for gating in ({}, {"target_density": "auto"}):
+        plan = Plan((scene,), "greedy", gating=gating)
+        sent.clear()
+        found = [list(plan.run(plan.items(), jobs)) for jobs in (1, 2)]
+        assert all(a.solution.cost == b.solution.cost for a, b in zip(*found, strict=True))
+        whole, bare = (len(cloudpickle.dumps(sent[at])) for at in (0, 41))
+        # a prior found from all scans needs them
+        assert (bare > 0.9 * whole) if gating else (bare < 0.2 * whole)
 
 
 @pytest.mark.slow
