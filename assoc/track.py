@@ -211,6 +211,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
+    from assoc.tracking.offline.ended_smoothing import EndedSmoothing
     from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
@@ -230,15 +231,16 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         radar = radar_of(survey, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
     # these show all tracks at once
-    whole = any(given[name] for name in ("smooth", "report", "map", "asterix"))
+    whole = any(given[name] for name in ("report", "map", "asterix"))
     sliced = given["jobs"] or given["scheduler"] or given["slice"]
-    if sliced and (whole or given["check"]):
+    if sliced and (whole or given["smooth"] or given["check"]):
         raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map, --asterix, --check")
 
     missing: list[str] = []
     odd, plots = None, None
     table: Any = None if sliced or whole else _ended_tracks(given, stored, outputs)
     takers, ends, sizes = TakenPlots(survey.named, stored.addressed), [], []
+    smoothing = EndedSmoothing(tracker, given["origin"])
 
     def track(scans: Iterator[Window]) -> PlotTracks | None:
         if whole:
@@ -247,13 +249,21 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         for followed in follow(tracker, scans, forget=True):
             takers.take(followed)
             table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
-            table.add(*followed.listed(not given["all"]))
+            if given["smooth"]:
+                smoothing.take(followed)
+            else:
+                table.add(*followed.listed(not given["all"]))
             ends.append(float(followed.step.time))
             sizes.append(len(followed.window))
             if len(ends) % FORGET == 0:
                 living = may_return(tracker)
                 takers.keep(living)
-                table.end(living)
+                if given["smooth"]:
+                    table.add_frame(smoothing.end(living).to_frame())
+                else:
+                    table.end(living)
+        if given["smooth"]:
+            table.add_frame(smoothing.finish().to_frame())
         return None
 
     if sliced:

@@ -1,6 +1,7 @@
 """Tracks that are written as they end are those of a table that holds them all."""
 
 import signal
+import weakref
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from assoc.simulation import simulate_recording
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
+from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.offline.ended_tracks import EndedTracks
 from tests.running import process
 
@@ -53,6 +55,33 @@ def test_rows_are_those_of_a_whole_table(here, more):
             np.testing.assert_array_equal(table[name].to_numpy(), found[name].to_numpy())
         else:
             assert (table[name].astype(str) == found[name].fillna("")).all()
+
+
+@pytest.mark.parametrize("tracker", ["mht", "nearest-neighbour"])
+def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys, tracker):
+    """To the same bytes as all at once, for a report; measurements of tracks that have ended are gone."""
+    monkeypatch.setattr(plots, "FORGET", 2)
+    taken, seen = [], []
+
+    class Seen(EndedSmoothing):
+        def take(self, followed):
+            super().take(followed)
+            taken.append(weakref.ref(followed.measurements[0]))
+
+        def end(self, living):
+            table = super().end(living)
+            seen.append((len(table), sum(one() is not None for one in taken)))
+            return table
+
+    words = ["plots.csv", "--smooth", "--tracker", tracker, *WORDS, "-o"]
+    assert track.main([*words, "whole.csv", "--report", "r.html"]) == 0
+    monkeypatch.setattr("assoc.tracking.offline.ended_smoothing.EndedSmoothing", Seen)
+    capsys.readouterr()
+    assert track.main([*words, "t.csv"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert (here / "t.csv").read_bytes() == (here / "whole.csv").read_bytes()
+    assert sum(rows for rows, _ in seen[:-1]) > 50 and seen[-1][0] > 50
+    assert seen[-2][1] < 0.7 * len(taken)
 
 
 def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):

@@ -1,8 +1,10 @@
 """Smoothed tracks against one large linear system, and against the truth."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from assoc import InvalidInputError, filters, simulation
@@ -10,6 +12,7 @@ from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
 from assoc.recordings import clustering_time_window, radar_of
 from assoc.scene import Scene
 from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoothed, track_scene
+from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.offline.plots import track_plots
 from tests.tracking import plain
 
@@ -90,6 +93,25 @@ def test_decisions_of_other_scans_are_refused():
     _, decisions = track_scene(tracker, scene, scans=range(6, 12))
     with pytest.raises(InvalidInputError, match="decisions: that of scan 0 is of another scan"):
         smoothed(tracker, scene, decisions)
+
+
+def test_ended_tracks_wait_for_late_decisions():
+    """Two targets, one after the other; decisions come three windows late, and it is asked after each window."""
+    times, path = np.arange(12.0), [np.array([[300.0 + 20.0 * k, 400.0, 200.0]]) for k in range(12)]
+    stamps = [[np.array([time])] for time in times]
+    scene = Scene([plain.sensor()], times, [[z] for z in path], plain.REGION, measurement_times=stamps)
+    tracker = MultiSensorTracker.for_scene(scene)
+    decisions = [Decision(k, times[k], (np.array([1 + k // 6]),), (np.array([True]),)) for k in range(12)]
+    smoothing, found = EndedSmoothing(tracker), []
+    for k in range(12):
+        step = SimpleNamespace(
+            time=times[k], final=decisions[8:] if k == 11 else decisions[max(k - 3, 0) : max(k - 2, 0)]
+        )
+        smoothing.take(SimpleNamespace(step=step, measurements=[path[k]], times=stamps[k], altitudes={}))
+        found.append(smoothing.end({1} if k < 5 else {2} - {k // 11 * 2}).to_frame())
+    assert [len(frame) for frame in found] == [0] * 8 + [6, 0, 0, 6]
+    whole = smoothed(tracker, scene, decisions, altitudes={}).to_frame()
+    assert pd.concat(found, ignore_index=True).equals(whole)
 
 
 def test_plots_with_times_of_their_own_are_smoothed():

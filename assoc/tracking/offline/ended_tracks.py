@@ -69,7 +69,7 @@ class EndedTracks:
         if not len(frame):
             return
         self._confirmed |= {*frame.track_id[frame.confirmed].tolist()}
-        wrong = frame[~frame.consistent]
+        wrong = frame[~frame.consistent] if "consistent" in frame else frame[:0].assign(nis=0.0)
         for track, nis in zip(wrong.track_id.tolist(), wrong.nis.tolist(), strict=True):
             self._inconsistent[track] = max(self._inconsistent.get(track, 0.0), nis)
         if self._error is None:

@@ -13,8 +13,7 @@ from assoc.metrics import CtMtIt
 from assoc.metrics.ct_mt_it import RatesSoFar
 from assoc.metrics.plot_identity import IdentitiesSoFar
 from assoc.recordings import Recording, Window
-from assoc.scene.scene import Scene
-from assoc.tracking.offline.smoothing import smoothed
+from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.quality import Qualities
 from assoc.tracking.track import Step, TrackColumns
 from assoc.tracking.track_table import TrackTable
@@ -116,7 +115,7 @@ def track_plots(
     smooth : bool
         Whether the table has the finished tracks instead, see `assoc.tracking.smoothed`; needs a new tracker.
     """
-    table = TrackTable()
+    table, smoothing = TrackTable(), EndedSmoothing(tracker)
     takers = TakenPlots(recording.aircraft is not None, bool(recording.addresses.any()))
     done: list[Followed] = []
     for followed in follow(tracker, windows):
@@ -124,13 +123,11 @@ def track_plots(
         takers.take(followed)
         table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
         table.add(*followed.listed(confirmed))
+        if smooth:
+            smoothing.take(followed)
     table.name_by_identities()
-    if smooth and done:
-        decisions = [decision for f in done for decision in f.step.final]
-        ends, settings = np.array([f.step.time for f in done]), tracker.settings
-        plots, times = [f.measurements for f in done], [f.times for f in done]
-        scene = Scene(tracker.sensors, ends, plots, settings.scene.region, measurement_times=times)
-        named, table = table, smoothed(tracker, scene, [*decisions, *tracker.flush()], altitudes=done[-1].altitudes)
+    if smooth:
+        named, table = table, smoothing.finish()
         table.take_names(named)
     ends = np.array([f.step.time for f in done])
     tracks = np.concatenate([np.zeros(0, dtype=np.int64), *(f.tracks for f in done)])
@@ -189,7 +186,7 @@ def follow(tracker: Tracker, windows: Iterable[Window], *, forget: bool = False)
         qualities.after(tracker, before, step, *scan)
         sure = np.concatenate(step.confirmed)[order]
         yield Followed(tracker, window, step, np.where(ids > 0, ids, -1), sure, *scan, altitudes, qualities)
-        if forget and number % FORGET == 0:
+        if forget and (number + 1) % FORGET == 0:
             living = may_return(tracker)
             qualities.keep(living)
             for gone in altitudes.keys() - living:
