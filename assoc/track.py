@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from assoc.tracking import Tracker
     from assoc.tracking.adapting.identity_watch import OddIdentity
     from assoc.tracking.offline.ended_tracks import EndedTracks
-    from assoc.tracking.offline.plots import PlotTracks
+    from assoc.tracking.offline.plots import PlotTracks, TakenPlots
 
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
@@ -211,8 +211,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
-    from assoc.tracking.offline.ended_smoothing import EndedSmoothing
-    from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return, track_plots
+    from assoc.tracking.offline.plots import TakenPlots, track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if is_asterix(file) else "tables", given["identity"] or "score-only"
@@ -239,31 +238,15 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     missing: list[str] = []
     odd, plots = None, None
     table: Any = None if sliced or whole else _ended_tracks(given, stored, outputs)
-    takers, ends, sizes = TakenPlots(survey.named, stored.addressed), [], []
-    smoothing = EndedSmoothing(tracker, given["origin"])
+    takers = TakenPlots(survey.named, stored.addressed)
+    ends: list[float] = []
+    sizes: list[int] = []
 
     def track(scans: Iterator[Window]) -> PlotTracks | None:
         if whole:
             recording = joined([*stored], notes, os.path.basename(file))
             return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
-        for followed in follow(tracker, scans, forget=True):
-            takers.take(followed)
-            table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
-            if given["smooth"]:
-                smoothing.take(followed)
-            else:
-                table.add(*followed.listed(not given["all"]))
-            ends.append(float(followed.step.time))
-            sizes.append(len(followed.window))
-            if len(ends) % FORGET == 0:
-                living = may_return(tracker)
-                takers.keep(living)
-                if given["smooth"]:
-                    table.add_frame(smoothing.end(living).to_frame())
-                else:
-                    table.end(living)
-        if given["smooth"]:
-            table.add_frame(smoothing.finish().to_frame())
+        _take(given, tracker, scans, table, takers, ends, sizes)
         return None
 
     if sliced:
@@ -295,6 +278,40 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
 
     ends_here = None if whole else finish
     return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], ends_here, odd)
+
+
+def _take(
+    given: Given,
+    tracker: Tracker,
+    scans: Iterator[Window],
+    table: EndedTracks,
+    takers: TakenPlots,
+    ends: list[float],
+    sizes: list[int],
+) -> None:
+    """Track windows, and hand tracks to the table as they end, or smoothed when they have."""
+    from assoc.tracking.offline.ended_smoothing import EndedSmoothing
+    from assoc.tracking.offline.plots import FORGET, follow, known_of, may_return
+
+    smoothing = EndedSmoothing(tracker, given["origin"]) if given["smooth"] else None
+    for followed in follow(tracker, scans, forget=True):
+        takers.take(followed)
+        table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
+        if smoothing is None:
+            table.add(*followed.listed(not given["all"]))
+        else:
+            smoothing.take(followed.step, followed.measurements, followed.times, followed.altitudes)
+        ends.append(float(followed.step.time))
+        sizes.append(len(followed.window))
+        if len(ends) % FORGET == 0:
+            living = may_return(tracker)
+            takers.keep(living)
+            if smoothing is None:
+                table.end(living)
+            else:
+                table.add_frame(smoothing.end(living).to_frame())
+    if smoothing is not None:
+        table.add_frame(smoothing.finish().to_frame())
 
 
 def _ended_tracks(given: Given, stored: StoredPlots, outputs: ExitStack) -> EndedTracks:

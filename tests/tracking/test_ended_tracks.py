@@ -64,9 +64,9 @@ def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys, tracker):
     taken, seen = [], []
 
     class Seen(EndedSmoothing):
-        def take(self, followed):
-            super().take(followed)
-            taken.append(weakref.ref(followed.measurements[0]))
+        def take(self, step, measurements, *rest):
+            super().take(step, measurements, *rest)
+            taken.append(weakref.ref(measurements[0]))
 
         def end(self, living):
             table = super().end(living)

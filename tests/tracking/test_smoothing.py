@@ -107,7 +107,7 @@ def test_ended_tracks_wait_for_late_decisions():
         step = SimpleNamespace(
             time=times[k], final=decisions[8:] if k == 11 else decisions[max(k - 3, 0) : max(k - 2, 0)]
         )
-        smoothing.take(SimpleNamespace(step=step, measurements=[path[k]], times=stamps[k], altitudes={}))
+        smoothing.take(step, [path[k]], stamps[k], {})
         found.append(smoothing.end({1} if k < 5 else {2} - {k // 11 * 2}).to_frame())
     assert [len(frame) for frame in found] == [0] * 8 + [6, 0, 0, 6]
     whole = smoothed(tracker, scene, decisions, altitudes={}).to_frame()

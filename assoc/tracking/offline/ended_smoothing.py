@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +13,9 @@ from assoc.errors import AssocWarning
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.offline.smoothing import smoothed
-from assoc.tracking.track import Decision
+from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
-
-if TYPE_CHECKING:
-    from assoc.tracking.offline.plots import Followed
 
 
 class EndedSmoothing:
@@ -38,16 +35,16 @@ class EndedSmoothing:
         self._windows: list[tuple[float, list[Array], list[Array]]] = []
         self._decisions: list[Decision] = []
         self._first = 0
-        self._latest: dict[int, float] = {}
+        self._latest: Mapping[int, float] = {}
         self._altitudes: dict[int, float] = {}
         # after how many windows which tracks lived
         self._lived: list[tuple[int, set[int]]] = []
 
-    def take(self, followed: Followed) -> None:
-        """Take the next window."""
-        self._windows.append((followed.step.time, followed.measurements, followed.times))
-        self._decisions += followed.step.final
-        self._latest = followed.altitudes
+    def take(self, step: Step, measurements: list[Array], times: list[Array], altitudes: Mapping[int, float]) -> None:
+        """Take the next window, and the last altitude of each track."""
+        self._windows.append((step.time, measurements, times))
+        self._decisions += step.final
+        self._latest = altitudes
 
     def end(self, living: set[int]) -> TrackTable:
         """Smooth the tracks whose measurements are all decided and that are not among the living."""

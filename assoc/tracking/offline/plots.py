@@ -124,7 +124,7 @@ def track_plots(
         table.count_identities(followed.tracks, known_of(followed.window)[:, 1:])
         table.add(*followed.listed(confirmed))
         if smooth:
-            smoothing.take(followed)
+            smoothing.take(followed.step, followed.measurements, followed.times, followed.altitudes)
     table.name_by_identities()
     if smooth:
         named, table = table, smoothing.finish()
