@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc.packing.kernels.columns import first_row
 
 
 class PackingArrays(NamedTuple):
@@ -178,7 +179,10 @@ def _numbered_components(rows: NDArray[np.int32], slack: NDArray[np.bool_]) -> t
             r = rows[j, s]
             if r >= 0:
                 used[r] = True
-                root = find(parent, r)
+                # mostly found at once
+                root = parent[r]
+                if root != first:
+                    root = find(parent, root)
                 if first < 0:
                     first = root
                 elif root != first:
@@ -201,8 +205,15 @@ def _numbered_components(rows: NDArray[np.int32], slack: NDArray[np.bool_]) -> t
 
 
 @inner_njit
-def _indexed_by_row(cols: NDArray[np.int32], row_ptr: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The columns of each row, ascending."""
+def _indexed_by_row(cols: NDArray[np.int32], num_rows: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Where the columns of each row begin, and the columns of each row, ascending."""
+    row_ptr = np.zeros(num_rows + 1, np.int64)
+    for k in range(cols.shape[0]):
+        for s in range(cols.shape[1]):
+            if cols[k, s] >= 0:
+                row_ptr[cols[k, s] + 1] += 1
+    for r in range(num_rows):
+        row_ptr[r + 1] += row_ptr[r]
     end = row_ptr[:-1].copy()
     row_cols = np.empty(row_ptr[-1], np.int32)
     for k in range(cols.shape[0]):
@@ -211,32 +222,25 @@ def _indexed_by_row(cols: NDArray[np.int32], row_ptr: NDArray[np.int64]) -> NDAr
             if r >= 0:
                 row_cols[end[r]] = k
                 end[r] += 1
-    return row_cols
+    return row_ptr, row_cols
 
 
 @njit
 def assembled(
     rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
 ) -> Any:
-    """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering."""
-    num, num_sensors = rows.shape
-    total = slack.size
+    """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering.
+
+    Rows and weights may be arrays of the packing then: not to be changed later.
+    """
+    num, total = weights.size, slack.size
     component, num_components = _numbered_components(rows, slack)
     row_start = np.zeros(num_components + 1, np.int64)
-    col_start = np.zeros(num_components + 1, np.int64)
     for r in range(total):
         if component[r] >= 0:
             row_start[component[r] + 1] += 1
-    first_row = np.empty(num, np.int32)
-    for j in range(num):
-        for s in range(num_sensors):
-            if rows[j, s] >= 0:
-                first_row[j] = rows[j, s]
-                break
-        col_start[component[first_row[j]] + 1] += 1
     for c in range(num_components):
         row_start[c + 1] += row_start[c]
-        col_start[c + 1] += col_start[c]
     fill = row_start[:-1].copy()
     new_row = np.full(total, -1, np.int32)
     row_origin = np.empty(row_start[-1], np.int32)
@@ -248,25 +252,27 @@ def assembled(
             row_origin[fill[c]] = r
             new_slack[fill[c]] = slack[r]
             fill[c] += 1
-    fill = col_start[:-1].copy()
-    cols = np.empty((num, num_sensors), np.int32)
-    new_weights = np.empty(num)
+    col_start = np.zeros(num_components + 1, np.int64)
     new_origin = np.empty(num, np.int32)
-    row_ptr = np.zeros(row_origin.size + 1, np.int64)
-    for j in range(num):
-        c = component[first_row[j]]
-        k = fill[c]
-        fill[c] += 1
-        new_weights[k] = weights[j]
-        new_origin[k] = origin[j]
-        for s in range(num_sensors):
-            r = rows[j, s]
-            if r >= 0:
-                cols[k, s] = new_row[r]
-                row_ptr[new_row[r] + 1] += 1
-            else:
-                cols[k, s] = -1
-    for r in range(row_origin.size):
-        row_ptr[r + 1] += row_ptr[r]
-    row_cols = _indexed_by_row(cols, row_ptr)
+    if num_components == 1 and row_origin.size == total:
+        # all in their places
+        cols, new_weights, col_start[1] = rows, weights, num
+        for j in range(num):
+            new_origin[j] = origin[j]
+    else:
+        cols, new_weights = np.empty(rows.shape, np.int32), np.empty(num)
+        for j in range(num):
+            col_start[component[first_row(rows, j)] + 1] += 1
+        for c in range(num_components):
+            col_start[c + 1] += col_start[c]
+        fill = col_start[:-1].copy()
+        for j in range(num):
+            c = component[first_row(rows, j)]
+            k = fill[c]
+            fill[c] += 1
+            new_weights[k] = weights[j]
+            new_origin[k] = origin[j]
+            for s in range(rows.shape[1]):
+                cols[k, s] = new_row[rows[j, s]] if rows[j, s] >= 0 else -1
+    row_ptr, row_cols = _indexed_by_row(cols, row_origin.size)
     return cols, new_weights, new_slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin

@@ -144,12 +144,8 @@ def prepare(problem: AssignmentProblem) -> Prepared:
             problem.tuples, problem.costs, offsets, int(sizes.sum())
         )
     else:
-        rows = problem.tuples + (offsets - 1).astype(np.int32)
         slack = np.repeat(sizes > sizes.min(), sizes)
-        # copies: the problem's arrays are read-only, and numba would compile kernels again for those
-        costs = problem.costs.copy()
-        arrays = assembled(rows, costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
-        whole = _whole_numbers(costs)
+        arrays, whole = _prepare_without_dummies(problem.tuples, problem.costs, offsets, slack)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
     packing = Packing(*(*arrays, 1.0 if whole else 0.0))
     # every bound contains this sum: exact to the last digit
@@ -167,6 +163,21 @@ def _prepare_with_dummies(
     rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
     arrays = assembled(rows, weights, np.ones(total, np.bool_), origin)
     return arrays, _whole_numbers(weights), single, single_cost
+
+
+@njit
+def _prepare_without_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], slack: NDArray[np.bool_]
+) -> Any:
+    """Arrays of the packing, and whether its weights are whole numbers."""
+    rows, origin = np.empty(tuples.shape, np.int32), np.empty(costs.size, np.int32)
+    # copied: the problem's arrays are read-only, and numba would compile kernels again for those
+    weights = np.empty(costs.size)
+    for j in range(costs.size):
+        weights[j], origin[j] = costs[j], j
+        for s in range(offsets.size):
+            rows[j, s] = tuples[j, s] + offsets[s] - 1
+    return assembled(rows, weights, slack, origin), _whole_numbers(weights)
 
 
 @njit

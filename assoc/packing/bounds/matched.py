@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
-from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.packing import Packing, PackingArrays
 
@@ -100,12 +99,23 @@ def _other_row(cols: NDArray[np.int32], j: int, row: int) -> int:
     return -1
 
 
+@inner_njit
+def _ends(cols: NDArray[np.int32], j: int, side: Ints) -> tuple[int, int]:
+    """The rows of a column on side 0 and on side 1, -1 for none."""
+    left = right = -1
+    for s in range(cols.shape[1]):
+        r = cols[j, s]
+        if r >= 0 and side[r] == 0:
+            left = r
+        elif r >= 0:
+            right = r
+    return left, right
+
+
 @njit
 def _match(packing: PackingArrays, side: Ints, owner: NDArray[np.int32], duals: Floats) -> float:
     """Fill in the columns and multipliers of the rows; return the weight, ``inf`` if there is no cover."""
-    cols, weights, slack, row_ptr, row_cols = (
-        packing.cols, packing.weights, packing.slack, packing.row_ptr, packing.row_cols,
-    )  # fmt: skip
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
     num = side.size
     number, count = np.empty(num, np.int64), np.zeros(2, np.int64)
     # a row alone: uncovered, or covered by its cheapest column without another row
@@ -115,25 +125,25 @@ def _match(packing: PackingArrays, side: Ints, owner: NDArray[np.int32], duals: 
         number[r], rows[side[r], count[side[r]]] = count[side[r]], r
         price[side[r], count[side[r]]] = 0.0 if slack[r] else np.inf
         count[side[r]] += 1
-    edges = 0
+    indptr = np.zeros(count[0] + 1, np.int64)
     for j in range(weights.size):
-        r = first_row(cols, j)
-        if _other_row(cols, j, r) >= 0:
-            edges += 1
-        elif weights[j] < price[side[r], number[r]]:
+        left, right = _ends(cols, j, side)
+        if left >= 0 and right >= 0:
+            indptr[number[left] + 1] += 1
+            continue
+        r = max(left, right)
+        if weights[j] < price[side[r], number[r]]:
             price[side[r], number[r]], alone[r] = weights[j], j
-    indptr, indices = np.zeros(count[0] + 1, np.int64), np.empty(edges, np.int64)
-    costs, column = np.empty(edges), np.empty(edges, np.int32)
-    edges = 0
     for i in range(count[0]):
-        r = rows[0, i]
-        for k in range(row_ptr[r], row_ptr[r + 1]):
-            j = row_cols[k]
-            other = _other_row(cols, j, r)
-            if other >= 0:
-                indices[edges], costs[edges], column[edges] = number[other], weights[j], j
-                edges += 1
-        indptr[i + 1] = edges
+        indptr[i + 1] += indptr[i]
+    indices, costs, column = np.empty(indptr[-1], np.int64), np.empty(indptr[-1]), np.empty(indptr[-1], np.int32)
+    end = indptr[:-1].copy()
+    for j in range(weights.size):
+        left, right = _ends(cols, j, side)
+        if left >= 0 and right >= 0:
+            e = end[number[left]]
+            end[number[left]] += 1
+            indices[e], costs[e], column[e] = number[right], weights[j], j
     row_edge, u, v = np.empty(count[0], np.int64), np.empty(count[0]), np.empty(count[1])
     weight = match_sparse(indptr, indices, costs, price[0, : count[0]], price[1, : count[1]], row_edge, u, v)
     if weight == np.inf:

@@ -42,7 +42,7 @@ def solve_core(problem: Costs, state: State) -> int:
         pending[i] = i
     for j in range(v.size):
         owner[j] = -1
-    core = Costs(indptr, indices, indices.astype(np.uint64), above, problem.row_slack, above)
+    core = Costs(indptr, indices, indices.view(np.uint64), above, problem.row_slack, above)
     part = State(chosen, u, v, owner, pending)
     left = hold_auction(core, part, u.size)
     if left > 0:
@@ -63,10 +63,13 @@ def _cheapest(problem: Costs) -> tuple[Ints, Ints]:
         row = above[indptr[i] : indptr[i + 1]]
         limit = _limit_of_cheap(row)
         end = begin[i]
-        for t in range(row.size):
+        # from another place in each row: where many are equal, rows would take the same columns
+        t = i % max(row.size, 1)
+        for _ in range(row.size):
             if row[t] <= limit and end < begin[i] + 2 * _CORE:
                 places[end] = indptr[i] + t
                 end += 1
+            t = t + 1 if t + 1 < row.size else 0
         begin[i + 1] = end
     return places[: begin[num]].copy(), begin
 
@@ -74,13 +77,17 @@ def _cheapest(problem: Costs) -> tuple[Ints, Ints]:
 @inner_njit
 def _limit_of_cheap(row: Floats) -> float:
     """A cost that between one and two times as many as a core has are below or at, if halving finds one."""
-    low, high = np.inf, -np.inf
+    low, high, least = np.inf, -np.inf, 0
     for t in range(row.size):
         low = min(low, row[t])
         if row[t] < np.inf:
             high = max(high, row[t])
+    for t in range(row.size):
+        least += row[t] == low
+    if least >= _CORE:
+        return low
     if row.size > 2 * _CORE:
-        for _ in range(24):
+        for _ in range(12):
             middle = 0.5 * (low + high)
             count = 0
             for t in range(row.size):

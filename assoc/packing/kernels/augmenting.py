@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._system.compiled import inner_njit
-from assoc._types import Ints
+from assoc._types import Floats, Ints
 from assoc.packing.kernels.heap import doubled, pop, push
 from assoc.packing.kernels.partial_matching import Costs, State
 
@@ -112,16 +112,33 @@ def augment_all(problem: Costs, state: State, num_pending: int) -> bool:
 
 
 @inner_njit
+def _matrix(problem: Costs, m: int) -> Floats:
+    """The costs above the columns' bases as a matrix, ``inf`` where there is no edge; a view if all are there."""
+    indptr, indices, above = problem.indptr, problem.indices, problem.above
+    n = indptr.size - 1
+    if indptr[n] == n * m:
+        complete = True
+        for i in range(n):
+            for j in range(m):
+                complete &= indices[i * m + j] == j
+        if complete:
+            return above[: n * m].reshape((n, m))
+    matrix = np.full((n, m), np.inf)
+    for i in range(n):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            matrix[i, j] = min(matrix[i, j], above[k])
+    return matrix
+
+
+@inner_njit
 def augment_dense(problem: Costs, state: State, num_pending: int) -> bool:
     """The same on a matrix of the costs: with many edges the nearest column is found faster by a look at all."""
     indptr, indices, _, costs, row_slack, above = problem
     row_edge, u, v, owner, pending = state
     n, m = row_slack.size, v.size
-    matrix, mate = np.full((n, m), np.inf), np.full(n, -1, np.int64)
+    matrix, mate = _matrix(problem, m), np.full(n, -1, np.int64)
     for i in range(n):
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            matrix[i, j] = min(matrix[i, j], above[k])
         if row_edge[i] >= 0:
             mate[i] = indices[row_edge[i]]
     distance, previous = np.empty(m), np.empty(m, np.int64)

@@ -32,9 +32,12 @@ from assoc.packing.kernels.augmenting import augment_all, augment_dense
 from assoc.packing.kernels.partial_matching import Costs, State
 
 # edges from which a dense problem is searched without a heap
-_MANY = 20_000
+_MANY = 500
 # most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
 _STEPS, _CHEAP = 4, 256
+# share of rows whose cheapest column is another's from which cheap edges tell little; rows from which more than shortest
+# paths is worth its time on a matrix; edges a row from which the cheapest are tried first
+_CONTESTED, _LARGE, _WIDE = 0.75, 220, 40
 # rows that are left where no auction is held
 _FEW = 8
 
@@ -88,36 +91,27 @@ def match_sparse(
 ) -> float:  # fmt: skip
     """Fill ``row_edge``, ``u`` and ``v``; return the total cost, ``inf`` where there is no matching."""
     n, m = row_slack.size, column_slack.size
-    # a column that must be matched gets a slack so large that no matching can compensate for it
-    largest = 0.0
-    for k in range(indptr[n]):
-        if costs[k] < np.inf:
-            largest = max(largest, abs(costs[k]))
-    for i in range(n):
-        if row_slack[i] < np.inf:
-            largest = max(largest, abs(row_slack[i]))
-    for j in range(m):
-        if column_slack[j] < np.inf:
-            largest = max(largest, abs(column_slack[j]))
-    price = 4.0 * largest * (min(n, m) + 1.0) + 1.0
-    if n == m and np.all(row_slack == np.inf):
-        # matching all rows matches all columns: no price, which would take digits from the duals
-        price = 0.0
-    base = np.empty(m)
+    # matching all rows matches all columns: no price, which would take digits from the duals
+    all_matched = n == m and np.all(row_slack == np.inf)
+    price = 0.0 if all_matched else _price(costs[: indptr[n]], row_slack, column_slack)
+    base, above = np.empty(m), costs
     for j in range(m):
         base[j] = column_slack[j] if column_slack[j] < np.inf else price
         v[j] = 0.0
+    if np.any(base != 0.0):
+        above = np.empty(indptr[n])
+        for k in range(indptr[n]):
+            above[k] = costs[k] - base[indices[k]]
     owner = np.full(m, -1, np.int64)
     pending = np.empty(n, np.int64)
-    above = np.empty(indptr[n])
     num_pending = 0
     for i in range(n):
         row_edge[i] = -1
         least, best = np.inf, -1
         for k in range(indptr[i], indptr[i + 1]):
-            above[k] = value = costs[k] - base[indices[k]]
-            if value < least:
-                least, best = value, k
+            # of equal ones a column that is free
+            if above[k] < least or (above[k] == least < np.inf and owner[indices[best]] >= 0 > owner[indices[k]]):
+                least, best = above[k], k
         if row_slack[i] <= least:
             if least == np.inf and row_slack[i] == np.inf:
                 return np.inf
@@ -131,15 +125,15 @@ def match_sparse(
             else:
                 pending[num_pending] = i
                 num_pending += 1
-    problem = Costs(indptr, indices, indices.astype(np.uint64), costs, row_slack, above)
+    problem = Costs(indptr, indices, indices.view(np.uint64), costs, row_slack, above)
     state = State(row_edge, u, v, owner, pending)
     many = indices.size > _MANY
     dense = many and 4 * indices.size > n * m
-    if price == 0.0 and num_pending > _FEW:
+    if all_matched and num_pending > _FEW:
         # free columns may keep a price here, as none stays free
-        if dense:
+        if n >= _LARGE and indices.size > _WIDE * n and num_pending < _CONTESTED * n:
             num_pending = solve_core(problem, state)
-        if not dense or num_pending > n // 2:
+        elif not dense or n >= _LARGE:
             num_pending = hold_auction(problem, state, num_pending)
     else:
         num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
@@ -154,6 +148,17 @@ def match_sparse(
         if owner[j] < 0:
             total += column_slack[j]
     return total
+
+
+@inner_njit
+def _price(costs: Floats, row_slack: Floats, column_slack: Floats) -> float:
+    """A slack for columns that must be matched, so large that no matching can compensate for it."""
+    largest = 0.0
+    for values in (costs, row_slack, column_slack):
+        for t in range(values.size):
+            if values[t] < np.inf:
+                largest = max(largest, abs(values[t]))
+    return 4.0 * largest * (min(row_slack.size, column_slack.size) + 1.0) + 1.0
 
 
 @inner_njit
