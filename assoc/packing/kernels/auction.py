@@ -22,7 +22,7 @@ from assoc.packing.kernels.partial_matching import Costs, State, unmatch_loose
 _FIRST, _FALL, _LAST, _WHOLE = 0.05, 0.1, 0.05, 0.15
 # most bids for each row with one step
 _BIDS = 40
-# cheapest edges of each row that dense problems are solved with at first: so many to twice as many
+# cheapest edges of each row that problems of wide rows are solved with at first: so many to twice as many
 _CORE = 16
 
 

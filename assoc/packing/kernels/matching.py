@@ -2,8 +2,8 @@
 
 Rows are matched to columns at the cost of the edge; an unmatched row or column costs its slack
 (``inf``: it must be matched). A cheap start by row minima, then auctions (auction.py) where all rows and columns must
-be matched, else the augmenting row reduction of [1]_, then a shortest augmenting path (augmenting.py) from every row
-that is left.
+be matched, of the cheapest edges alone where rows have many; else the augmenting row reduction of [1]_. Then a
+shortest augmenting path (augmenting.py) from every row that is left.
 
 The duals solve
 
@@ -33,11 +33,12 @@ from assoc.packing.kernels.partial_matching import Costs, State
 
 # edges from which a dense problem is searched without a heap
 _MANY = 500
-# most steps of the row reduction for each row that is left, and where many rows of few edges make steps cheap
+# most steps of the row reduction for each row that is left, and where rows of few edges make steps cheap
 _STEPS, _CHEAP = 4, 256
-# share of rows whose cheapest column is another's from which cheap edges tell little; rows from which more than shortest
-# paths is worth its time on a matrix; edges a row from which the cheapest are tried first
-_CONTESTED, _LARGE, _WIDE = 0.75, 220, 40
+# share of rows whose cheapest column is another's from which cheap edges tell little
+_CONTESTED = 0.75
+# rows from which more than shortest paths is worth its time on a matrix; edges a row from which the cheapest go first
+_LARGE, _WIDE = 220, 40
 # rows that are left where no auction is held
 _FEW = 8
 
@@ -127,8 +128,8 @@ def match_sparse(
                 num_pending += 1
     problem = Costs(indptr, indices, indices.view(np.uint64), costs, row_slack, above)
     state = State(row_edge, u, v, owner, pending)
-    many = indices.size > _MANY
-    dense = many and 4 * indices.size > n * m
+    wide = 4 * indices.size > n * m
+    dense = wide and indices.size > _MANY
     if all_matched and num_pending > _FEW:
         # free columns may keep a price here, as none stays free
         if n >= _LARGE and indices.size > _WIDE * n and num_pending < _CONTESTED * n:
@@ -136,7 +137,7 @@ def match_sparse(
         elif not dense or n >= _LARGE:
             num_pending = hold_auction(problem, state, num_pending)
     else:
-        num_pending = _reduce_rows(problem, state, num_pending, _CHEAP if many and not dense else _STEPS)
+        num_pending = _reduce_rows(problem, state, num_pending, _STEPS if wide else _CHEAP)
     if num_pending > 0:
         if not (augment_dense(problem, state, num_pending) if dense else augment_all(problem, state, num_pending)):
             return np.inf
