@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assoc.packing.kernels.auction import hold_auction
+from assoc.packing.kernels.auction import hold_auction, solve_core
 from assoc.packing.kernels.partial_matching import Costs, State
 
 
@@ -24,3 +24,12 @@ def test_ties_leave_few_rows(most):
     reduced = (costs - state.v[indices]).reshape(n, degree)
     assert (reduced.min(axis=1) == state.u).all()
     assert (costs[chosen] - state.v[indices[chosen]] == state.u[chosen // degree]).all()
+
+
+def test_rows_of_equal_costs_keep_other_columns():
+    """If all rows kept the same of their equal edges, only these columns could be matched."""
+    n = 100
+    indptr, indices, costs = np.arange(n + 1) * n, np.tile(np.arange(n), n), np.ones(n * n)
+    problem = Costs(indptr, indices, indices.view(np.uint64), costs, np.full(n, np.inf), costs)
+    state = State(np.full(n, -1), np.zeros(n), np.zeros(n), np.full(n, -1), np.arange(n))
+    assert solve_core(problem, state) == 0

@@ -181,7 +181,7 @@ def augment_dense(problem: Costs, state: State, num_pending: int) -> bool:
             u[owner[order[t]]] += sink_distance - tree_distance[t]
             v[order[t]] -= sink_distance - tree_distance[t]
         if sink_column >= 0:
-            j = sink_column
+            j = np.int64(sink_column)
         elif sink_row == start:
             continue
         else:
