@@ -102,6 +102,15 @@ def test_parallel_edges():
     assert found.cost == -1.0
     found = match([0, 2, 4], [0, 0, 0, 0], [-1.0, -1.0, -3.0, -2.0], [0.0, 0.0], [0.0])
     assert found.row_edge.tolist() == [-1, 2]
+    # as many edges as a complete matrix, in its order, but the last row has one of the row before
+    n = 30
+    indptr, indices, matrix = np.arange(n + 1) * n, np.tile(np.arange(n), n), np.random.default_rng(1).random((n, n))
+    matrix[-2] = matrix[0]
+    matrix[-2, -1], indptr[-2] = -1.0, indptr[-2] - 1
+    costs = matrix.ravel().copy()
+    matrix[-2, -1], matrix[-1, -1] = 1e6, -1.0
+    found = match(indptr, indices, costs, np.full(n, np.inf), np.full(n, np.inf))
+    assert found.cost == pytest.approx(matrix[linear_sum_assignment(matrix)].sum())
 
 
 @pytest.mark.parametrize("dummy", [True, False])

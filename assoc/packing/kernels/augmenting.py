@@ -119,6 +119,7 @@ def _matrix(problem: Costs, m: int) -> Floats:
     if indptr[n] == n * m:
         complete = True
         for i in range(n):
+            complete &= indptr[i] == i * m
             for j in range(m):
                 complete &= indices[i * m + j] == j
         if complete:
