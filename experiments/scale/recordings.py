@@ -3,10 +3,10 @@
 500 aircraft at a time within 250 km, each for half an hour, turns of 4 s, P_d 0.9, 5 % false plots, altitudes and
 codes: a CSV file, tracked by the program `assoc track` in a process of its own. Plots a second of processor time, all
 of it: reading, grouping, tracking, writing. A first run on a short recording compiles modules and kernels. Memory at
-the peak is that of the process; that of the longer recording says whether it grows. Two processes track slices of 400 s
-of the longest recording (a short one has too few to share them out evenly): the wall time of one process without slices
-over theirs, and their processor time over its. A day of three radars, each tracked from its own files, is extrapolated
-from these slices.
+the peak is that of the process; that of the longer recording says whether it grows. Two processes track slices of a
+quarter of an hour of the longest recording (a short one has too few to share them out evenly): the wall time of one
+process without slices over theirs, and their processor time over its. A day of three radars, each tracked from its own
+files, is extrapolated from these slices.
 """
 
 import os
@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,7 +26,7 @@ from experiments.common.command import main
 
 GOAL = "chosen by us"
 AIRCRAFT, TURN, LIFE, REACH = 500, 4.0, 1_800.0, 250e3
-SIZES = {"nearest-neighbour": (100_000, 500_000), "mht": (100_000,)}
+SIZES = (100_000, 500_000, 5_000_000)
 DAY = 26_000_000
 """Plots of three radars in a day."""
 GOALS = {"nearest-neighbour": 20_000.0, "mht": 10_000.0}
@@ -88,35 +90,49 @@ def track(recording: Path, tracker: str, *more: str) -> Run:
     return Run(plots, used.ru_utime + used.ru_stime, time.perf_counter() - begin, used.ru_maxrss / 1e3)
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
-    """Measure each tracker on recordings of growing length, and two processes."""
+def lengths(files: Mapping[int, Path]) -> list[Claim]:
+    """Plots a second and memory of each tracker, length by length; the shortest recording only compiles."""
     claims = []
-    with tempfile.TemporaryDirectory() as folder:
-        files = {}
-        for plots in sorted({10_000, *(() if quick else (size for sizes in SIZES.values() for size in sizes))}):
-            files[plots] = Path(folder) / f"{plots}.csv"
-            write(files[plots], plots, rng)
-        for tracker, sizes in SIZES.items():
-            track(files[10_000], tracker)
-            for size in (10_000,) if quick else sizes:
-                found = track(files[size], tracker)
-                words, rate = f"{tracker}, {size:,} plots", found.plots / found.processor
-                print(f"{words}: {found}", flush=True)
-                claims += [
-                    Claim(f"{words}: plots a second", "1/s", ours=rate, band=(GOALS[tracker], None), source=GOAL),
-                    Claim(f"{words}: memory", "MB", ours=found.peak, band=(None, 1_000.0), source=GOAL),
-                ]
-        size = 10_000 if quick else max(files)
-        one, two = (track(files[size], "nearest-neighbour", *more) for more in ((), ("--jobs", "2", "--slice", "400")))
-        claims.append(Claim("two processes: wall time", "", ours=one.wall / two.wall, band=(1.7, None), source=GOAL))
-        claims.append(Claim("two processes: processor time", "", ours=two.processor / one.processor, source=GOAL))
-        day, hours = "a day of three radars in slices", two.processor * DAY / two.plots / 3_600.0
-        claims += [
-            Claim(f"{day}: processor time", "h", ours=hours, band=(None, 12.0), source=GOAL),
-            Claim(f"{day}: memory of a process", "MB", ours=two.peak, band=(None, 4_000.0), source=GOAL),
-        ]
+    shortest, *others = files
+    for tracker, goal in GOALS.items():
+        track(files[shortest], tracker)
+        for size in others or [shortest]:
+            found = track(files[size], tracker)
+            words, rate = f"{tracker}, {size:,} plots", found.plots / found.processor
+            print(f"{words}: {found}", flush=True)
+            claims += [
+                Claim(f"{words}: plots a second", "1/s", ours=rate, band=(goal, None), source=GOAL),
+                Claim(f"{words}: memory", "MB", ours=found.peak, band=(None, 1_000.0), source=GOAL),
+            ]
     return claims
 
 
+def processes(files: Mapping[int, Path]) -> list[Claim]:
+    """The longest recording by one process and by two, and a day."""
+    longest = files[max(files)]
+    one, two = (track(longest, "nearest-neighbour", *more) for more in ((), ("--jobs", "2")))
+    print(f"one process: {one}\ntwo: {two}", flush=True)
+    day, hours = "a day of three radars in slices", two.processor * DAY / two.plots / 3_600.0
+    return [
+        Claim("two processes: wall time", "", ours=one.wall / two.wall, band=(1.7, None), source=GOAL),
+        Claim("two processes: processor time", "", ours=two.processor / one.processor, source=GOAL),
+        Claim(f"{day}: processor time", "h", ours=hours, band=(None, 12.0), source=GOAL),
+        Claim(f"{day}: memory of a process", "MB", ours=two.peak, band=(None, 4_000.0), source=GOAL),
+    ]
+
+
+PARTS: dict[str, Callable[[Mapping[int, Path]], list[Claim]]] = {"lengths": lengths, "processes": processes}
+
+
+def experiment(chosen: Namespace) -> list[Claim]:
+    """Write recordings of growing length, and measure these parts."""
+    rng = np.random.default_rng(chosen.seed)
+    with tempfile.TemporaryDirectory() as folder:
+        files = {plots: Path(folder) / f"{plots}.csv" for plots in (10_000, *(() if chosen.quick else SIZES))}
+        for plots, path in files.items():
+            write(path, plots, rng)
+        return [claim for name in chosen.names for claim in PARTS[name](files)]
+
+
 if __name__ == "__main__":
-    raise SystemExit(main("scale.recordings", experiment, __doc__))
+    raise SystemExit(main("scale.recordings", experiment, __doc__, only=PARTS))
