@@ -12,6 +12,8 @@ SPACING = 150.0
 NOISE, SPEED, ACCELERATION = 10.0, 10.0, 1.0
 """Measurement noise (m), speed along an axis (m/s), process noise (m/s^1.5)."""
 DETECTION = 0.9
+FAR = 2_000.0
+"""Farther beyond the clutter than any target flies, metres."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ def simulate(targets: int, clutter: float, scans: int, seed: int) -> Plane:
     state = np.concatenate([rng.uniform(0, side, (targets, 2)), rng.normal(0, SPEED, (targets, 2))], axis=1)
     F = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
     root = np.linalg.cholesky(ACCELERATION**2 * np.kron([[1 / 3, 1 / 2], [1 / 2, 1.0]], np.eye(2)))
-    # clutter is uniform in the field of view, the targets' own square has its share
+    # clutter is uniform, the targets' own square has its share
     rate = clutter * targets * 1.4**2
     truth, measurements = [state], []
     for _ in range(scans):
@@ -51,12 +53,16 @@ def simulate(targets: int, clutter: float, scans: int, seed: int) -> Plane:
         false = rng.uniform(field[:, 0], field[:, 1], (rng.poisson(rate), 2))
         z = np.concatenate([seen + rng.normal(0, NOISE, seen.shape), false])
         measurements.append(rng.permutation(z))
+    # targets are detected where they have flown out of the clutter, too: our trackers expect no measurement where their
+    # sensor does not see, and the others know of no field of view
+    seen_field = field + [-FAR, FAR]
+    share = np.prod(np.diff(seen_field)) / np.prod(np.diff(field))
     sensor = PositionSensor(
         position=np.zeros(3),
         noise=[NOISE, NOISE],
         detection_probability=DETECTION,
-        false_alarm_rate=rate,
-        field_of_view=field,
+        false_alarm_rate=rate * share,
+        field_of_view=seen_field,
     )
     start = truth[0] + rng.standard_normal(truth[0].shape) * START_DEVIATION
     return Plane(sensor, np.stack(truth), start, measurements)
