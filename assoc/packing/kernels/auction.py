@@ -20,6 +20,8 @@ from assoc.packing.kernels.partial_matching import Costs, State, unmatch_loose
 # steps of the auction: the first as a share of the spread of a row's costs (if more, a gap between its two best), the
 # next as a share of the one before, the last as a share of a gap, or of 1 for whole-numbered costs
 _FIRST, _FALL, _LAST, _WHOLE = 0.05, 0.1, 0.05, 0.15
+# usual gap of whole numbers that are mostly tied; most steps of the row reduction, for each row that is left, after it
+_TIES, _STEPS = 2.0, 32
 # most bids for each row with one step
 _BIDS = 40
 # cheapest edges of each row that problems of wide rows are solved with at first: so many to twice as many
@@ -119,7 +121,9 @@ def hold_auction(problem: Costs, state: State, num_pending: int) -> int:
                 state.v[j] = math.floor(state.v[j] + 0.5)
         num_pending = unmatch_loose(problem, state)
         if last:
-            return num_pending
+            # prices that rise by nothing at ties reduce nothing
+            ties = whole and gap < _TIES
+            return num_pending if ties else reduce_rows(problem, state, num_pending, _STEPS)
         step *= _FALL
 
 
@@ -180,3 +184,53 @@ def _bid(problem: Costs, state: State, num_pending: int, sizes: tuple[float, flo
                 row_edge[other] = -1
             i = other
     return bids
+
+
+@inner_njit
+def reduce_rows(problem: Costs, state: State, num_pending: int, most: int) -> int:
+    """Augmenting row reduction, with ``most`` steps a row: each row takes its best column at the second best's price.
+
+    Returns how many rows are still pending.
+    """
+    indptr, indices, unsigned, _, row_slack, above = problem
+    row_edge, u, v, owner, pending = state
+    steps = most * num_pending + 8
+    left = 0
+    at = 0
+    while at < num_pending:
+        i = pending[at]
+        at += 1
+        while i >= 0:
+            least, second, best = np.inf, row_slack[i], -1
+            for k in range(indptr[i], indptr[i + 1]):
+                value = above[k] - v[unsigned[k]]
+                if value < least:
+                    # a parallel edge to the same column is not a second choice; it would only make the step smaller
+                    second = min(second, least)
+                    least, best = value, k
+                elif value < second:
+                    second = value
+            if best < 0 or row_slack[i] <= least:
+                u[i] = row_slack[i]
+                break
+            j = indices[best]
+            if owner[j] < 0:
+                u[i] = least
+                owner[j] = i
+                row_edge[i] = best
+                break
+            steps -= 1
+            if steps <= 0 or second == np.inf or second <= least:
+                # a tie or a row without a second choice: left to the augmenting paths
+                u[i] = least
+                pending[left] = i
+                left += 1
+                break
+            u[i] = second
+            v[j] -= second - least
+            other = owner[j]
+            owner[j] = i
+            row_edge[i] = best
+            row_edge[other] = -1
+            i = other
+    return left

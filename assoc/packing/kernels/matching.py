@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.errors import InfeasibleError
-from assoc.packing.kernels.auction import hold_auction, solve_core
+from assoc.packing.kernels.auction import hold_auction, reduce_rows, solve_core
 from assoc.packing.kernels.augmenting import augment_all, augment_dense
 from assoc.packing.kernels.partial_matching import Costs, State
 
@@ -137,7 +137,7 @@ def match_sparse(
         elif not dense or n >= _LARGE:
             num_pending = hold_auction(problem, state, num_pending)
     else:
-        num_pending = _reduce_rows(problem, state, num_pending, _STEPS if wide else _CHEAP)
+        num_pending = reduce_rows(problem, state, num_pending, _STEPS if wide else _CHEAP)
     if num_pending > 0:
         if not (augment_dense(problem, state, num_pending) if dense else augment_all(problem, state, num_pending)):
             return np.inf
@@ -160,53 +160,3 @@ def _price(costs: Floats, row_slack: Floats, column_slack: Floats) -> float:
             if values[t] < np.inf:
                 largest = max(largest, abs(values[t]))
     return 4.0 * largest * (min(row_slack.size, column_slack.size) + 1.0) + 1.0
-
-
-@inner_njit
-def _reduce_rows(problem: Costs, state: State, num_pending: int, most: int) -> int:
-    """Augmenting row reduction, with ``most`` steps a row: each row takes its best column at the second best's price.
-
-    Returns how many rows are still pending.
-    """
-    indptr, indices, unsigned, _, row_slack, above = problem
-    row_edge, u, v, owner, pending = state
-    steps = most * num_pending + 8
-    left = 0
-    at = 0
-    while at < num_pending:
-        i = pending[at]
-        at += 1
-        while i >= 0:
-            least, second, best = np.inf, row_slack[i], -1
-            for k in range(indptr[i], indptr[i + 1]):
-                value = above[k] - v[unsigned[k]]
-                if value < least:
-                    # a parallel edge to the same column is not a second choice; it would only make the step smaller
-                    second = min(second, least)
-                    least, best = value, k
-                elif value < second:
-                    second = value
-            if best < 0 or row_slack[i] <= least:
-                u[i] = row_slack[i]
-                break
-            j = indices[best]
-            if owner[j] < 0:
-                u[i] = least
-                owner[j] = i
-                row_edge[i] = best
-                break
-            steps -= 1
-            if steps <= 0 or second == np.inf or second <= least:
-                # a tie or a row without a second choice: left to the augmenting paths
-                u[i] = least
-                pending[left] = i
-                left += 1
-                break
-            u[i] = second
-            v[j] -= second - least
-            other = owner[j]
-            owner[j] = i
-            row_edge[i] = best
-            row_edge[other] = -1
-            i = other
-    return left
