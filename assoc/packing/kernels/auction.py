@@ -1,9 +1,13 @@
 """Auctions with falling steps [1]_: where all rows and columns must be matched they leave few rows to match.
 
+After the last step comes the augmenting row reduction of [2]_, which begins where rows may stay unmatched.
+
 References
 ----------
 .. [1] D. P. Bertsekas, "The auction algorithm: a distributed relaxation method for the assignment problem", Annals of
    Operations Research 14, 105-123 (1988).
+.. [2] R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear
+   assignment problems", Computing 38, 325-340 (1987).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Rows are matched to columns at the cost of the edge; an unmatched row or column costs its slack
 (``inf``: it must be matched). A cheap start by row minima, then auctions (auction.py) where all rows and columns must
-be matched, of the cheapest edges alone where rows have many; else the augmenting row reduction of [1]_. Then a
+be matched, of the cheapest edges alone where rows have many; then the augmenting row reduction of [1]_, and a
 shortest augmenting path (augmenting.py) from every row that is left.
 
 The duals solve
