@@ -231,7 +231,7 @@ def assembled(
 ) -> Any:
     """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering.
 
-    Rows and weights may be arrays of the packing then: not to be changed later.
+    Rows and weights may become arrays of the packing: they must not be changed afterwards.
     """
     num, total = weights.size, slack.size
     component, num_components = _numbered_components(rows, slack)
@@ -255,7 +255,7 @@ def assembled(
     col_start = np.zeros(num_components + 1, np.int64)
     new_origin = np.empty(num, np.int32)
     if num_components == 1 and row_origin.size == total:
-        # all in their places
+        # all rows and columns are in their places
         cols, new_weights, col_start[1] = rows, weights, num
         for j in range(num):
             new_origin[j] = origin[j]

@@ -33,3 +33,17 @@ def test_rows_of_equal_costs_keep_other_columns():
     problem = Costs(indptr, indices, indices.view(np.uint64), costs, np.full(n, np.inf), costs)
     state = State(np.full(n, -1), np.zeros(n), np.zeros(n), np.full(n, -1), np.arange(n))
     assert solve_core(problem, state) == 0
+
+
+def test_the_row_reduction_after_it_leaves_few_rows():
+    """After the last step a fourth of the rows are above their least."""
+    rng = np.random.default_rng(4)
+    n, degree = 200, 8
+    indices = np.concatenate([np.append(rng.integers(0, n, degree - 1), other) for other in rng.permutation(n)])
+    costs = rng.random(indices.size)
+    problem = Costs(np.arange(n + 1) * degree, indices, indices.view(np.uint64), costs, np.full(n, np.inf), costs)
+    state = State(np.full(n, -1), np.zeros(n), np.zeros(n), np.full(n, -1), np.arange(n))
+    assert hold_auction(problem, state, n) <= n // 12
+    chosen = state.row_edge[state.row_edge >= 0]
+    least = (costs - state.v[indices]).reshape(n, degree).min(axis=1)
+    assert costs[chosen] - state.v[indices[chosen]] == pytest.approx(least[chosen // degree], abs=1e-12)
