@@ -67,12 +67,13 @@ class AssignmentProblem:
     listed twice counts with its smaller cost.
     """
 
-    __slots__ = ("_prepared", "costs", "dummy", "sizes", "tuples")
+    __slots__ = ("_listed", "_matrix", "_prepared", "dummy", "sizes")
 
-    tuples: NDArray[np.int32]
-    costs: NDArray[np.float64]
     sizes: NDArray[np.int32]
     dummy: bool
+    # costs of all pairs of two lists: their tuples and costs are listed when somebody asks for them
+    _matrix: NDArray[np.float64] | None
+    _listed: tuple[NDArray[np.int32], NDArray[np.float64]] | None
 
     def __init__(self, tuples: ArrayLike, costs: ArrayLike, sizes: ArrayLike, *, dummy: bool = True) -> None:
         if not isinstance(dummy, (bool, np.bool_)):
@@ -111,11 +112,21 @@ class AssignmentProblem:
             costs_, tuples_, alone = costs_[keep], tuples_[keep], alone[keep]
         if dummy:
             tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_, alone)
-        self.tuples = _frozen(tuples_, np.int32)
-        self.costs = _frozen(costs_, np.float64)
+        self._listed = _frozen(tuples_, np.int32), _frozen(costs_, np.float64)
         self.sizes = _frozen(sizes_, np.int32)
         self.dummy = bool(dummy)
+        self._matrix = None
         self._prepared: Any = None
+
+    @property
+    def tuples(self) -> NDArray[np.int32]:
+        """Allowed tuples, singletons included, int32 (M, S), read-only."""
+        return self._lists()[0]
+
+    @property
+    def costs(self) -> NDArray[np.float64]:
+        """Their costs, (M,), read-only."""
+        return self._lists()[1]
 
     @property
     def num_sensors(self) -> int:
@@ -125,7 +136,7 @@ class AssignmentProblem:
     @property
     def num_tuples(self) -> int:
         """Number of allowed tuples M, singletons included."""
-        return int(self.costs.size)
+        return int(self.costs.size if self._matrix is None else self._matrix.size)
 
     def __repr__(self) -> str:
         sizes = " x ".join(str(n) for n in self.sizes)
@@ -155,7 +166,8 @@ class AssignmentProblem:
             With ``dummy``: shape (n_1 + 1, ..., n_S + 1), index 0 is the dummy and the all-dummy entry
             is ignored. Without: shape (n_1, ..., n_S), the classical axial problem, also rectangular.
             ``inf`` and masked entries are forbidden tuples; a forbidden singleton costs 0, as if it
-            were not listed.
+            were not listed. A matrix without dummies and forbidden entries is kept as it is; ``exact`` solves it
+            without a list of its pairs.
         dummy : bool, default True
             Whether index 0 is the dummy.
 
@@ -172,6 +184,9 @@ class AssignmentProblem:
             With ``dummy`` the all-dummy entry is finite and not 0: the tensor may be an axial one.
         """
         dense = _numbers(tensor, "tensor")
+        if not dummy and _is_whole(dense):
+            memory.require(18.0 * dense.size, f"tensor: {dense.size} elements", "list the allowed tuples instead")
+            return cls._of_matrix(np.array(dense, order="C"))
         if dense.ndim == 0:
             raise InvalidInputError("tensor: expected one dimension per sensor, got a scalar")
         if dummy and min(dense.shape) == 0:
@@ -189,6 +204,26 @@ class AssignmentProblem:
         offset = 0 if dummy else 1
         sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
         return cls(index + offset, dense[keep], sizes, dummy=dummy)
+
+    @classmethod
+    def _of_matrix(cls, matrix: NDArray[np.float64]) -> AssignmentProblem:
+        """The problem of all pairs of two lists: a matrix that `_is_whole`, and that nobody changes."""
+        problem = cls.__new__(cls)
+        problem.sizes, problem.dummy = _frozen(np.array(matrix.shape), np.int32), False
+        problem._matrix, problem._listed, problem._prepared = matrix, None, None
+        return problem
+
+    def _lists(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Tuples and costs, those of a matrix row by row."""
+        if self._listed is None:
+            assert self._matrix is not None
+            rows, columns = self._matrix.shape
+            memory.require(28.0 * self._matrix.size, f"a list of {self._matrix.size} tuples", "take solver 'exact'")
+            tuples = np.empty((rows * columns, 2), dtype=np.int32)
+            tuples[:, 0] = np.repeat(np.arange(1, rows + 1), columns)
+            tuples[:, 1] = np.tile(np.arange(1, columns + 1), rows)
+            self._listed = _frozen(tuples, np.int32), _frozen(self._matrix.ravel(), np.float64)
+        return self._listed
 
     @classmethod
     def from_sparse(cls, array: Any, dummy: bool = True) -> AssignmentProblem:
@@ -396,6 +431,9 @@ def taken_problem(problem: object) -> AssignmentProblem:
             f"problem: an array of shape {costs.shape} is taken as by scipy's linear_sum_assignment, without dummies; "
             f"{_FROM_DENSE}"
         )
+        if _is_whole(costs):
+            # not copied: it is gone after the call
+            return AssignmentProblem._of_matrix(np.require(costs, requirements=["C", "W"]))
         return AssignmentProblem.from_dense(costs, dummy=False)
     check_problem(problem)
     return cast(AssignmentProblem, problem)
@@ -430,6 +468,14 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     numbers = array.astype(np.float64, copy=False)
     # masked entries are forbidden
     return np.where(np.ma.getmaskarray(np.ma.asarray(values)), np.inf, numbers) if np.ma.is_masked(values) else numbers
+
+
+def _is_whole(costs: NDArray[np.float64]) -> bool:
+    """Whether costs are a matrix without forbidden entries, whose sums stay in range."""
+    if costs.ndim != 2 or not costs.size or 4 * sum(costs.shape) > _MAX_SINGLETON_NUMBERS:
+        return False
+    # NaN is not below anything
+    return bool(max(-costs.min(), costs.max()) <= _MAX_TOTAL_COST / costs.size)
 
 
 def _warn_of_dummy_cost(cost: float, name: str) -> None:

@@ -25,7 +25,7 @@ from assoc.packing.run import Callback, Outcome, Run, SolveFunction
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.solution import Solution
 from assoc.solvers import registry
-from assoc.solvers.certificate import certify, costs_of
+from assoc.solvers.certificate import certify, costs_of, proved_matrix
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.plausibility import cost_warnings
 from assoc.solvers.start import start_columns
@@ -106,7 +106,8 @@ def assign(
         check_writable(proof)
     make_run = partial(Run, _seed(seed), time_limit=limit, callback=callback, watch=watch, **begun)
     with interruptible():
-        solution = _solution(problem, (solver, solve), chosen, make_run, start)
+        at_once = proved_matrix(problem, make_run(), chosen) if solver == "exact" and start is None else None
+        solution = at_once or _solution(problem, (solver, solve), chosen, make_run, start)
         if proof is not None:
             _prove(proof, problem, solution)
     _warn_of_rounding(problem, solution)

@@ -19,6 +19,8 @@ References
 
 from __future__ import annotations
 
+import math
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +43,8 @@ _CONTESTED = 0.75
 _LARGE, _WIDE = 220, 40
 # rows that are left where no auction is held
 _FEW = 8
+# elements of a matrix that are checked at once: they stay in the cache
+_BLOCK = 32_768
 
 
 class Matching(NamedTuple):
@@ -85,6 +89,36 @@ def match(
     return Matching(row_edge, u, v, float(cost))
 
 
+class MatrixMatching(NamedTuple):
+    """A matching of all rows of a matrix, and what proves it."""
+
+    columns: Ints
+    """Column of each row, (n,)."""
+    row_duals: Floats
+    """u of the module's dual problem, (n,)."""
+    column_duals: Floats
+    """v of it, (m,)."""
+    bound: float
+    """No matching costs less, whatever was rounded."""
+
+
+def match_matrix(costs: Floats) -> MatrixMatching:
+    """Match each row of a matrix of finite costs (n, m), n <= m, contiguous and writable, to a column of its own."""
+    n, m = costs.shape
+    indptr, indices = np.arange(0, n * m + 1, m, dtype=np.int64), np.tile(np.arange(m, dtype=np.int64), n)
+    must, may = np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
+    chosen, u, v = np.empty(n, np.int64), np.empty(n), np.empty(m)
+    match_sparse(indptr, indices, costs.reshape(-1), must, may, chosen, u, v)
+    v = np.minimum(v, may)
+    # what was updated in place proves nothing: u anew, by v
+    block = max(1, _BLOCK // m)
+    u = np.concatenate([(costs[first : first + block] - v).min(axis=1) for first in range(0, n, block)])
+    bound = math.fsum([*u.tolist(), *v.tolist()])
+    # each difference and the sum are rounded once; rounding keeps the order of differences
+    bound -= sys.float_info.epsilon * (float(np.abs(u).sum()) + 2.0 * abs(bound))
+    return MatrixMatching(chosen - indptr[:-1], u, v, bound)
+
+
 @njit
 def match_sparse(
     indptr: Ints, indices: Ints, costs: Floats, row_slack: Floats, column_slack: Floats,
@@ -94,7 +128,10 @@ def match_sparse(
     n, m = row_slack.size, column_slack.size
     # matching all rows matches all columns: no price, which would take digits from the duals
     all_matched = n == m and np.all(row_slack == np.inf)
-    price = 0.0 if all_matched else _price(costs[: indptr[n]], row_slack, column_slack)
+    must = False
+    for j in range(m):
+        must = must or column_slack[j] == np.inf
+    price = _price(costs[: indptr[n]], row_slack, column_slack) if must and not all_matched else 0.0
     base, above = np.empty(m), costs
     for j in range(m):
         base[j] = column_slack[j] if column_slack[j] < np.inf else price
@@ -108,11 +145,17 @@ def match_sparse(
     num_pending = 0
     for i in range(n):
         row_edge[i] = -1
-        least, best = np.inf, -1
-        for k in range(indptr[i], indptr[i + 1]):
+        first = indptr[i]
+        row = above[first : indptr[i + 1]]
+        least = _least(row)
+        best = -1
+        for t in range(row.size):
             # of equal ones a column that is free
-            if above[k] < least or (above[k] == least < np.inf and owner[indices[best]] >= 0 > owner[indices[k]]):
-                least, best = above[k], k
+            if row[t] == least:
+                if owner[indices[first + t]] < 0:
+                    best = first + t
+                    break
+                best = best if best >= 0 else first + t
         if row_slack[i] <= least:
             if least == np.inf and row_slack[i] == np.inf:
                 return np.inf
@@ -149,6 +192,19 @@ def match_sparse(
         if owner[j] < 0:
             total += column_slack[j]
     return total
+
+
+@inner_njit
+def _least(values: Floats) -> float:
+    """The least of some values, ``inf`` of none: four at a time, which do not wait for each other."""
+    a = b = c = d = np.inf
+    whole = values.size - values.size % 4
+    for t in range(0, whole, 4):
+        a, b = min(a, values[t]), min(b, values[t + 1])
+        c, d = min(c, values[t + 2]), min(d, values[t + 3])
+    for t in range(whole, values.size):
+        a = min(a, values[t])
+    return min(min(a, b), min(c, d))
 
 
 @inner_njit

@@ -1,0 +1,123 @@
+"""Problems that are a matrix of costs: the exact solver's answers, without a list of all pairs."""
+
+import pickle
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
+
+import assoc
+from assoc import AssignmentProblem, assign
+from assoc.errors import AssocWarning
+from assoc.packing.kernels.matching import match_matrix
+
+KINDS = ("uniform", "negative", "ties", "whole numbers", "products", "all equal")
+SHAPES = [(1, 1), (1, 7), (7, 1), (2, 2), (12, 12), (12, 17), (17, 12), (60, 60), (60, 45), (240, 240)]
+
+
+def matrix_of(kind, shape, seed=0):
+    rng = np.random.default_rng([KINDS.index(kind), *shape, seed])
+    if kind == "products":
+        return np.outer(np.arange(1.0, shape[0] + 1), np.arange(1.0, shape[1] + 1))
+    if kind in ("ties", "whole numbers"):
+        return rng.integers(0, 5 if kind == "ties" else 1000, shape).astype(float)
+    return np.full(shape, -2.5) if kind == "all equal" else rng.normal(-5.0 * (kind == "negative"), 1.0, shape)
+
+
+def listed(matrix):
+    """The same problem from its tuples."""
+    return AssignmentProblem(np.argwhere(np.ones(matrix.shape)) + 1, matrix.ravel(), matrix.shape, dummy=False)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_optimum_with_its_proof(kind, shape):
+    matrix = matrix_of(kind, shape)
+    problem = AssignmentProblem.from_dense(matrix, dummy=False)
+    solution = assign(problem)
+    assert problem._listed is None
+    assert solution.status == "optimal" and solution.solver == "exact" and solution.stopped_by == "converged"
+    assert solution.cost == pytest.approx(matrix[linear_sum_assignment(matrix)].sum(), abs=1e-9)
+    rows, columns = solution.tuples.T - 1
+    assert len(rows) == min(shape) and len(set(rows)) == len(set(columns)) == min(shape)
+    assert (np.diff(rows) > 0).all()
+    assert np.array_equal(problem.tuples[solution.indices], solution.tuples)
+    assert problem.costs[solution.indices].sum() == pytest.approx(solution.cost, abs=1e-9)
+    u, v = solution.duals
+    assert (u[:, None] + v <= matrix + 1e-9).all()
+    # indices of the longer list may stay unused
+    assert shape[0] <= shape[1] or (u <= 0.0).all()
+    assert shape[1] <= shape[0] or (v <= 0.0).all()
+    assert u.sum() + v.sum() == pytest.approx(solution.lower_bound, abs=1e-8)
+    assert [point.cost for point in solution.trace] == [solution.cost]
+    other = assign(listed(matrix))
+    assert other.cost == pytest.approx(solution.cost, abs=1e-9) and other.tuples.shape == solution.tuples.shape
+
+
+@given(st.integers(0, 2**31), st.sampled_from([(6, 6), (5, 9)]), st.sampled_from([0.0, 4.0, 9.0]))
+def test_the_bound_holds_in_exact_arithmetic(seed, shape, decades):
+    rng = np.random.default_rng(seed)
+    matrix = rng.normal(size=shape) * 10.0 ** rng.uniform(0.0, decades, shape)
+    found = match_matrix(matrix)
+    prices = [Fraction(price) for price in found.column_duals.tolist()]
+    assert shape[0] == shape[1] or max(prices) <= 0
+    rows = [min(Fraction(cost) - price for cost, price in zip(row, prices, strict=True)) for row in matrix.tolist()]
+    assert Fraction(found.bound) <= sum(rows) + sum(prices)
+    cost = matrix[np.arange(shape[0]), found.columns].sum()
+    assert found.bound == pytest.approx(cost, rel=1e-9, abs=1e-9)
+
+
+def test_what_rounding_leaves_open_is_solved_from_the_tuples():
+    matrix = np.array([[1e15, 0.0], [0.0, 0.5 - 1e15]])
+    problem = AssignmentProblem.from_dense(matrix, dummy=False)
+    solution = assign(problem)
+    assert solution.cost == 0.0 and solution.gap < 1e-6
+    assert match_matrix(matrix).bound < -0.1 and problem._listed is not None
+
+
+def test_a_matrix_is_listed_when_it_is_asked_for():
+    matrix = matrix_of("uniform", (5, 7))
+    problem = AssignmentProblem.from_dense(matrix, dummy=False)
+    again = pickle.loads(pickle.dumps(problem))
+    assert problem.num_tuples == 35 and problem._listed is None
+    assert repr(problem) == repr(listed(matrix))
+    for other in (problem, again):
+        assert np.array_equal(other.tuples, listed(matrix).tuples) and other.tuples.dtype == np.int32
+        assert np.array_equal(other.costs, matrix.ravel())
+        assert not other.tuples.flags.writeable and not other.costs.flags.writeable
+
+
+@pytest.mark.parametrize("solver", ["greedy", "lagrangian", "milp"])
+def test_other_solvers_list_the_pairs(solver):
+    matrix = matrix_of("uniform", (8, 9))
+    dense, tuples = AssignmentProblem.from_dense(matrix, dummy=False), listed(matrix)
+    assert assign(dense, solver).cost == assign(tuples, solver).cost
+    start = assign(tuples, "greedy")
+    assert assign(dense, start=start).cost == pytest.approx(assign(tuples).cost)
+
+
+def test_a_matrix_is_the_problems_own():
+    matrix = matrix_of("uniform", (6, 6))
+    problem = AssignmentProblem.from_dense(matrix, dummy=False)
+    before = assign(problem).cost
+    kept = matrix.copy()
+    matrix[:] = 0.0
+    assert assign(problem).cost == before
+    for given_ in (kept, kept.astype(np.float32).T, np.asfortranarray(kept), kept[:, ::-1]):
+        given_.flags.writeable = False
+        untouched = given_.copy()
+        with pytest.warns(AssocWarning, match="taken as by scipy's"):
+            solution = assign(given_)
+        assert solution.cost == pytest.approx(given_[linear_sum_assignment(given_)].sum())
+        assert np.array_equal(given_, untouched)
+
+
+def test_a_callback_sees_the_answer_and_a_proof_is_written(tmp_path):
+    problem, seen = AssignmentProblem.from_dense(matrix_of("ties", (9, 11)), dummy=False), []
+    solution = assign(problem, callback=seen.append, proof=tmp_path / "proof.json")
+    assert [point.cost for point in seen] == [solution.cost]
+    problem.save(tmp_path / "problem.txt")
+    assert assoc.check.main([str(tmp_path / "problem.txt"), str(tmp_path / "proof.json")]) == 0
