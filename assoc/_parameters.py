@@ -7,6 +7,7 @@ import secrets
 import sys
 import types
 from dataclasses import Field, fields
+from functools import cache
 from numbers import Integral, Real
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
@@ -177,3 +178,13 @@ class Parameters:
         for name in names:
             value = getattr(self, name)
             self._require(is_number(value) and 0 < value < 1, name, "a number strictly between 0 and 1")
+
+
+def values_of(parameters: Any) -> dict[str, Any]:
+    """Names and values of a solver's parameters."""
+    return {name: getattr(parameters, name) for name in _names_of(parameters.__class__)}
+
+
+@cache
+def _names_of(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))

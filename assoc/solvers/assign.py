@@ -25,8 +25,9 @@ from assoc.packing.run import Callback, Outcome, Run, SolveFunction
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.solution import Solution
 from assoc.solvers import registry
-from assoc.solvers.certificate import certify, costs_of, proved_matrix
+from assoc.solvers.certificate import certify, costs_of
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
+from assoc.solvers.pairs import proved_pairs
 from assoc.solvers.plausibility import cost_warnings
 from assoc.solvers.start import start_columns
 
@@ -106,8 +107,7 @@ def assign(
         check_writable(proof)
     make_run = partial(Run, _seed(seed), time_limit=limit, callback=callback, watch=watch, **begun)
     with interruptible():
-        at_once = proved_matrix(problem, make_run(), chosen) if solver == "exact" and start is None else None
-        solution = at_once or _solution(problem, (solver, solve), chosen, make_run, start)
+        solution = _solution(problem, (solver, solve), chosen, make_run, start)
         if proof is not None:
             _prove(proof, problem, solution)
     _warn_of_rounding(problem, solution)
@@ -142,6 +142,9 @@ def _solution(
     start: Solution | None,
 ) -> Solution:
     """Solve a problem, first with large costs lowered; again, from there, while the answer has one of these."""
+    at_once = proved_pairs(problem, make_run(), chosen) if called[0] == "exact" and start is None else None
+    if at_once is not None:
+        return at_once
     for posed in conditioned(problem):
         run = make_run()
         run.unit, run.known = posed.unit, posed.known

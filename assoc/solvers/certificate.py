@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import fields
-from functools import cache
 from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._parameters import values_of
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
-from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.kernels.columns import first_row
-from assoc.packing.kernels.matching import match_matrix
 from assoc.packing.prepare import Prepared, PreparedArrays
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
@@ -62,50 +59,9 @@ def certify(
         stopped_by=run.stopped_by or "converged",
         duals=_duals_by_sensor(problem, prepared, duals) if duals is not None else (),
         trace=tuple(run.trace),
-        parameters=_values(parameters),
+        parameters=values_of(parameters),
         compile_time=run.compile_time(),
     )
-
-
-def proved_matrix(problem: AssignmentProblem, run: Run, parameters: Any) -> Solution | None:
-    """The exact solver's answer to a problem that is a matrix, without a list of its tuples; None if not proved."""
-    matrix = problem._matrix
-    if matrix is None:
-        return None
-    upright = matrix.shape[0] > matrix.shape[1]
-    found = match_matrix(np.ascontiguousarray(matrix.T) if upright else matrix)
-    rows: NDArray[Any] = np.arange(found.columns.size)
-    columns, duals = found.columns, (found.row_duals, found.column_duals)
-    if upright:
-        columns = np.argsort(found.columns)
-        rows, duals = found.columns[columns], duals[::-1]
-    cost = math.fsum(matrix[rows, columns].tolist())
-    if cost - found.bound > TOLERANCE * max(1.0, abs(found.bound)):
-        return None
-    run.record(1, cost, min(found.bound, cost))
-    return Solution(
-        tuples=np.stack([rows + 1, columns + 1], axis=1).astype(np.int32),
-        indices=rows * matrix.shape[1] + columns,
-        cost=cost,
-        lower_bound=min(found.bound, cost),
-        solver="exact",
-        iterations=1,
-        runtime=run.runtime(),
-        stopped_by=run.stopped_by or "converged",
-        duals=duals,
-        trace=tuple(run.trace),
-        parameters=_values(parameters),
-        compile_time=run.compile_time(),
-    )
-
-
-def _values(parameters: Any) -> dict[str, Any]:
-    return {name: getattr(parameters, name) for name in _field_names(parameters.__class__)}
-
-
-@cache
-def _field_names(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
 
 
 def costs_of(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.integer]) -> Floats | None:

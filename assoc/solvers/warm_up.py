@@ -139,14 +139,16 @@ def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
 
 
 def _problems() -> list[AssignmentProblem]:
-    """Problems with random costs and dummies, an axial one, an easy one of two sensors, and an empty one."""
+    """Problems with random costs and dummies, an axial one, easy ones of two sensors, and an empty one."""
     rng = np.random.default_rng(1)
     dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
     costs = rng.normal(size=(5, 6))
     costs[0, 0] = 0.0
     planar = AssignmentProblem.from_dense(costs)
-    return [_small_problem(), axial, dense, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
+    pairs = AssignmentProblem.from_dense(costs, dummy=False)
+    empty = AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])
+    return [_small_problem(), axial, dense, planar, pairs, empty]
 
 
 def _small_problem() -> AssignmentProblem:

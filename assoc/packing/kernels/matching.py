@@ -43,8 +43,6 @@ _CONTESTED = 0.75
 _LARGE, _WIDE = 220, 40
 # rows that are left where no auction is held
 _FEW = 8
-# elements of a matrix that are checked at once: they stay in the cache
-_BLOCK = 32_768
 
 
 class Matching(NamedTuple):
@@ -89,11 +87,11 @@ def match(
     return Matching(row_edge, u, v, float(cost))
 
 
-class MatrixMatching(NamedTuple):
-    """A matching of all rows of a matrix, and what proves it."""
+class ProvedMatching(NamedTuple):
+    """A matching of all rows, and what proves it."""
 
-    columns: Ints
-    """Column of each row, (n,)."""
+    row_edge: Ints
+    """The chosen edge of each row, (n,)."""
     row_duals: Floats
     """u of the module's dual problem, (n,)."""
     column_duals: Floats
@@ -102,21 +100,36 @@ class MatrixMatching(NamedTuple):
     """No matching costs less, whatever was rounded."""
 
 
-def match_matrix(costs: Floats) -> MatrixMatching:
-    """Match each row of a matrix of finite costs (n, m), n <= m, contiguous and writable, to a column of its own."""
-    n, m = costs.shape
-    indptr, indices = np.arange(0, n * m + 1, m, dtype=np.int64), np.tile(np.arange(m, dtype=np.int64), n)
-    must, may = np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
-    chosen, u, v = np.empty(n, np.int64), np.empty(n), np.empty(m)
-    match_sparse(indptr, indices, costs.reshape(-1), must, may, chosen, u, v)
+def match_rows(indptr: Ints, indices: Ints, costs: Floats, columns: int) -> ProvedMatching | None:
+    """Match each row to a column of its own, of so many, by edges as of `match`; None where that cannot be.
+
+    With as many rows as columns each column is matched, too; there must not be more rows. The arrays must be writable.
+    """
+    n = indptr.size - 1
+    must, may = np.full(n, np.inf), np.full(columns, np.inf if n == columns else 0.0)
+    row_edge, u, v = np.empty(n, np.int64), np.empty(n), np.empty(columns)
+    if match_sparse(indptr, indices, costs, must, may, row_edge, u, v) == np.inf:
+        return None
     v = np.minimum(v, may)
     # what was updated in place proves nothing: u anew, by v
-    block = max(1, _BLOCK // m)
-    u = np.concatenate([(costs[first : first + block] - v).min(axis=1) for first in range(0, n, block)])
+    _least_reduced(indptr, indices, costs, v, u)
     bound = math.fsum([*u.tolist(), *v.tolist()])
     # each difference and the sum are rounded once; rounding keeps the order of differences
     bound -= sys.float_info.epsilon * (float(np.abs(u).sum()) + 2.0 * abs(bound))
-    return MatrixMatching(chosen - indptr[:-1], u, v, bound)
+    return ProvedMatching(row_edge, u, v, bound)
+
+
+@njit
+def _least_reduced(indptr: Ints, indices: Ints, costs: Floats, v: Floats, u: Floats) -> None:
+    """Fill in the least cost of each row's edges less the price of their columns."""
+    unsigned = indices.view(np.uint64)
+    for i in range(u.size):
+        least = np.inf
+        for k in range(indptr[i], indptr[i + 1]):
+            value = costs[k] - v[unsigned[k]]
+            if value < least:
+                least = value
+        u[i] = least
 
 
 @njit

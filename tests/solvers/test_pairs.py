@@ -1,4 +1,4 @@
-"""Problems that are a matrix of costs: the exact solver's answers, without a list of all pairs."""
+"""Two lists without dummies, from a matrix of costs or from pairs: the exact solver's answers by one matching."""
 
 import pickle
 from fractions import Fraction
@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 import assoc
 from assoc import AssignmentProblem, assign
 from assoc.errors import AssocWarning
-from assoc.packing.kernels.matching import match_matrix
+from assoc.packing.kernels.matching import match_rows
 
 KINDS = ("uniform", "negative", "ties", "whole numbers", "products", "all equal")
 SHAPES = [(1, 1), (1, 7), (7, 1), (2, 2), (12, 12), (12, 17), (17, 12), (60, 60), (60, 45), (240, 240)]
@@ -30,6 +30,12 @@ def matrix_of(kind, shape, seed=0):
 def listed(matrix):
     """The same problem from its tuples."""
     return AssignmentProblem(np.argwhere(np.ones(matrix.shape)) + 1, matrix.ravel(), matrix.shape, dummy=False)
+
+
+def edges(matrix):
+    """All pairs as edges of `match_rows`."""
+    n, m = matrix.shape
+    return np.arange(0, n * m + 1, m), np.tile(np.arange(m), n), matrix.ravel()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -61,12 +67,12 @@ def test_the_optimum_with_its_proof(kind, shape):
 def test_the_bound_holds_in_exact_arithmetic(seed, shape, decades):
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=shape) * 10.0 ** rng.uniform(0.0, decades, shape)
-    found = match_matrix(matrix)
+    found = match_rows(*edges(matrix), shape[1])
     prices = [Fraction(price) for price in found.column_duals.tolist()]
     assert shape[0] == shape[1] or max(prices) <= 0
     rows = [min(Fraction(cost) - price for cost, price in zip(row, prices, strict=True)) for row in matrix.tolist()]
     assert Fraction(found.bound) <= sum(rows) + sum(prices)
-    cost = matrix[np.arange(shape[0]), found.columns].sum()
+    cost = matrix.ravel()[found.row_edge].sum()
     assert found.bound == pytest.approx(cost, rel=1e-9, abs=1e-9)
 
 
@@ -75,7 +81,7 @@ def test_what_rounding_leaves_open_is_solved_from_the_tuples():
     problem = AssignmentProblem.from_dense(matrix, dummy=False)
     solution = assign(problem)
     assert solution.cost == 0.0 and solution.gap < 1e-6
-    assert match_matrix(matrix).bound < -0.1 and problem._listed is not None
+    assert match_rows(*edges(matrix), 2).bound < -0.1 and problem._listed is not None
 
 
 def test_a_matrix_is_listed_when_it_is_asked_for():
@@ -121,3 +127,35 @@ def test_a_callback_sees_the_answer_and_a_proof_is_written(tmp_path):
     assert [point.cost for point in seen] == [solution.cost]
     problem.save(tmp_path / "problem.txt")
     assert assoc.check.main([str(tmp_path / "problem.txt"), str(tmp_path / "proof.json")]) == 0
+
+
+@pytest.mark.parametrize("shape", [(20, 20), (20, 30), (30, 20)])
+@pytest.mark.parametrize("seed", range(3))
+def test_pairs_in_any_order_some_listed_twice(shape, seed):
+    rng = np.random.default_rng(seed)
+    matrix = np.where(rng.random(shape) < 0.2, rng.normal(size=shape), np.inf)
+    matrix[np.arange(20), rng.permutation(20)] = rng.normal(size=20)
+    pairs = np.argwhere(np.isfinite(matrix))
+    costs = matrix[tuple(pairs.T)]
+    # the dearer copies come first
+    order = np.concatenate([rng.permutation(len(pairs)), rng.permutation(len(pairs))])
+    dear = np.repeat([5.0, 0.0], len(pairs))
+    problem = AssignmentProblem(pairs[order] + 1, costs[order] + dear, shape, dummy=False)
+    solution = assign(problem)
+    rows, columns = linear_sum_assignment(np.where(np.isfinite(matrix), matrix, 1e6))
+    assert solution.cost == pytest.approx(matrix[rows, columns].sum())
+    assert solution.status == "optimal"
+    assert np.array_equal(problem.tuples[solution.indices], solution.tuples)
+    assert (np.diff(solution.tuples[:, 0]) > 0).all()
+    assert problem.costs[solution.indices].sum() == pytest.approx(solution.cost)
+    u, v = solution.duals
+    first, second = problem.tuples.T - 1
+    assert (u[first] + v[second] <= problem.costs + 1e-9).all()
+    assert shape[0] <= shape[1] or (u <= 0.0).all()
+
+
+def test_a_measurement_in_no_pair_is_told():
+    with pytest.raises(assoc.InfeasibleError, match="2 measurement"):
+        assign(AssignmentProblem([[1, 1], [1, 2], [2, 2]], [0.0, 1.0, 2.0], [3, 3], dummy=False))
+    with pytest.raises(assoc.InfeasibleError):
+        assign(AssignmentProblem([[1, 1], [2, 1], [3, 2]], [0.0, 1.0, 2.0], [3, 4], dummy=False))
