@@ -264,9 +264,11 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
     position, columns, matrix = sensors.positions[s], sensors.columns[s, :c], sensors.matrices[s]
     known = (code == LINEAR or code == POSITION) and space.seen[s, side, 0] == space.versions[at]
     for j in range(m):
-        linear = space.linear[s, side, j]
-        linearise_at(code, position, columns, matrix, space.means[at, j], space.h[s, j, :d], linear[H])
-        if not known:
+        if known:
+            _expect(code, columns, matrix, space.means[at, j], space.h[s, j, :d])
+        else:
+            linear = space.linear[s, side, j]
+            linearise_at(code, position, columns, matrix, space.means[at, j], space.h[s, j, :d], linear[H])
             P, work, S = space.covariances[at, j], space.work[s, side, j], space.S[s, side, j]
             if d == 3 and c == 3:
                 good, space.log_dets[s, side, j] = innovate(3, 3, P, columns, linear, work, S)
@@ -276,13 +278,26 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
                 return _BAD
     if not known:
         space.seen[s, side, 0], space.seen[s, side, 1] = space.versions[at], 0
-    if not _mix(code, d, s, at, space):
+    if not (_mix(3, code, s, at, space) if d == 3 else _mix(d, code, s, at, space)):
         return _BAD
     return _queue(sensors, near, code, t, s, space)
 
 
 @lean_inner_njit
-def _mix(code: int, d: int, s: int, at: int, space: _Space) -> bool:
+def _expect(code: int, columns: Array, matrix: Array, mean: Array, h: Array) -> None:
+    """Write the measurement of a linear sensor that is expected of a mean into h (d,)."""
+    for a in range(len(h)):
+        if code == POSITION:
+            h[a] = mean[columns[a]]
+            continue
+        total = 0.0
+        for p in range(len(columns)):
+            total += matrix[a, p] * mean[columns[p]]
+        h[a] = total
+
+
+@literal_njit
+def _mix(d: int, code: int, s: int, at: int, space: _Space) -> bool:
     """Mean and covariance of the expected measurements of all components, and its factor, the diagonal inverted."""
     side, m = _side(s, at), space.weights.shape[2]
     weights, middle, v, S, L = space.weights[at, 0], space.middle, space.v, space.whole[0], space.whole[1]
@@ -303,7 +318,7 @@ def _mix(code: int, d: int, s: int, at: int, space: _Space) -> bool:
                 S[a, e] += weights[j] * (space.S[s, side, j, a, e] + away)
     for a in range(d):
         middle[a] += space.h[s, 0, a]
-    good = factor(S, 3, L) if d == 3 else factor(S, d, L)
+    good = factor(S, d, L)
     # measurements are many: they are multiplied
     for a in range(d if good else 0):
         L[a, a] = 1.0 / L[a, a]
@@ -386,7 +401,8 @@ def _likelihood(sensors: Sensors, near: Measured, k: int, s: int, space: _Space)
         space.joint[j] = space.weights[at, 1, j] - 0.5 * (nis + space.log_dets[s, side, j] + d * LOG_TURN)
         highest = max(highest, space.joint[j])
     for j in range(m):
-        total += math.exp(space.joint[j] - highest)
+        # of the highest without an exponential
+        total += 1.0 if space.joint[j] == highest else math.exp(space.joint[j] - highest)
     return highest + math.log(total)
 
 
