@@ -76,9 +76,7 @@ class AssignmentProblem:
     _listed: tuple[NDArray[np.int32], NDArray[np.float64]] | None
 
     def __init__(self, tuples: ArrayLike, costs: ArrayLike, sizes: ArrayLike, *, dummy: bool = True) -> None:
-        if not isinstance(dummy, (bool, np.bool_)):
-            found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
-            raise InvalidInputError(f"dummy: expected True or False, got {found}")
+        dummy = _checked_dummy(dummy)
         sizes_ = _integers(sizes, "sizes", 1)
         if sizes_.size == 0:
             raise InvalidInputError("sizes: expected at least one sensor, got none")
@@ -114,7 +112,7 @@ class AssignmentProblem:
             tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_, alone)
         self._listed = _frozen(tuples_, np.int32), _frozen(costs_, np.float64)
         self.sizes = _frozen(sizes_, np.int32)
-        self.dummy = bool(dummy)
+        self.dummy = dummy
         self._matrix = None
         self._prepared: Any = None
 
@@ -183,7 +181,7 @@ class AssignmentProblem:
         AssocWarning
             With ``dummy`` the all-dummy entry is finite and not 0: the tensor may be an axial one.
         """
-        dense = _numbers(tensor, "tensor")
+        dense, dummy = _numbers(tensor, "tensor"), _checked_dummy(dummy)
         if not dummy and _is_whole(dense):
             memory.require(18.0 * dense.size, f"tensor: {dense.size} elements", "list the allowed tuples instead")
             return cls._of_matrix(np.array(dense, order="C"))
@@ -197,6 +195,11 @@ class AssignmentProblem:
         if dummy:
             keep[(0,) * dense.ndim] = False
             _warn_of_dummy_cost(float(dense[(0,) * dense.ndim]), "tensor")
+        wrong = keep & ~(dense > -np.inf)
+        if wrong.any():
+            at = np.unravel_index(np.argmax(wrong), wrong.shape)
+            where = ", ".join(map(str, at))
+            raise InvalidInputError(f"costs[{where}] is {dense[at]}; expected a number, or inf for a forbidden tuple")
         count = np.count_nonzero(keep)
         # numpy's list of indices and the stacked array, then the problem
         memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
@@ -437,6 +440,13 @@ def taken_problem(problem: object) -> AssignmentProblem:
         return AssignmentProblem.from_dense(costs, dummy=False)
     check_problem(problem)
     return cast(AssignmentProblem, problem)
+
+
+def _checked_dummy(dummy: object) -> bool:
+    if not isinstance(dummy, (bool, np.bool_)):
+        found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
+        raise InvalidInputError(f"dummy: expected True or False, got {found}")
+    return bool(dummy)
 
 
 def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:

@@ -65,11 +65,12 @@ def test_bad_input_is_one_clear_line(tuples, costs, sizes, dummy, message):
     [
         (3.0, True, "tensor: expected one dimension per sensor, got a scalar"),
         (np.zeros((2, 0)), True, "tensor: each dimension needs its dummy"),
-        (np.full((2, 2), NAN), True, "costs: row 0 is nan"),
-        (np.full((2, 2), -INF), False, "costs: row 0 is -inf"),
+        (np.full((2, 2), NAN), True, r"costs\[0, 1\] is nan; expected a number, or inf"),
+        (np.array([[1.0, INF], [2.0, -INF]]), False, r"costs\[1, 1\] is -inf"),
         ([[1.0], [1.0, 2.0]], True, "tensor: "),
         ([["a"]], True, "tensor: expected real numbers"),
         (np.zeros((2, 2)), "no", "dummy: expected True or False, got 'no'"),
+        (np.zeros((2, 2)), 0, "dummy: expected True or False, got 0"),
     ],
 )
 def test_bad_tensors(tensor, dummy, message):
