@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from assoc.tracking import Tracker
     from assoc.tracking.adapting.identity_watch import OddIdentity
     from assoc.tracking.offline.ended_tracks import EndedTracks
-    from assoc.tracking.offline.plots import PlotTracks, TakenPlots
+    from assoc.tracking.offline.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
@@ -206,12 +206,10 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
 
 
 def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitStack) -> Tracked:
-    import numpy as np
-
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
-    from assoc.tracking.offline.plots import TakenPlots, track_plots
+    from assoc.tracking.offline.plots import PlotTracks, track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if is_asterix(file) else "tables", given["identity"] or "score-only"
@@ -237,31 +235,28 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
 
     missing: list[str] = []
     odd, plots = None, None
+    judged: Any
     table: Any = None if sliced or whole else _ended_tracks(given, stored, outputs)
-    takers = TakenPlots(survey.named, stored.addressed)
-    ends: list[float] = []
-    sizes: list[int] = []
 
-    def track(scans: Iterator[Window]) -> PlotTracks | None:
-        if whole:
-            recording = joined([*stored], notes, os.path.basename(file))
-            return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
-        _take(given, tracker, scans, table, takers, ends, sizes)
-        return None
+    def track(scans: Iterator[Window]) -> PlotTracks | Judged:
+        if not whole:
+            return _take(given, tracker, scans, table, stored)
+        recording = joined([*stored], notes, os.path.basename(file))
+        return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
 
     if sliced:
         table, judged, missing, odd = _in_slices(given, tracker, windows, stored, outputs)
         count = len(judged.ends)
     else:
         turns = 1 + (survey.last - survey.first) / windows.rotation
-        plots, count = _watched(
+        judged, count = _watched(
             given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
         )
-        judged = Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept())
-    if plots is not None:
-        table, sizes = plots.table, [len(window) for window in plots.windows]
-        table.origin = given["origin"]
-        judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
+        if isinstance(judged, PlotTracks):
+            plots, table = judged, judged.table
+            table.origin = given["origin"]
+            sizes = [len(window) for window in plots.windows]
+            judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
         odd = ()
@@ -280,19 +275,14 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], ends_here, odd)
 
 
-def _take(
-    given: Given,
-    tracker: Tracker,
-    scans: Iterator[Window],
-    table: EndedTracks,
-    takers: TakenPlots,
-    ends: list[float],
-    sizes: list[int],
-) -> None:
+def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedTracks, stored: StoredPlots) -> Judged:
     """Track windows, and hand tracks to the table as they end, or smoothed when they have."""
-    from assoc.tracking.offline.ended_smoothing import EndedSmoothing
-    from assoc.tracking.offline.plots import FORGET, follow, known_of, may_return
+    import numpy as np
 
+    from assoc.tracking.offline.ended_smoothing import EndedSmoothing
+    from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return
+
+    takers, ends, sizes = TakenPlots(stored.survey.named, stored.addressed), list[float](), list[int]()
     smoothing = EndedSmoothing(tracker, given["origin"]) if given["smooth"] else None
     for followed in follow(tracker, scans, forget=True):
         takers.take(followed)
@@ -312,6 +302,7 @@ def _take(
                 table.add_frame(smoothing.end(living).to_frame())
     if smoothing is not None:
         table.add_frame(smoothing.finish().to_frame())
+    return Judged(np.array(ends), sizes, stored.sourced, takers.rates(), takers.kept())
 
 
 def _ended_tracks(given: Given, stored: StoredPlots, outputs: ExitStack) -> EndedTracks:
