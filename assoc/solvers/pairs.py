@@ -1,47 +1,47 @@
-"""Two lists without dummies: the exact solver's answer by one matching of the problem as it is, without a packing."""
+"""Two lists: the exact solver's answer by one matching of the problem as it is, without a packing."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._parameters import values_of
-from assoc._types import Floats, Ints
+from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.bounds.priced import TOLERANCE
-from assoc.packing.kernels.matching import match_rows
+from assoc.packing.kernels.matching import ProvedMatching, match_proved
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
 
 def proved_pairs(problem: AssignmentProblem, run: Run, parameters: Any) -> Solution | None:
-    """Match all of the shorter list; None for other problems, or where rounding or a missing pair leaves no proof."""
-    if problem.dummy or problem.num_sensors != 2 or not problem.num_tuples:
+    """Match two lists; None for other problems, or where rounding or a missing pair leaves no proof."""
+    if problem.num_sensors != 2 or not problem.sizes.all() or not problem.num_tuples:
         return None
-    upright = bool(problem.sizes[0] > problem.sizes[1])
-    graph = _graph_of_matrix(problem._matrix, upright) if problem._matrix is not None else _graph(problem, upright)
-    found = match_rows(graph.indptr, graph.indices, graph.costs, int(problem.sizes.max()))
-    if found is None:
+    matrix = problem._matrix
+    answer = _of_tuples(problem) if matrix is None else _of_matrix(matrix)
+    if answer is None:
         return None
-    cost = math.fsum(graph.costs[found.row_edge].tolist())
-    if cost - found.bound > TOLERANCE * max(1.0, abs(found.bound)):
+    indices, duals, bound = answer
+    if matrix is None:
+        tuples, costs = problem.tuples[indices], problem.costs[indices]
+    else:
+        pairs = np.unravel_index(indices, matrix.shape)
+        tuples, costs = np.stack(pairs, axis=1).astype(np.int32) + np.int32(1), matrix[pairs]
+    cost = math.fsum(costs.tolist())
+    if cost - bound > TOLERANCE * max(1.0, abs(bound)):
         return None
-    run.record(1, cost, min(found.bound, cost))
-    first: NDArray[Any] = np.arange(found.row_edge.size)
-    second, indices = graph.indices[found.row_edge], graph.place(found.row_edge)
-    duals = found.row_duals, found.column_duals
-    if upright:
-        order = np.argsort(second)
-        first, second, indices, duals = second[order], order, indices[order], duals[::-1]
+    bound = min(bound, cost)
+    run.record(1, cost, bound)
     return Solution(
-        tuples=np.stack([first + 1, second + 1], axis=1).astype(np.int32),
+        tuples=tuples,
         indices=indices,
         cost=cost,
-        lower_bound=min(found.bound, cost),
+        lower_bound=bound,
         solver="exact",
         iterations=1,
         runtime=run.runtime(),
@@ -53,33 +53,83 @@ def proved_pairs(problem: AssignmentProblem, run: Run, parameters: Any) -> Solut
     )
 
 
-class _Graph(NamedTuple):
-    """Pairs of two lists: row i, of the shorter list, has edges ``indptr[i]:indptr[i + 1]``."""
+class _Answer(NamedTuple):
+    """Tuples of a problem, as indices in the order of the tuples, and what proves them."""
 
-    indptr: Ints
-    indices: Ints
-    costs: Floats
-    place: Callable[[NDArray[Any]], NDArray[Any]]
-    """Which tuples of the problem edges are."""
+    indices: NDArray[Any]
+    duals: tuple[Floats, Floats]
+    bound: float
 
 
-def _graph(problem: AssignmentProblem, upright: bool) -> _Graph:
-    """The tuples of a problem; ``upright``: the second list is the shorter one."""
-    columns = np.ascontiguousarray(problem.tuples.T)
-    rows, others = columns[int(upright)], columns[int(not upright)]
-    # copied: numba would compile kernels again for read-only arrays
-    indices, costs = others.astype(np.int64) - 1, problem.costs.copy()
-    order: NDArray[Any] | None = None
-    if (rows[1:] < rows[:-1]).any():
-        order = np.argsort(rows, kind="stable")
-        rows, indices, costs = rows[order], indices[order], costs[order]
-    indptr = np.searchsorted(rows, np.arange(1, problem.sizes.min() + 2))
-    return _Graph(indptr, indices, costs, lambda edges: edges if order is None else order[edges])
-
-
-def _graph_of_matrix(matrix: Floats, upright: bool) -> _Graph:
-    """All pairs of a matrix."""
+def _of_matrix(matrix: Floats) -> _Answer | None:
+    """Match all of the shorter list of a matrix."""
+    upright = matrix.shape[0] > matrix.shape[1]
     costs = np.ascontiguousarray(matrix.T) if upright else matrix
     n, m = costs.shape
     indptr, indices = np.arange(0, n * m + 1, m), np.tile(np.arange(m), n)
-    return _Graph(indptr, indices, costs.reshape(-1), lambda edges: edges % m * n + edges // m if upright else edges)
+    found = match_proved(indptr, indices, costs.reshape(-1), *_slacks(n, m))
+    if found is None:
+        return None
+    edges = found.row_edge
+    return _Answer(np.sort(edges % m * n + edges // m) if upright else edges, _duals(found, upright), found.bound)
+
+
+def _of_tuples(problem: AssignmentProblem) -> _Answer | None:
+    """Match listed pairs: with dummies what is not matched costs its singleton, without all of the shorter list is."""
+    upright = bool(not problem.dummy and problem.sizes[0] > problem.sizes[1])
+    n, m = problem.sizes[::-1].tolist() if upright else problem.sizes.tolist()
+    indptr, indices, costs, place, single = _edges(problem.tuples, problem.costs, n, m, int(upright))
+    alone = problem.costs[single]
+    row_slack, column_slack = (alone[:n].copy(), alone[n:].copy()) if problem.dummy else _slacks(n, m)
+    found = match_proved(indptr, indices, costs, row_slack, column_slack)
+    if found is None:
+        return None
+    matched = np.flatnonzero(found.row_edge >= 0)
+    edges, chosen = found.row_edge[matched], single[:n].copy()
+    chosen[matched] = place[edges]
+    if problem.dummy:
+        free = np.ones(m, dtype=np.bool_)
+        free[indices[edges]] = False
+        # tuples that the first sensor missed come first
+        chosen = np.concatenate([single[n:][free], chosen])
+    elif upright:
+        chosen = chosen[np.argsort(problem.tuples[chosen, 0])]
+    return _Answer(chosen, _duals(found, upright), found.bound)
+
+
+def _slacks(n: int, m: int) -> tuple[Floats, Floats]:
+    """Costs of leaving rows and columns unmatched where all of the shorter list must be matched, n <= m."""
+    return np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
+
+
+def _duals(found: ProvedMatching, upright: bool) -> tuple[Floats, Floats]:
+    u, v = found.row_duals, found.column_duals
+    return (v, u) if upright else (u, v)
+
+
+@njit
+def _edges(tuples: NDArray[np.int32], costs: Floats, n: int, m: int, side: int) -> Any:
+    """Pairs as edges of `match_proved`, their places among the tuples, and the cheapest singletons (n + m,), -1: none.
+
+    Rows are the list `side`, of n measurements, columns the other one, of m.
+    """
+    indptr, single = np.zeros(n + 1, np.int64), np.full(n + m, -1)
+    for k in range(costs.size):
+        i, j = tuples[k, side], tuples[k, 1 - side]
+        if i > 0 and j > 0:
+            indptr[i] += 1
+            continue
+        r = i - 1 if i > 0 else n + j - 1
+        if single[r] < 0 or costs[k] < costs[single[r]]:
+            single[r] = k
+    for i in range(n):
+        indptr[i + 1] += indptr[i]
+    indices, place = np.empty(indptr[n], np.int64), np.empty(indptr[n], np.int64)
+    prices, end = np.empty(indptr[n]), indptr.copy()
+    for k in range(costs.size):
+        i, j = tuples[k, side], tuples[k, 1 - side]
+        if i > 0 and j > 0:
+            e = end[i - 1]
+            end[i - 1] += 1
+            indices[e], prices[e], place[e] = j - 1, costs[k], k
+    return indptr, indices, prices, place, single

@@ -1,4 +1,4 @@
-"""Two lists without dummies, from a matrix of costs or from pairs: the exact solver's answers by one matching."""
+"""Two lists, from a matrix of costs or from pairs: the exact solver's answers by one matching."""
 
 import pickle
 from fractions import Fraction
@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 import assoc
 from assoc import AssignmentProblem, assign
 from assoc.errors import AssocWarning
-from assoc.packing.kernels.matching import match_rows
+from assoc.packing.kernels.matching import match_proved
 
 KINDS = ("uniform", "negative", "ties", "whole numbers", "products", "all equal")
 SHAPES = [(1, 1), (1, 7), (7, 1), (2, 2), (12, 12), (12, 17), (17, 12), (60, 60), (60, 45), (240, 240)]
@@ -33,9 +33,10 @@ def listed(matrix):
 
 
 def edges(matrix):
-    """All pairs as edges of `match_rows`."""
+    """All pairs as edges of `match_proved`, and slacks with which all rows are matched."""
     n, m = matrix.shape
-    return np.arange(0, n * m + 1, m), np.tile(np.arange(m), n), matrix.ravel()
+    slacks = np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
+    return np.arange(0, n * m + 1, m), np.tile(np.arange(m), n), matrix.ravel(), *slacks
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -67,11 +68,13 @@ def test_the_optimum_with_its_proof(kind, shape):
 def test_the_bound_holds_in_exact_arithmetic(seed, shape, decades):
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=shape) * 10.0 ** rng.uniform(0.0, decades, shape)
-    found = match_rows(*edges(matrix), shape[1])
+    found = match_proved(*edges(matrix))
     prices = [Fraction(price) for price in found.column_duals.tolist()]
     assert shape[0] == shape[1] or max(prices) <= 0
     rows = [min(Fraction(cost) - price for cost, price in zip(row, prices, strict=True)) for row in matrix.tolist()]
     assert Fraction(found.bound) <= sum(rows) + sum(prices)
+    # to the last digit: nothing that was updated in place is left in it
+    assert np.array_equal(found.row_duals, (matrix - found.column_duals).min(axis=1))
     cost = matrix.ravel()[found.row_edge].sum()
     assert found.bound == pytest.approx(cost, rel=1e-9, abs=1e-9)
 
@@ -81,7 +84,7 @@ def test_what_rounding_leaves_open_is_solved_from_the_tuples():
     problem = AssignmentProblem.from_dense(matrix, dummy=False)
     solution = assign(problem)
     assert solution.cost == 0.0 and solution.gap < 1e-6
-    assert match_rows(*edges(matrix), 2).bound < -0.1 and problem._listed is not None
+    assert match_proved(*edges(matrix)).bound < -0.1 and problem._listed is not None
 
 
 def test_a_matrix_is_listed_when_it_is_asked_for():
@@ -152,6 +155,49 @@ def test_pairs_in_any_order_some_listed_twice(shape, seed):
     first, second = problem.tuples.T - 1
     assert (u[first] + v[second] <= problem.costs + 1e-9).all()
     assert shape[0] <= shape[1] or (u <= 0.0).all()
+
+
+def expected_with_dummies(pairs, costs, alone):
+    """Least cost by scipy: each measurement has a partner of its own, for staying alone."""
+    n, m = len(alone[0]), len(alone[1])
+    matrix = np.full((n + m, n + m), 1e6)
+    np.minimum.at(matrix, tuple(pairs.T), costs)
+    matrix[np.arange(n), m + np.arange(n)] = alone[0]
+    matrix[n + np.arange(m), np.arange(m)] = alone[1]
+    matrix[n:, m:] = 0.0
+    return matrix[linear_sum_assignment(matrix)].sum()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (6, 9), (30, 20), (40, 40)])
+@pytest.mark.parametrize("kind", ["likelihoods", "whole numbers", "no pairs"])
+@pytest.mark.parametrize("seed", range(4))
+def test_false_alarms_and_misses(shape, kind, seed):
+    rng = np.random.default_rng(seed)
+    pairs = np.argwhere(rng.random(shape) < (0.0 if kind == "no pairs" else 0.3))
+    costs = rng.normal(-1.0, 3.0, len(pairs))
+    alone = [np.where(rng.random(size) < 0.5, rng.normal(size=size), 0.0) for size in shape]
+    if kind == "whole numbers":
+        costs, alone = np.round(costs), [np.round(own) for own in alone]
+    singles = [np.stack([np.arange(1, shape[0] + 1), np.zeros(shape[0], int)], axis=1),
+               np.stack([np.zeros(shape[1], int), np.arange(1, shape[1] + 1)], axis=1)]  # fmt: skip
+    # each twice, the dearer one first or last
+    tuples = np.concatenate([pairs + 1, *singles])
+    prices, dear = np.concatenate([costs, *alone]), rng.random(len(pairs) + sum(shape))
+    order = rng.permutation(2 * len(tuples))
+    problem = AssignmentProblem(
+        np.concatenate([tuples, tuples])[order], np.concatenate([prices + dear, prices])[order], shape
+    )
+    solution = assign(problem)
+    assert solution.cost == pytest.approx(expected_with_dummies(pairs, costs, alone), abs=1e-9)
+    assert solution.status == "optimal" and solution.lower_bound <= solution.cost
+    assert np.array_equal(problem.tuples[solution.indices], solution.tuples)
+    assert problem.costs[solution.indices].sum() == pytest.approx(solution.cost, abs=1e-9)
+    assert np.array_equal(solution.tuples, solution.tuples[np.lexsort(solution.tuples.T[::-1])])
+    for s, size in enumerate(shape):
+        assert sorted(solution.tuples[:, s][solution.tuples[:, s] > 0]) == list(range(1, size + 1))
+    prices = [np.concatenate([[0.0], own]) for own in solution.duals]
+    assert (prices[0][problem.tuples[:, 0]] + prices[1][problem.tuples[:, 1]] <= problem.costs + 1e-9).all()
+    assert sum(own.sum() for own in solution.duals) == pytest.approx(solution.lower_bound, abs=1e-8)
 
 
 def test_a_measurement_in_no_pair_is_told():

@@ -88,10 +88,10 @@ def match(
 
 
 class ProvedMatching(NamedTuple):
-    """A matching of all rows, and what proves it."""
+    """A matching, and what proves it."""
 
-    row_edge: Ints
-    """The chosen edge of each row, (n,)."""
+    row_edge: NDArray[np.int64]
+    """The chosen edge of each row, or -1, (n,)."""
     row_duals: Floats
     """u of the module's dual problem, (n,)."""
     column_duals: Floats
@@ -100,19 +100,16 @@ class ProvedMatching(NamedTuple):
     """No matching costs less, whatever was rounded."""
 
 
-def match_rows(indptr: Ints, indices: Ints, costs: Floats, columns: int) -> ProvedMatching | None:
-    """Match each row to a column of its own, of so many, by edges as of `match`; None where that cannot be.
-
-    With as many rows as columns each column is matched, too; there must not be more rows. The arrays must be writable.
-    """
-    n = indptr.size - 1
-    must, may = np.full(n, np.inf), np.full(columns, np.inf if n == columns else 0.0)
-    row_edge, u, v = np.empty(n, np.int64), np.empty(n), np.empty(columns)
-    if match_sparse(indptr, indices, costs, must, may, row_edge, u, v) == np.inf:
+def match_proved(
+    indptr: Ints, indices: Ints, costs: Floats, row_slack: Floats, column_slack: Floats
+) -> ProvedMatching | None:
+    """Solve as `match`, of writable arrays, with a bound that holds; None if there is no matching."""
+    row_edge, u, v = np.empty(row_slack.size, np.int64), np.empty(row_slack.size), np.empty(column_slack.size)
+    if match_sparse(indptr, indices, costs, row_slack, column_slack, row_edge, u, v) == np.inf:
         return None
-    v = np.minimum(v, may)
+    v = np.minimum(v, column_slack)
     # what was updated in place proves nothing: u anew, by v
-    _least_reduced(indptr, indices, costs, v, u)
+    _least_reduced(indptr, indices, costs, v, row_slack, u)
     bound = math.fsum([*u.tolist(), *v.tolist()])
     # each difference and the sum are rounded once; rounding keeps the order of differences
     bound -= sys.float_info.epsilon * (float(np.abs(u).sum()) + 2.0 * abs(bound))
@@ -120,11 +117,11 @@ def match_rows(indptr: Ints, indices: Ints, costs: Floats, columns: int) -> Prov
 
 
 @njit
-def _least_reduced(indptr: Ints, indices: Ints, costs: Floats, v: Floats, u: Floats) -> None:
-    """Fill in the least cost of each row's edges less the price of their columns."""
+def _least_reduced(indptr: Ints, indices: Ints, costs: Floats, v: Floats, row_slack: Floats, u: Floats) -> None:
+    """Fill in the least cost of each row's edges less the price of their columns, or its slack."""
     unsigned = indices.view(np.uint64)
     for i in range(u.size):
-        least = np.inf
+        least = row_slack[i]
         for k in range(indptr[i], indptr[i + 1]):
             value = costs[k] - v[unsigned[k]]
             if value < least:
