@@ -41,8 +41,6 @@ def matched(packing: Packing) -> Matched | None:
 def _sides(packing: PackingArrays, side: Ints) -> bool:
     """Fill in the side of each row, 0 or 1; False if a column has more than two rows, or two of one side."""
     cols, slack, row_ptr, row_cols = packing.cols, packing.slack, packing.row_ptr, packing.row_cols
-    if cols.shape[1] == 2 and _lists_are_sides(cols, slack, side):
-        return True
     for j in range(cols.shape[0]):
         count = 0
         for s in range(cols.shape[1]):
@@ -66,27 +64,6 @@ def _sides(packing: PackingArrays, side: Ints) -> bool:
                     size += 1
                 elif other >= 0 and side[other] == side[row]:
                     return False
-    return True
-
-
-@inner_njit
-def _lists_are_sides(cols: NDArray[np.int32], slack: NDArray[np.bool_], side: Ints) -> bool:
-    """The same at sight: two lists of measurements, none of the first or all of them free to stay uncovered."""
-    side[:] = -1
-    # of the rows of the first list
-    free = bound = False
-    for j in range(cols.shape[0]):
-        for s in range(2):
-            r = cols[j, s]
-            if r >= 0:
-                if side[r] == 1 - s:
-                    return False
-                side[r] = s
-                free, bound = free or (s == 0 and slack[r]), bound or (s == 0 and not slack[r])
-    if free and bound:
-        return False
-    for r in range(side.size):
-        side[r] = int(slack[r]) if side[r] < 0 else abs(side[r] - int(free))
     return True
 
 
