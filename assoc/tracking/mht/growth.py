@@ -262,10 +262,14 @@ def _in_blocks(kept: Array, lengths: Sequence[int], states: Callable[[int, Array
     ends = np.cumsum(lengths)
     which = np.searchsorted(ends, kept, side="right")
     blocks = []
-    for part, first in enumerate((ends - lengths).tolist()):
+    for part in range(len(lengths)):
         places = np.flatnonzero(which == part)
-        blocks += [(part, some, kept[some] - first) for some in np.split(places, range(_BLOCK, len(places), _BLOCK))]
-    return placed(len(kept), ((places, states(part, places, rows)) for part, places, rows in blocks))
+        blocks += [(part, places[k : k + _BLOCK]) for k in range(0, len(places), _BLOCK)]
+    made = (
+        (places, states(part, places, kept[places] - (ends[part] - lengths[part])))
+        for part, places in blocks or [(0, np.zeros(0, dtype=np.int64))]
+    )
+    return placed(len(kept), made)
 
 
 def growth_of(progress: Progress, timed: TimedScan | None) -> AtOnce | InOrder:
