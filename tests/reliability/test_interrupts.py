@@ -107,7 +107,7 @@ import sys
 import assoc
 from numba.core.registry import cpu_target
 
-problem = assoc.AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-1.0, -3.0, -2.0], [2, 2])
+problem = assoc.AssignmentProblem([[1, 1, 0], [1, 2, 1], [2, 1, 0]], [-1.0, -3.0, -2.0], [2, 2, 1])
 engine = cpu_target.target_context.codegen()._engine._ee
 hand_over = engine._object_cache_getbuffer
 asked = heard = 0
