@@ -54,19 +54,22 @@ def proved_pairs(problem: AssignmentProblem, run: Run, parameters: Any) -> Solut
 
 
 class _Answer(NamedTuple):
-    """Tuples of a problem, as indices in the order of the tuples, and what proves them."""
+    """Tuples of a problem and what proves them."""
 
     indices: NDArray[Any]
+    """Of the chosen tuples among the problem's, in the lexicographic order of these, (K,)."""
     duals: tuple[Floats, Floats]
+    """Multipliers of the measurements of both lists, (n_1,) and (n_2,)."""
     bound: float
+    """No solution costs less."""
 
 
 def _of_matrix(matrix: Floats) -> _Answer | None:
-    """Match all of the shorter list of a matrix."""
+    """Match all of the shorter list of a matrix of costs, (n_1, n_2)."""
     upright = matrix.shape[0] > matrix.shape[1]
     costs = np.ascontiguousarray(matrix.T) if upright else matrix
     n, m = costs.shape
-    indptr, indices = np.arange(0, n * m + 1, m), np.tile(np.arange(m), n)
+    indptr, indices = np.arange(0, n * m + 1, m, dtype=np.int64), np.tile(np.arange(m, dtype=np.int64), n)
     found = match_proved(indptr, indices, costs.reshape(-1), *_slacks(n, m))
     if found is None:
         return None
