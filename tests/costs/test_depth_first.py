@@ -9,7 +9,13 @@ from assoc.costs.tracks import depth_first
 from assoc.costs.tracks.scores import score_terms
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, InteractingMultipleModel
+from assoc.filters import (
+    ConstantVelocity,
+    ExtendedKalmanFilter,
+    Gaussian,
+    InteractingMultipleModel,
+    LinearMeasurement,
+)
 from assoc.sensors import BearingSensor, DirectionSensor, PositionSensor, Radar2D, Radar3D
 
 SPACE = [(-3e4, 3e4), (-3e4, 3e4), (0.0, 1e4)]
@@ -72,11 +78,28 @@ def scan(sensors, states, rng):
     return found
 
 
-def grown(filter_, states, z, sensors, **options):
-    terms = score_terms(sensors)
+def grown(filter_, states, z, sensors, terms=None, **options):
+    terms = terms or score_terms(sensors)
     # an array of its own: one without steps between rows would be compiled for anew
     misses = np.broadcast_to(terms.miss, (len(states), len(sensors))).copy()
     return grow_track_tuples(filter_, states, z, sensors, terms, misses, gate_probability=GATE, **options)
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+def test_linear_measurements_of_whole_states(modes):
+    rng = np.random.default_rng(modes)
+    states = predicted(filters(ExtendedKalmanFilter, modes), rng)
+    mixed = np.array([[1.0, 0.0, 0.0, 2.0, 0.0, 0.0], [0.0, 1.0, 0.5, 0.0, 0.0, 1.0]])
+    models = [LinearMeasurement(matrix, np.eye(len(matrix)) * 150.0**2) for matrix in (mixed, np.eye(6)[:3], mixed[:1])]
+    z = [model.measure(states.mean) + rng.normal(0.0, 150.0, (len(states), model.dim)) for model in models]
+    one, other = (
+        grown(filters(kind, modes), states, z, models, score_terms(PLACES))
+        for kind in (ExtendedKalmanFilter, SensorBySensor)
+    )
+    assert (one.rows > 0).all(axis=1).sum() > 20
+    np.testing.assert_array_equal(one.track, other.track)
+    np.testing.assert_array_equal(one.rows, other.rows)
+    np.testing.assert_allclose(one.costs, other.costs, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
