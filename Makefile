@@ -17,7 +17,6 @@
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size, some hours (python -m experiments.benchmarks --brief: everything in 25 minutes)
 # make bench-quick      a minute: has something become twice as slow, beside HiGHS in the same process?
-# make bench-cold       what a user waits for after an installation, with an empty cache of kernels
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
@@ -38,7 +37,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
 SPHINX = $(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
-.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick bench-cold clean
+.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -106,9 +105,6 @@ bench: $(VENV)/.installed-peers
 
 bench-quick: $(VENV)/.installed-test
 	$(PY) -m experiments.bench_quick
-
-bench-cold: $(VENV)/.installed-test
-	$(PY) -m experiments.cold_start
 
 clean:
 	rm -rf $(VENV) $(OLDEST) $(NEWEST) demo dist docs/_build

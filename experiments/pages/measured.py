@@ -1,31 +1,13 @@
-"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
+"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers and concepts."""
 
 from collections.abc import Iterable, Sequence
 from functools import partial
-from pathlib import Path
 
 from experiments.common.claims import Claim
-from experiments.common.results import RESULTS, Results, number, result_file, table
+from experiments.common.results import Results, number, table
 from experiments.pages.trackers import labels
 
 SCENARIOS = tuple("CDEFGH")
-_FOR = {
-    "llvmlite": "the compiler of the kernels",
-    "numba": "kernels: costs, solvers, filters, trackers",
-    "numpy": "arrays",
-    "scipy": "sparse graphs, matchings, linear programs, nearest neighbours, distributions",
-    "ortools": "the solver `milp`",
-    "pandas": "tables: `to_frame`, tracks, CSV and Parquet files, studies, reports",
-    "rich": "progress at a terminal",
-    "Pygments": "needed by rich",
-    "cloudpickle": "your own functions in other processes",
-    "shtab": "completion of names and options",
-    "assoc": "the package, its kernels compiled",
-}
-"""What each part of an installation is for; a small package that one of these needs is not named."""
-_SPARED = ("ortools", "absl-py", "immutabledict", "protobuf", "typing_extensions", "pandas", "python-dateutil", "six",
-           "tzdata")  # fmt: skip
-"""ortools, pandas, and what is installed for them alone."""
 
 
 def _judged(claim: Claim, digits: int = 3) -> str:
@@ -105,18 +87,6 @@ def paper_setting() -> str:
     return table(["", "paper", *(f'"{name}"' for name in readings)], rows)
 
 
-def consistency() -> str:
-    """NEES and NIS of every filter."""
-    r = Results("filters.consistency")
-    cells: dict[tuple[str, str], list[str]] = {}
-    for claim in r.claims:
-        case, rest = claim.quantity.split(", ", 1)
-        name = rest.split(": N")[0]
-        cells.setdefault((case, name), []).append(f"{claim.ours:,.4g}{'' if claim.holds else ' *'}")
-    return table(["case", "filter", "NEES (6)", "NIS (3)"], [[*key, *values] for key, values in cells.items()],
-                 lambda column: column > 1)  # fmt: skip
-
-
 KINDS = ("Kalman", "EKF", "UKF", "EnKF")
 COLUMNS = {
     "filterpy": "filterpy",
@@ -164,14 +134,6 @@ def _plain(name: str, corner: str, parts: Sequence[str], digits: int = 3) -> str
     return table([corner, *parts], _grid(r, labels(r, f": {parts[0]}"), parts, digits))
 
 
-def scan_time() -> str:
-    """From one scan's measurements to a proven answer, part by part."""
-    r = Results("scan_time")
-    parts = ("build_problem", "exact", "AssignmentProblem", "greedy", "HiGHS", "HiGHS / exact")
-    rows = _grid(r, labels(r, ": HiGHS / exact"), ("build_problem and exact", *parts))
-    return table(["ms", "both", *parts], rows)
-
-
 def ghost_rankings() -> str:
     """The ten best of ghost scenes: seconds, and what is proved."""
     r = Results("ghost_rankings")
@@ -196,15 +158,6 @@ def probabilities_beside() -> str:
     rows = [[kind, way, *(number(r[f"{kind}, {way}: {part}"].ours, 2) for part in what)]
             for kind in kinds for of, way in ways if of == kind]  # fmt: skip
     return table(["", "", *what], rows)
-
-
-def linear_programs() -> str:
-    """Times of our simplex method, and ratios of HiGHS's to them."""
-    r = Results("linear_programs")
-    kinds = labels(r, ": rows")
-    what = [c.quantity.split(": ")[1] for c in r.claims if c.quantity.startswith(f"{kinds[0]}: ")]
-    heads = [f"{part}, ms" if part.startswith("ours") else part for part in what]
-    return table(["", *heads], _grid(r, kinds, what))
 
 
 def _sizes(r: Results, kind: str) -> list[str]:
@@ -242,42 +195,6 @@ def scale_trackers() -> str:
             worst, median = (number(r[f"{kind}: exponent of {part}"].ours) for part in ("worst", "median"))
             rows.append([f"`{kind}`: grows with the power", worst, "", median, "", ""])
     return table(["tracker, targets", "worst scan, s", "which", "median, s", "peak, MB", "tracked, %"], rows)
-
-
-def first_call(folder: Path = RESULTS) -> str:
-    """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
-    if not result_file("cold_start", folder).exists():
-        return "`make bench-cold` measures the seconds on your machine."
-    r = Results("cold_start", folder)
-    rows = []
-    for label in labels(r, ": fresh clone, wall"):
-        cells = []
-        for way in ("fresh clone", "wheel", "again"):
-            first = f"{label}: {way}, first scan, wall"
-            cells.append(" / ".join(_judged(r[q], 2) for q in (first, f"{label}: {way}, wall") if q in r))
-        goal = r[f"{label}: fresh clone, wall"].band[1]
-        rows.append([label, *cells, number(r[f"{label}: fresh clone, cpu"].ours, 2), f"{goal:g}"])
-    return table(["first scan / all, s", "fresh clone", "wheel", "again", "clone, CPU time", "goal, clone"], rows)
-
-
-def sizes(folder: Path = RESULTS) -> str:
-    """What an installation takes on the disk, and what each package is for."""
-    if not result_file("installation", folder).exists():
-        return "`python -m experiments.installation WHEEL` weighs the packages on your machine."
-    r = Results("installation", folder)
-    names = [c.quantity.removeprefix("installed, ") for c in r.starting("installed, ")]
-    named = [name for name in names if name.split()[0] in _FOR]
-    kept = [name for name in names if name.split()[0] not in _SPARED]
-
-    def row(name: str, use: str, of: list[str]) -> list[str]:
-        kinds = ("installed", "without bytecode")
-        return [name, use, *(number(sum(r[f"{kind}, {package}"].ours for package in of)) for kind in kinds)]
-
-    rows = [row(name, _FOR[name.split()[0]], [name]) for name in named]
-    others = [name for name in names if name not in named]
-    rows.append(row(f"{len(others)} others", "needed by ortools, pandas, rich", others))
-    rows += [row("all", "", names), row("all but ortools, pandas and what only they need", "", kept)]
-    return table(["package", "for", "MB on the disk", "without bytecode"], rows)
 
 
 def traffic() -> str:
@@ -355,24 +272,6 @@ def readings() -> str:
     return table(["reading", "mean cycles", "95 % interval"], rows)
 
 
-def extras() -> str:
-    """What each extra adds on the disk."""
-    r = Results("extra_sizes")
-    alone = number(r["stonesoup without what it requires"].ours, 1)
-    brings = {
-        "plot": "figures by matplotlib",
-        "report": "interactive HTML pages by plotly",
-        "parquet": "Parquet files by pyarrow",
-        "stonesoup": f"the adapter for Stone Soup, which itself takes {alone} MB",
-        "asterix": "ASTERIX recordings",
-        "motile": "motile's problems by our solvers; most of it is motile's own solver, SCIP",
-        "dask": "parameter studies on a cluster",
-        "tune": "tuning of parameters by optuna",
-    }
-    rows = [[f"`assoc[{name}]`", number(r[f"extra {name}"].ours), what] for name, what in brings.items()]
-    return table(["extra", "on disk, MB", "for"], rows, lambda column: column == 1)
-
-
 def prior() -> str:
     """What a certified optimum of bearings is worth, with and without a prior of positions."""
     r = Results("ambiguous_bearings")
@@ -411,7 +310,6 @@ TABLES = {
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
     "phases": phases,
-    "consistency": consistency,
     "speed": speed,
     "speed-ratios": speed_ratios,
     "batch": batch,
@@ -422,9 +320,6 @@ TABLES = {
     ),
     "ant-colony": ant_colony,
     "readings": readings,
-    "first-call": first_call,
-    "linear-programs": linear_programs,
-    "scan-time": scan_time,
     "large-components": partial(
         _plain, "large_components", "problems",
         ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio"),
@@ -438,7 +333,5 @@ TABLES = {
          "estimate, furthest off longer runs"),
     ),
     "probabilities-beside": probabilities_beside,
-    "sizes": sizes,
-    "extras": extras,
     "prior": prior,
 }  # fmt: skip

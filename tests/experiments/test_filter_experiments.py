@@ -11,7 +11,7 @@ from assoc.simulation.dubins.paths import Pose, path, shortest
 from experiments.common.claims import load_json
 from experiments.common.command import main
 from experiments.common.results import Results
-from experiments.filters import benchmark, consistency, manoeuvres
+from experiments.filters import benchmark, manoeuvres
 from experiments.filters.b1 import Setting
 from experiments.papers.dubins_enkf import __main__ as dubins_enkf
 from experiments.papers.dubins_enkf import along_path, flight_paths
@@ -147,20 +147,6 @@ def test_tuning_never_sees_the_reports_flights():
         assert all(
             flight.position != one.position and flight.turns != one.turns for one in manoeuvres.SCENARIOS.values()
         )
-
-
-def test_consistency_of_the_exact_filters():
-    import numpy as np
-
-    rng = np.random.default_rng(0)
-    case = consistency.linear_case(60, rng, steps=40)
-    from assoc.filters import KalmanFilter, bounds
-
-    values, nis = consistency.run(KalmanFilter(consistency.ConstantVelocity(1.0)), case)
-    low, high = bounds(6, 60, 0.999)
-    assert low < values[-1].mean() < high
-    low, high = bounds(3, nis.size, 0.999)
-    assert low < nis.mean() < high
 
 
 @pytest.mark.slow

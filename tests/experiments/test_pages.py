@@ -16,13 +16,12 @@ from experiments.pages import commands, prose, verdicts
 from experiments.pages.__main__ import FOLDER, TABLES, main, refresh
 from tests.release import licences
 
-BY_HAND = ("choosing", "dependencies", "registration")
+BY_HAND = ("choosing", "registration")
 """Pages without slots: what is measured stands in their tables."""
 FIXED = {
     "air_traffic": "0.06 0.1 0.5 0.9 0.95 1 5 6 8 10 15 20 40 60 66 137 250 300 3,704",
     "choosing": "0.5 0.7 0.87 0.95 0.98 1 2 12 87 100 128 300 4096",
     "concepts": "0.99 0.999 01 1 2",
-    "dependencies": "3.11 64 430",
     "probabilities": "0 0.02 0.5 1 2 3 4 14 20 22 80 2,048",
     "scaling": "0.001 4 26 500 1,000 3,000 10,000",
     "tracking_measured": "0 0.6 1 2 5 10 15 20 30 80 219 400 500",
