@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, cast
 
@@ -24,8 +25,9 @@ _MAX_DENSE_ELEMENTS = 200_000_000
 _MAX_SINGLETON_NUMBERS = 64_000_000
 _DENSE = (np.ndarray, list, tuple)
 _FROM_DENSE = (
-    "AssignmentProblem.from_dense(costs, dummy=False) takes a matrix as scipy's linear_sum_assignment does, "
-    "from_dense(costs) one whose row 0 and column 0 are the costs of leaving a measurement alone"
+    "AssignmentProblem.from_matrix(costs) takes a matrix as scipy's linear_sum_assignment does, from_matrix(costs, "
+    "unassigned=...) with costs of leaving rows and columns unassigned, from_dense(costs) one that has these as row 0 "
+    "and column 0"
 )
 # larger sums of costs could overflow in a solver
 _MAX_TOTAL_COST = 1e300
@@ -207,6 +209,40 @@ class AssignmentProblem:
         offset = 0 if dummy else 1
         sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
         return cls(index + offset, dense[keep], sizes, dummy=dummy)
+
+    @classmethod
+    def from_matrix(cls, costs: ArrayLike, unassigned: float | Sequence[ArrayLike] | None = None) -> AssignmentProblem:
+        """Read the costs of assigning rows to columns.
+
+        The rows and columns that a solution assigns to each other are its `Solution.pairs`.
+
+        Parameters
+        ----------
+        costs : array_like of float, shape (n, m)
+            Cost of each pair; ``inf`` and masked entries forbid a pair.
+        unassigned : float, or pair of array_like of shape (n,) and (m,), optional
+            What it costs to leave a row or a column unassigned: one number for all, or one for each row and one for
+            each column. A pair is assigned only where that costs less than to leave both. ``inf``: as many pairs as
+            possible, and of these choices the cheapest; `Solution.cost` then holds a large number for each that is
+            left. None: each row is assigned, or each column if there are fewer of these, as by scipy's
+            ``linear_sum_assignment``; if forbidden pairs leave no such choice, solvers raise InfeasibleError.
+
+        Raises
+        ------
+        InvalidInputError
+            `costs` is no matrix, holds NaN or -inf, or `unassigned` has another shape or is no number.
+        LimitExceededError
+            The problem would take more memory than is available.
+        """
+        matrix = _numbers(costs, "costs")
+        if matrix.ndim != 2:
+            raise InvalidInputError(f"costs: expected a matrix, got shape {matrix.shape}")
+        if unassigned is None:
+            return cls.from_dense(matrix, dummy=False)
+        dense = np.zeros((matrix.shape[0] + 1, matrix.shape[1] + 1))
+        dense[1:, 1:] = matrix
+        dense[1:, 0], dense[0, 1:] = _costs_alone(matrix, unassigned)
+        return cls.from_dense(dense)
 
     @classmethod
     def _of_matrix(cls, matrix: NDArray[np.float64]) -> AssignmentProblem:
@@ -442,6 +478,31 @@ def taken_problem(problem: object) -> AssignmentProblem:
     return cast(AssignmentProblem, problem)
 
 
+def _costs_alone(matrix: NDArray[np.float64], unassigned: float | Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
+    """Costs of leaving rows (n,) and columns (m,) unassigned."""
+    single = isinstance(unassigned, (int, float, np.number))
+    both: list[Any] = (
+        [unassigned, unassigned] if single else list(unassigned) if isinstance(unassigned, (list, tuple)) else []
+    )
+    if len(both) != 2:
+        found = f"{len(both)} values" if both else type(unassigned).__name__
+        raise InvalidInputError(f"unassigned: expected a number, or costs of the rows and of the columns, got {found}")
+    alone = []
+    for name, costs, count in zip(("rows", "columns"), both, matrix.shape, strict=True):
+        numbers = _numbers(costs, f"unassigned: {name}")
+        if numbers.shape not in ((), (count,)):
+            raise InvalidInputError(f"unassigned: {name}: expected {count} numbers, got shape {numbers.shape}")
+        if not (numbers > -np.inf).all():
+            raise InvalidInputError(
+                f"unassigned: {name}: expected numbers, got {numbers[~(numbers > -np.inf)].flat[0]}"
+            )
+        alone.append(np.broadcast_to(numbers, (count,)).copy())
+    # to leave one more is dearer than any choice of pairs, but not so dear that costs are lost in rounding
+    finite = np.concatenate([matrix[np.isfinite(matrix)], *(costs[np.isfinite(costs)] for costs in alone)])
+    dear = min(matrix.shape) * float(np.ptp(finite)) + float(np.abs(finite).max()) if finite.size else 0.0
+    return [np.where(np.isposinf(costs), dear or 1.0, costs) for costs in alone]
+
+
 def _checked_dummy(dummy: object) -> bool:
     if not isinstance(dummy, (bool, np.bool_)):
         found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
@@ -471,8 +532,8 @@ def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
 def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
         array = np.asarray(values)
-    except ValueError as error:
-        raise InvalidInputError(f"{name}: {error}") from None
+    except ValueError:
+        raise InvalidInputError(f"{name}: expected rows of the same length; inf forbids an entry") from None
     if array.dtype.kind not in "fiu" and array.size:
         raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
     numbers = array.astype(np.float64, copy=False)
@@ -532,7 +593,9 @@ def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
         raise InvalidInputError(f"costs: row {row} is {costs[row]}; expected a number, or inf for a forbidden tuple")
     keep: NDArray[np.bool_] = ~np.isposinf(costs)
     if not _finite(costs[keep]):
-        raise InvalidInputError(f"costs: the sum of magnitudes exceeds {_MAX_TOTAL_COST:.0e}; rescale the costs")
+        raise InvalidInputError(
+            f"costs: the sum of magnitudes exceeds {_MAX_TOTAL_COST:.0e}; inf forbids a tuple, or rescale the costs"
+        )
     return keep
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc.errors import InvalidInputError
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -94,6 +96,20 @@ class Solution:
     def num_targets(self) -> int:
         """Number of chosen tuples with at least two measurements."""
         return int((np.count_nonzero(self.tuples, axis=1) >= 2).sum())
+
+    @property
+    def pairs(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns that are assigned to each other, from 0, as by scipy's ``linear_sum_assignment``.
+
+        Raises
+        ------
+        InvalidInputError
+            The problem has not two lists.
+        """
+        if self.tuples.shape[1] != 2:
+            raise InvalidInputError(f"pairs: expected a solution of two lists, got {self.tuples.shape[1]}; see tuples")
+        rows, columns = (self.tuples[self.tuples.all(axis=1)].T - 1).astype(np.intp)
+        return rows, columns
 
     def to_frame(self) -> pd.DataFrame:
         """One row per chosen tuple: columns ``sensor_1`` .. ``sensor_S`` (0: missed) and ``measurements``."""

@@ -381,7 +381,10 @@ def test_commands_of_the_pages_run(page, inputs, tmp_path, monkeypatch, capsys):
         assert program(words[0]).main(words[1:]) == 0, (words, capsys.readouterr().err)
 
 
-@pytest.mark.parametrize(("page", "section"), [("ant_colony", "## Equations 7 to 11"), ("live", "# Live operation")])
+@pytest.mark.parametrize(
+    ("page", "section"),
+    [("ant_colony", "## Equations 7 to 11"), ("live", "# Live operation"), ("own_loop", "# Only the assignment")],
+)
 def test_python_of_the_pages_runs(page, section, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
@@ -390,5 +393,7 @@ def test_python_of_the_pages_runs(page, section, tmp_path, monkeypatch):
     assert blocks
     for block in blocks:
         exec(block, names)
+    if page == "own_loop":
+        assert names["lost"].tolist() == [2] and names["new"].tolist() == [] and names["again"].cost == -15.0
     if page == "live":
         assert (tmp_path / "radars.npz").exists()

@@ -55,7 +55,7 @@ def assign(
     ----------
     problem : AssignmentProblem or array_like
         The problem to solve. An array of costs is taken as by scipy's ``linear_sum_assignment``, whose rows and columns
-        are then ``solution.tuples.T - 1``.
+        are then ``solution.pairs``.
     solver : str, default "exact"
         One of ``assoc.solvers.names()``.
     seed : int, SeedSequence, Generator or None, default 0
