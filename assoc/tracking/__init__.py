@@ -9,15 +9,15 @@ from assoc.tracking.associate.multi_sensor import MultiSensorTracker
 from assoc.tracking.associate.nearest_neighbour import NearestNeighbourTracker
 from assoc.tracking.associate.static import StaticFusionTracker
 from assoc.tracking.associate.track_problem import track_problem
-from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.live_tracker import LiveTracker
 from assoc.tracking.live.pictures import Picture
 from assoc.tracking.moving import MovingTargets
 from assoc.tracking.offline.smoothing import smoothed
-from assoc.tracking.stages.identity_evidence import IdentityParameters
-from assoc.tracking.stages.life_cycle import LifeCycle
-from assoc.tracking.track import Decision, Step, Track
+from assoc.tracking.records.identity_evidence import IdentityParameters
+from assoc.tracking.records.initiation import Initiation
+from assoc.tracking.records.life_cycle import LifeCycle
+from assoc.tracking.records.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
 

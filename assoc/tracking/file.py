@@ -18,14 +18,14 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
-from assoc.tracking.adapting.clutter import ClutterMap
-from assoc.tracking.adapting.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.adapting.identity_watch import IdentityWatch
-from assoc.tracking.births.ghosts import Unseen
+from assoc.tracking.records.clutter import ClutterMap
+from assoc.tracking.records.doubles import Doubles
+from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
+from assoc.tracking.records.ghosts import Unseen
+from assoc.tracking.records.track_batch import one_state
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.doubles import Doubles
 from assoc.tracking.state import Starter, TrackerState
-from assoc.tracking.track_batch import one_state
 
 FORMAT = "assoc.tracker"
 VERSION = 5

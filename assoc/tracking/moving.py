@@ -14,7 +14,7 @@ import numpy as np
 
 from assoc._parameters import positive
 from assoc._types import Array
-from assoc.tracking.track import Track
+from assoc.tracking.records.track import Track
 
 
 class Target(NamedTuple):

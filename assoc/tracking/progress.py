@@ -13,10 +13,10 @@ from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
+from assoc.tracking.records.track import Step
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Step
-from assoc.tracking.track_batch import TrackBatch
 
 # default limits of the exact solver on one scan: visits of tuples in branch and bound, and the least number of nodes;
 # counted, not timed, so that the answer does not depend on the machine

@@ -23,9 +23,9 @@ from assoc.costs.tracks.tuples import gate_of
 from assoc.filters.base import predict_each
 from assoc.scene.scan import Scan
 from assoc.tracking.adapting.in_use import in_use
-from assoc.tracking.births.starter import current
+from assoc.tracking.records.track import Step
+from assoc.tracking.stages.starter import current
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Step
 from assoc.tracking.tracker import Tracker
 
 _KEEP = 0.95

@@ -19,11 +19,11 @@ from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
 from assoc.solvers.registry import make_parameters
-from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.new_tracks import NewTracks
 from assoc.tracking.filter_choice import open_heights
-from assoc.tracking.stages.identity_evidence import IdentityParameters
-from assoc.tracking.stages.life_cycle import LifeCycle
+from assoc.tracking.new_tracks import NewTracks
+from assoc.tracking.records.identity_evidence import IdentityParameters
+from assoc.tracking.records.initiation import Initiation
+from assoc.tracking.records.life_cycle import LifeCycle
 
 _CLIMB = 0.1
 """Usual climb of a target as a share of its usual speed."""
@@ -35,7 +35,7 @@ class TrackerSettings:
 
     name: str
     method: Any
-    """How scans are associated, with its own settings; see `assoc.tracking.associate.method`."""
+    """How scans are associated, with its own settings; see `assoc.tracking.method`."""
     scene: Scene
     """Sensors and region."""
     filter: Filter[Any]
@@ -55,7 +55,7 @@ class TrackerSettings:
     by_range: Any = None
     """(S, B): see `assoc.costs.tracks.scores.ScoreTerms`."""
     starter: TrackerSettings | None = None
-    """If all sensors measure angles alone; see `assoc.tracking.births.starter`."""
+    """If all sensors measure angles alone; see `assoc.tracking.stages.starter`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):

@@ -11,14 +11,14 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
-from assoc.tracking.adapting.clutter import ClutterMap
-from assoc.tracking.adapting.estimates import Estimates
 from assoc.tracking.adapting.identity_watch import IdentityWatch
-from assoc.tracking.births.ghosts import Unseen
+from assoc.tracking.records.clutter import ClutterMap
+from assoc.tracking.records.doubles import Doubles
+from assoc.tracking.records.estimates import Estimates
+from assoc.tracking.records.ghosts import Unseen
+from assoc.tracking.records.identity_evidence import Identities
+from assoc.tracking.records.track_batch import TrackBatch, empty_batch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.doubles import Doubles
-from assoc.tracking.stages.identity_evidence import Identities
-from assoc.tracking.track_batch import TrackBatch, empty_batch
 
 
 class TrackerState(NamedTuple):
@@ -29,7 +29,7 @@ class TrackerState(NamedTuple):
     turns: Array
     """Mean number of turns of each sensor in a scan, (S,)."""
     method_state: Any
-    """Further state of this kind of tracker; see `assoc.tracking.associate.method`."""
+    """Further state of this kind of tracker; see `assoc.tracking.method`."""
     lost: TrackBatch
     """Confirmed tracks that ended not long ago; see `assoc.tracking.stages.taking_up`."""
     doubles: Doubles
@@ -59,7 +59,7 @@ class TrackerState(NamedTuple):
 
 
 class Starter(NamedTuple):
-    """Tentative tracks of bearings alone; see `assoc.tracking.births.starter`."""
+    """Tentative tracks of bearings alone; see `assoc.tracking.stages.starter`."""
 
     state: TrackerState
     unseen: Unseen

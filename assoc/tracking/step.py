@@ -24,18 +24,18 @@ from assoc.filters.batches import concatenate
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimates
-from assoc.tracking.births.starter import current, end_ghosts, step_starter, take_over
 from assoc.tracking.progress import Progress, Work
+from assoc.tracking.records.identity_evidence import checked_identities
+from assoc.tracking.records.track import Step
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
 from assoc.tracking.stages.coverage import count_out_of_view, keep_pace
-from assoc.tracking.stages.identity_evidence import checked_identities
 from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
+from assoc.tracking.stages.starter import current, end_ghosts, step_starter, take_over
 from assoc.tracking.stages.taking_up import take_up
 from assoc.tracking.stages.watching import watch_identities
 from assoc.tracking.state import TrackerState, rng_of
-from assoc.tracking.track import Step
 
 Stage = Callable[[Progress], Progress]
 

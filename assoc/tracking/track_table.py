@@ -20,8 +20,8 @@ from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.filter_choice import open_heights
 from assoc.tracking.quality import Qualities
-from assoc.tracking.stages.identity_evidence import address_text
-from assoc.tracking.track import Decision, Track, TrackColumns
+from assoc.tracking.records.identity_evidence import address_text
+from assoc.tracking.records.track import Decision, Track, TrackColumns
 from assoc.tracking.tracker import Tracker
 
 if TYPE_CHECKING:

@@ -23,19 +23,19 @@ from assoc.sensors import Sensor
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.adapting.identity_watch import OddIdentity
-from assoc.tracking.associate.method import Method
-from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.starter import current, with_starter
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
+from assoc.tracking.method import Method
+from assoc.tracking.records.identity_evidence import IdentityParameters
+from assoc.tracking.records.initiation import Initiation
+from assoc.tracking.records.life_cycle import LifeCycle
+from assoc.tracking.records.track import Decision, Step, Track, TrackColumns
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_time
-from assoc.tracking.stages.identity_evidence import IdentityParameters
-from assoc.tracking.stages.life_cycle import LifeCycle
+from assoc.tracking.stages.starter import current, with_starter
 from assoc.tracking.state import first_state
 from assoc.tracking.step import advance, check
 from assoc.tracking.target_kinds import target_kind
-from assoc.tracking.track import Decision, Step, Track, TrackColumns
-from assoc.tracking.track_batch import TrackBatch
 
 
 @doors
@@ -96,7 +96,7 @@ class Tracker:
 
     name: ClassVar[str]
     method: ClassVar[type[Method]]
-    """How scans are associated; see `assoc.tracking.associate.method`."""
+    """How scans are associated; see `assoc.tracking.method`."""
     plain: ClassVar[type[Tracker]]
     """The tracker that tries kinds of targets for "auto"."""
 
@@ -267,7 +267,7 @@ class Tracker:
             what it looked at. No sensor may have looked in a direction twice. A sector without width: it did not
             look, as one that is off or reports on its own (AIS). Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
-            Mode 3/A code and ICAO address (of a ship its MMSI, `assoc.tracking.stages.identity_evidence.ship`) of each
+            Mode 3/A code and ICAO address (of a ship its MMSI, `assoc.tracking.records.identity_evidence.ship`) of each
             measurement, 0 or -1 where it has none. Trackers that were made without `identity` only watch them
             (`health`).
 

@@ -23,8 +23,8 @@ from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, identity
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Track, Tracker
-from assoc.tracking.adapting.clutter import ClutterMap
-from assoc.tracking.adapting.estimates import Estimates
+from assoc.tracking.records.clutter import ClutterMap
+from assoc.tracking.records.estimates import Estimates
 from experiments.common.claims import Claim
 from experiments.common.command import main, whole
 from experiments.trackers.judging import CUTOFF, goal, mean_claim

@@ -11,13 +11,13 @@ from assoc.filters.batches import concatenate
 from assoc.scene import Scene
 from assoc.tracking import Tracker
 from assoc.tracking.associate.all_sensors import associated, associated_in_order
-from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
+from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import misses
-from assoc.tracking.track_batch import TrackBatch
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,11 @@ from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS, Initiation
-from assoc.tracking.adapting.clutter import ClutterMap
 from assoc.tracking.adapting.health import Health, Quantity, SensorHealth
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
+from assoc.tracking.records.clutter import ClutterMap
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 

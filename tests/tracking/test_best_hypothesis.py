@@ -12,7 +12,7 @@ from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, extend
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import decide, keep_best, same_tree
-from assoc.tracking.track_batch import ID, SCORE
+from assoc.tracking.records.track_batch import ID, SCORE
 
 VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
 

@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 from assoc import InvalidInputError
 from assoc.filters import ConstantVelocity
 from assoc.tracking.fusion import FusionParameters, SystemTracks, TrackFusion, fuse_tables, intersected
-from assoc.tracking.track import Track
+from assoc.tracking.records.track import Track
 
 COVARIANCE = np.diag([50.0, 50.0, 80.0, 5.0, 5.0, 5.0]) ** 2
 

@@ -11,7 +11,7 @@ from assoc.sensors import PositionSensor, Radar2D
 from assoc.tracking import TRACKERS, IdentityParameters, Initiation
 from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.offline.plots import track_plots
-from assoc.tracking.stages.identity_evidence import LARGEST, MEMORY, Identities, log_ratio
+from assoc.tracking.records.identity_evidence import LARGEST, MEMORY, Identities, log_ratio
 from tests.sizes import few_or_all, sample
 from tests.tracking.crossing import TURN, crossing, radar
 

@@ -11,7 +11,7 @@ from assoc.scene import Scene
 from assoc.sensors import PositionSensor
 from assoc.tracking import TRACKERS, IdentityParameters, track_scene
 from assoc.tracking.adapting.identity_watch import MOST, IdentityWatch, TrackLookup
-from assoc.tracking.stages.identity_evidence import ship
+from assoc.tracking.records.identity_evidence import ship
 
 A, B, C = 0x3C6444, 0x4B1A22, 0x400001
 

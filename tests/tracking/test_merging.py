@@ -6,7 +6,7 @@ import pytest
 from assoc import filters
 from assoc.filters import Gaussian
 from assoc.tracking import TRACKERS
-from assoc.tracking.stages.doubles import Doubles
+from assoc.tracking.records.doubles import Doubles
 from tests.sizes import sample
 from tests.tracking import plain
 

@@ -10,7 +10,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, Gaussian, KalmanFilter
 from assoc.sensors import PositionSensor
 from assoc.tracking import LatePlots, Tracker
-from assoc.tracking.associate.method import Method
+from assoc.tracking.method import Method
 from assoc.tracking.progress import Association
 
 VIEW = [[-1e4, 1e4]] * 3

@@ -11,7 +11,7 @@ from assoc.filters import Gaussian
 from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, Track, TrackTable, track_scene
 from assoc.tracking.quality import Qualities
-from assoc.tracking.track import TrackColumns
+from assoc.tracking.records.track import TrackColumns
 from tests.tracking import plain
 
 

@@ -9,11 +9,11 @@ from assoc.errors import InvalidInputError
 from assoc.filters import Gaussian
 from assoc.scene import Scan
 from assoc.tracking import TRACKERS, LatePlots
-from assoc.tracking.births.ghosts import Unseen
-from assoc.tracking.births.starter import partners
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.progress import Progress, Work
-from assoc.tracking.track import Step
+from assoc.tracking.records.ghosts import Unseen
+from assoc.tracking.records.track import Step
+from assoc.tracking.stages.starter import partners
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 

@@ -17,7 +17,7 @@ from assoc.tracking import (
 )
 from assoc.tracking.file import file_arrays
 from assoc.tracking.filter_choice import two_speeds
-from assoc.tracking.stages.life_cycle import count_bits
+from assoc.tracking.records.life_cycle import count_bits
 from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
 from tests.tracking.stepping import stepped

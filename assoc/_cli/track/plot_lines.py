@@ -18,7 +18,7 @@ from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import COORDINATES, coordinates
 from assoc.recordings.several import NO_HEIGHT, heights_above
-from assoc.tracking.stages.identity_evidence import ship
+from assoc.tracking.records.identity_evidence import ship
 
 if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin

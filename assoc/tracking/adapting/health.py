@@ -9,8 +9,8 @@ import numpy as np
 
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
-from assoc.tracking.adapting.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 from assoc.tracking.adapting.identity_watch import OddIdentity
+from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
 _WIDTH = 1.96
 # differences smaller than this share are not worth a word, nor those within so many standard deviations

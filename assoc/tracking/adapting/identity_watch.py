@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from assoc._text.times import moment
 from assoc._types import Array
-from assoc.tracking.stages.identity_evidence import UNKNOWN, address_text
+from assoc.tracking.records.identity_evidence import UNKNOWN, address_text
 
 SURE = 3
 """Equal identities in a row that a sensor must have measured on a track."""

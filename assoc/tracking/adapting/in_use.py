@@ -14,7 +14,7 @@ from assoc.filters import ExtendedKalmanFilter, InteractingMultipleModel, Kalman
 from assoc.filters.base import Filter
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
-from assoc.tracking.adapting.estimates import DETECTION, Estimates
+from assoc.tracking.records.estimates import DETECTION, Estimates
 from assoc.tracking.settings import TrackerSettings
 
 # a band detects at least this share of what the best one does: tracks of false alarms wait long where misses say little

@@ -14,12 +14,12 @@ from assoc.costs.views import bands_of, bands_of_measured, places_of
 from assoc.filters.base import Expected, predict_each
 from assoc.filters.imm import Mixture
 from assoc.scene.own_times import FULL_TURN
-from assoc.tracking.adapting.estimates import ALARMS, declared_values
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.estimates import ALARMS, declared_values
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import dwells
-from assoc.tracking.track_batch import TrackBatch
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
 _WIDER, _FALSE = 4.0, 0.05

@@ -12,9 +12,9 @@ from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.filters.base import predict_each
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import owners
+from assoc.tracking.records.track_batch import ID, STARTED, TrackBatch
 from assoc.tracking.stages.coverage import covered
-from assoc.tracking.track import owners
-from assoc.tracking.track_batch import ID, STARTED, TrackBatch
 
 
 def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array, missed: Array) -> Association:

@@ -43,15 +43,15 @@ from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.pairs.permutations import without_permutations
 from assoc.tracking.associate import joint_tuples
-from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
+from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import Step
+from assoc.tracking.records.track_batch import STARTED, TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Step
-from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 Permutations = Literal["best", "all"]

@@ -27,9 +27,9 @@ from assoc.ranking.pairs.tuple_permutations import without_tuple_permutations
 from assoc.tracking.associate.all_sensors import begin, begin_in_order
 from assoc.tracking.associate.multi_sensor import new_targets
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import owners
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import covered, misses
-from assoc.tracking.track import owners
-from assoc.tracking.track_batch import TrackBatch
 
 MARGIN = 7.0
 """Tuples whose weight is below exp(-MARGIN) of that of their track without measurements are left out."""

@@ -33,11 +33,11 @@ from assoc.tracking.mht.growth import AtOnce, Offers, growth_of
 from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import Decision, Step
+from assoc.tracking.records.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import to_delete
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 _EFFORT = 0.05

@@ -10,8 +10,8 @@ from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import corrected, grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.all_sensors import associated, associated_in_order
-from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.stages.coverage import misses
 from assoc.tracking.tracker import Tracker

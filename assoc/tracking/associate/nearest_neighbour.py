@@ -14,12 +14,12 @@ from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
-from assoc.tracking.associate.method import Method
 from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import owners
+from assoc.tracking.records.track_batch import STARTED, TrackBatch
 from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
-from assoc.tracking.track import owners
-from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 Rule = Literal["greedy", "assignment"]

@@ -10,8 +10,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.motion.models import Motion
-from assoc.tracking.births.initiation import velocity_components
-from assoc.tracking.track import Track
+from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.track import Track
 
 _OPEN_HEIGHT, _OPEN_VELOCITY = 5e3, 200.0
 """Standard deviations of a height and of velocities that a system does not report, metres and m/s."""

@@ -36,7 +36,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.tracking.fusion.systems import SystemTracks, check_tracks, open_states
-from assoc.tracking.track import Track
+from assoc.tracking.records.track import Track
 
 _LEAST_BOX = 1e4
 """Least side of the box of all tracks from which a density of targets is estimated, metres."""

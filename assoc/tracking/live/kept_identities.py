@@ -6,7 +6,7 @@ from collections import deque
 
 from assoc._types import Array
 from assoc.metrics.plot_identity import MEMORY, majority
-from assoc.tracking.stages.identity_evidence import UNKNOWN
+from assoc.tracking.records.identity_evidence import UNKNOWN
 
 # code or address of a plot that has none
 _NOBODY = -1

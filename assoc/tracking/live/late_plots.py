@@ -20,12 +20,12 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.adapting.identity_watch import OddIdentity
-from assoc.tracking.births.starter import current
+from assoc.tracking.records.identity_evidence import checked_identities, no_identities
+from assoc.tracking.records.track import Decision, Step, Track
+from assoc.tracking.records.track_batch import ID, PARENT, TrackBatch
 from assoc.tracking.stages.checking import checked_measurements
-from assoc.tracking.stages.identity_evidence import checked_identities, no_identities
+from assoc.tracking.stages.starter import current
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Decision, Step, Track
-from assoc.tracking.track_batch import ID, PARENT, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0

@@ -29,9 +29,9 @@ from assoc.tracking.live.own_positions import OwnPositions
 from assoc.tracking.live.pictures import Agreement, Antenna, CheckedPlot, Picture, SensorState
 from assoc.tracking.live.state import LiveSettings, LiveState
 from assoc.tracking.quality import Qualities
+from assoc.tracking.records.identity_evidence import checked_identities
+from assoc.tracking.records.track import Step, Track
 from assoc.tracking.stages.checking import checked
-from assoc.tracking.stages.identity_evidence import checked_identities
-from assoc.tracking.track import Step, Track
 from assoc.tracking.tracker import Tracker
 
 JUMP = 60.0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from assoc._types import Array
 from assoc.scene.own_times import FULL_TURN
-from assoc.tracking.track import Track
+from assoc.tracking.records.track import Track
 
 SILENCE = 15.0
 """Seconds, or three turns, without a plot after which a sensor is treated as switched off."""

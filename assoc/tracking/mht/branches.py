@@ -18,7 +18,7 @@ from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
-from assoc.tracking.track_batch import BEST, BITS, EXISTS, HIDDEN, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
+from assoc.tracking.records.track_batch import BEST, BITS, EXISTS, HIDDEN, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
 
 class Tables(NamedTuple):

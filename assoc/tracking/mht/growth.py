@@ -19,8 +19,8 @@ from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_
 from assoc.filters.base import Filter
 from assoc.filters.batches import placed
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
-from assoc.tracking.track_batch import TrackBatch
 
 _MOST_CROSSINGS = 100
 """The most new targets in a scan that start from crossings of several sensors."""

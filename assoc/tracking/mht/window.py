@@ -12,10 +12,10 @@ from assoc._parameters import is_whole
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
-from assoc.tracking.associate.method import Method
 from assoc.tracking.file import Saved
-from assoc.tracking.track import Decision, owners
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.method import Method
+from assoc.tracking.records.track import Decision, owners
+from assoc.tracking.records.track_batch import TrackBatch
 
 MOST_SCANS = 1000
 """The longest window, in scans: every branch stores its history in it."""

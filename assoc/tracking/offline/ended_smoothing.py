@@ -13,7 +13,7 @@ from assoc.errors import AssocWarning
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.offline.smoothing import smoothed
-from assoc.tracking.track import Decision, Step
+from assoc.tracking.records.track import Decision, Step
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 

@@ -15,7 +15,7 @@ from assoc.metrics.plot_identity import IdentitiesSoFar
 from assoc.recordings import Recording, Window
 from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.quality import Qualities
-from assoc.tracking.track import Step, TrackColumns
+from assoc.tracking.records.track import Step, TrackColumns
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 

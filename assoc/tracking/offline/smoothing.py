@@ -19,8 +19,8 @@ from assoc.errors import InvalidInputError
 from assoc.filters.smoother import FixedLagSmoother, Window
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.tracking.births.initiation import velocity_components
-from assoc.tracking.track import Decision, Track
+from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.track import Decision, Track
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 

@@ -14,8 +14,8 @@ from assoc._types import Array
 from assoc.costs.views import log_missed, places_of
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.track_batch import TrackBatch
 
 _FORGETTING = 0.05
 # turns in a scan; with fewer all sensors are taken to be off, and no track is deleted

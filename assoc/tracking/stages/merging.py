@@ -20,10 +20,10 @@ from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
 from assoc.filters.base import Expected
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.doubles import Doubles
+from assoc.tracking.records.track import renamed
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import dwells
-from assoc.tracking.stages.doubles import Doubles
-from assoc.tracking.track import renamed
-from assoc.tracking.track_batch import TrackBatch
 
 FALSE_MERGE = 1e-6
 """Probability of so much evidence where there are two targets."""

@@ -9,9 +9,9 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.gating import near_pairs
 from assoc.filters.base import Expected
-from assoc.tracking.births.initiation import velocity_components
 from assoc.tracking.progress import Progress
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.track_batch import TrackBatch
 
 # how much likelier a position is where an old track was than anywhere in the region
 _LIKELIER = 100.0

@@ -18,11 +18,11 @@ from assoc._types import Array
 from assoc.costs.views import places_of
 from assoc.filters.base import predict_each
 from assoc.problem import AssignmentProblem
-from assoc.tracking.births.initiation import velocity_components
 from assoc.tracking.progress import Progress
-from assoc.tracking.stages.life_cycle import OVERLOOKED
-from assoc.tracking.track import renamed
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.life_cycle import OVERLOOKED
+from assoc.tracking.records.track import renamed
+from assoc.tracking.records.track_batch import TrackBatch
 
 # ends are kept for this share of a target's mean lifetime
 _KEPT = 0.25

@@ -8,9 +8,9 @@ from assoc._text.plain import one_line
 from assoc.costs.gating import chi_square_quantiles
 from assoc.recordings.several import NO_HEIGHT
 from assoc.tracking.adapting.identity_watch import TrackLookup
-from assoc.tracking.births.starter import current
 from assoc.tracking.progress import Progress
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.stages.starter import current
 
 # tracks whose positions differ by less than their uncertainty lets expect in this share of cases may be one target's
 _TOGETHER = 0.999

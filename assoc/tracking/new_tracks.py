@@ -23,7 +23,7 @@ from assoc.filters.state import gaussian
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.tracking.births.initiation import Initiation
+from assoc.tracking.records.initiation import Initiation
 
 
 class Crossings(NamedTuple):

@@ -5,7 +5,7 @@ cannot distinguish them from targets. A tracker that decides each scan at once c
 scores better by chance, and such ghosts keep the bearings that the targets need. So it passes the measurements that its
 tracks do not use to a starter: the state of a multiple hypothesis tracker inside its own state, which defers decisions
 for some scans and then hands its tracks over. Tracks in the starter are reported as soon as they are confirmed.
-Tracks of a tracker that decides at once may still swap bearings and become ghosts; `assoc.tracking.births.ghosts` ends
+Tracks of a tracker that decides at once may still swap bearings and become ghosts; `assoc.tracking.records.ghosts` ends
 those.
 """
 
@@ -21,11 +21,11 @@ from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.track import Decision, Step
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import in_view
 from assoc.tracking.state import Starter, TrackerState
-from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import TrackBatch
 
 _GROWN = 5
 """Age in scans at which a track is taken over: confirmation takes two or three, decisions three more."""

@@ -20,11 +20,11 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track import Decision, Step, decision
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import to_delete
 from assoc.tracking.state import TrackerState
-from assoc.tracking.track import Decision, Step, decision
-from assoc.tracking.track_batch import TrackBatch
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Method(ABC):
     """The method of association of a kind of tracker."""
 
     starter: ClassVar[Method | None] = None
-    """Method of the starter where all sensors measure angles alone; see `assoc.tracking.births.starter`."""
+    """Method of the starter where all sensors measure angles alone; see `assoc.tracking.stages.starter`."""
 
     def arranged(self, scan: Scan) -> Scan:
         """The scan with its measurements in the order in which the method numbers them."""

@@ -11,9 +11,9 @@ from assoc._types import Array
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.filters.state import gaussian
-from assoc.tracking.births.initiation import velocity_components
-from assoc.tracking.stages.life_cycle import HISTORY, LifeCycle
-from assoc.tracking.track import Track, TrackColumns
+from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.life_cycle import HISTORY, LifeCycle
+from assoc.tracking.records.track import Track, TrackColumns
 
 MASK = (1 << HISTORY) - 1
 """Number of last scans whose detections are stored, one bit each."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.tracking.stages.life_cycle import OVERLOOKED
+from assoc.tracking.records.life_cycle import OVERLOOKED
 
 
 class Unseen(NamedTuple):

@@ -1,1 +1,0 @@
-"""How tracks begin: from one measurement, a tuple, or crossing bearings."""
