@@ -26,6 +26,10 @@ class MissingExtraError(AssocError, ImportError):
     """An optional dependency is not installed; the message names the command that installs it."""
 
 
+class RemovedError(AssocError, ImportError):
+    """A public name existed once; the message says what to use instead."""
+
+
 class AssocWarning(UserWarning):
     """Legal input that is probably a mistake, such as degrees instead of radians; one line."""
 

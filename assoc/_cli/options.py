@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from typing import Any, NoReturn
@@ -13,6 +14,7 @@ from assoc._cli.lines import HelpFormatter
 from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
 from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._parameters import parameters_of
+from assoc._removed import removed
 from assoc._system.imports import check_extra
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
@@ -168,7 +170,11 @@ class Parser(argparse.ArgumentParser):
         return given
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse; the error for an unknown flag suggests similar ones."""
+        """Parse; the error for an unknown flag says what to use instead, or suggests similar ones."""
+        for word in sys.argv[1:] if args is None else args:
+            flag = word.partition("=")[0]
+            if flag not in self._option_string_actions and (line := removed(flag)):
+                self.error(line)
         parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown[0])}")
@@ -208,6 +214,8 @@ def read_config(
             values[key] = known[key].read_toml(value, f"{path}: {key}")
         elif key in solvers:
             tables[key] = value
+        elif line := removed(flag_of(key)):
+            raise InvalidInputError(f"{path}: {line}")
         elif isinstance(value, (dict, list)):
             raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(solvers)}")
         else:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from assoc._files.output import STDOUT, is_stream
+from assoc._removed import removed
 from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
@@ -125,6 +126,8 @@ class OneOf:
         """Read a name."""
         value = self._aliases.get(value.lower(), value)
         if value not in self.names:
+            if line := removed(f"{label} {value}"):
+                raise InvalidInputError(line)
             raise InvalidInputError(f"{label}: unknown name {value!r}; known: {', '.join(self.names)}")
         return value
 

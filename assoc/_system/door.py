@@ -21,6 +21,7 @@ from typing import Any, Literal, TypeVar, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from assoc._removed import removed
 from assoc.errors import AssocError, InvalidInputError
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -64,7 +65,8 @@ def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords:
     try:
         bound = inspect.signature(function).bind(*args, **keywords).arguments
     except TypeError:
-        return None  # too many or too few arguments: Python's message is good
+        lines = (removed(f"{function.__qualname__.removesuffix('.__init__')}({name})") for name in keywords)
+        return next(filter(None, lines), None)  # too many or too few arguments: Python's message is good
     kinds = annotations_of(function)
     for name, value in bound.items():
         parameter = inspect.signature(function).parameters[name]

@@ -7,9 +7,10 @@ import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
-from assoc.errors import MissingExtraError
+from assoc._removed import removed
+from assoc.errors import MissingExtraError, RemovedError
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -21,6 +22,9 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
 
     def load(name: str) -> Any:
         if name not in homes:
+            if line := removed(f"{package}.{name}"):
+                # from package import name hides what an AttributeError says
+                raise RemovedError(line)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         home = homes[name]
         module = importlib.import_module(home if home.startswith("assoc.") else f"{package}.{home}")
@@ -32,6 +36,13 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
         return sorted({*homes, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
 
     return load, names
+
+
+def removed_attribute(owner: object, name: str) -> NoReturn:
+    """As ``__getattr__`` of a class: say what to use instead of an attribute that existed once."""
+    lines = (removed(f"{kind.__name__}.{name}") for kind in type(owner).__mro__)
+    usual = f"{type(owner).__name__!r} object has no attribute {name!r}"
+    raise AttributeError(next(filter(None, lines), usual), name=name, obj=owner)
 
 
 def check_extra(package: str, extra: str) -> None:

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any
 
 from assoc._parameters import Parameters
+from assoc._removed import removed
 from assoc._system.compile_time import loading
 from assoc._system.door import door
 from assoc._text.near import did_you_mean
@@ -109,7 +110,11 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
     known = [f.name for f in fields(kind)] if values else []  # type: ignore[arg-type]
     for key in values:
         if key not in known:
-            raise InvalidInputError(f"{key}: no parameter of solver {name!r}; {_near(key, known)}")
+            # associate and assign hand on what they do not know
+            lines = (removed(f"{owner}({key})") for owner in (name, "associate", "assign"))
+            raise InvalidInputError(
+                next(filter(None, lines), "") or f"{key}: no parameter of solver {name!r}; {_near(key, known)}"
+            )
     try:
         return kind(**values)
     except TypeError as error:

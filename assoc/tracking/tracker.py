@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from assoc._parameters import checked_time_limit, whole_seed
 from assoc._system.door import doors
+from assoc._system.imports import removed_attribute
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
@@ -158,6 +159,9 @@ class Tracker:
             noise = manoeuvre_noise(pace) if kind is None else kind.noise(pace)
             options["filter"] = two_speeds(noise, unscented=open_heights(scene.sensors))
         return cls(scene.sensors, *arguments, region=scene.region, **options)
+
+    if not TYPE_CHECKING:
+        __getattr__ = removed_attribute
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:

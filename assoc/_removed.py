@@ -1,0 +1,22 @@
+"""What existed once, and what to use instead: the one place that answers old spellings.
+
+A removed option, name, argument or value does nothing any more; where it is met, one line says so. The spelling tells
+where:
+
+- ``--flag``: an option of the programs, also as a key of their TOML files; ``--flag value``: one of its values
+- ``assoc.room.name``: a public name of a package
+- ``Class.name``: an attribute or a method
+- ``function(argument)``, ``Class.method(argument)``: an argument by keyword of a function that `door` decorates, or
+  a parameter of a solver, ``aco(argument)``
+"""
+
+from __future__ import annotations
+
+REMOVED: dict[str, str] = {}
+"""By old spelling, the sentence that says what to use instead."""
+
+
+def removed(spelling: str) -> str:
+    """Return the line for something that existed once; empty for all else."""
+    sentence = REMOVED.get(spelling)
+    return f"{spelling} exists no longer: {sentence}" if sentence else ""
