@@ -82,7 +82,7 @@ class EnsembleKalmanFilter(PointFilter[Ensemble]):
         # the members, their noise, and the next ones
         memory.require(24.0 * B * n * self.size, f"size = {self.size}: {B} ensembles", "take fewer members")
         factors = np.linalg.cholesky(state.covariance)
-        shocks = self.rng.standard_normal((B, self.size, n))
+        shocks = self._drawn((B, self.size, n), state.mean)
         return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))
 
     def predict(self, state: Ensemble, dt: float) -> Ensemble:
@@ -96,7 +96,7 @@ class EnsembleKalmanFilter(PointFilter[Ensemble]):
             flat = motion.propagate(members.reshape(-1, n), dt)
             moved, F = np.ascontiguousarray(flat).reshape(B, N, n), _NOTHING3
         out = np.empty(members.shape)
-        move_ensemble(members, F, self.rng.standard_normal((B, N, n)), moved, self._roots(state, dt), out)
+        move_ensemble(members, F, self._drawn((B, N, n), members[:, 0]), moved, self._roots(state, dt), out)
         return _ensemble(out)
 
     def _roots(self, state: Ensemble, dt: float) -> Array:
@@ -117,12 +117,19 @@ class EnsembleKalmanFilter(PointFilter[Ensemble]):
     def _correct(self, state: Ensemble, z: Array, models: Array) -> Update[Ensemble]:
         members = self._points(state)
         (B, N, _), d = members.shape, z.shape[1]
-        shocks = self.rng.standard_normal((B, N, d)) if len(z) else _NOTHING3
+        shocks = self._drawn((B, N, d), z, members[:, 0]) if len(z) else _NOTHING3
         out, rest = np.empty(members.shape), np.empty(B * (d + d * d + 2))
         status = ensemble_update(members, z, models, shocks, out, rest)
         if status != GOOD:
             complain(status)
         return update_of(_ensemble(out), rest, d)
+
+    def _drawn(self, shape: tuple[int, ...], *rows: Array) -> Array:
+        """Standard normal numbers for each of the rows, the same in whatever order these come."""
+        order = np.lexsort(np.concatenate(rows, axis=1).T)
+        shocks = np.empty(shape)
+        shocks[order] = self.rng.standard_normal(shape)
+        return shocks
 
     def _points(self, state: Ensemble) -> Array:
         n = state.members.shape[2]

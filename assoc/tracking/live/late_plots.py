@@ -172,7 +172,7 @@ class LatePlots:
         time, measurements, sectors, identities
             See `Tracker.step`. The sectors are those since the last scan, whatever measurements arrive.
         times : sequence over sensors of arrays (n_s,), optional
-            Each measurement's own time, not after `time`.
+            Each measurement's own time, not after `time`. Late are those not after the last scan's time.
 
         Returns
         -------
@@ -194,7 +194,8 @@ class LatePlots:
         if times is None or now is None:
             return self._finish(self._advance(time, checked, times, sectors, codes), 0, 0)
         stamps = checked_times(times, checked, float(time), "times")
-        on_time = [array >= now for array in stamps]
+        # a scan holds what was measured after the one before, up to its own time
+        on_time = [(array > now) | (array == float(time)) for array in stamps]
         if all(mask.all() for mask in on_time):
             return self._finish(self._advance(time, checked, stamps, sectors, codes), 0, 0)
         before = tracker.state, self.past, self.names, self._decided, self.next_id
@@ -233,11 +234,10 @@ class LatePlots:
         moves, refused = [], 0
         for s, (z, times) in enumerate(zip(measurements, stamps, strict=True)):
             rows = np.flatnonzero(~on_time[s])
-            # a time on the border of two scans belongs to the later one, as for measurements in time
-            scan = np.searchsorted(ends, times[rows], side="right")
+            scan = np.searchsorted(ends, times[rows])
             good = scan < len(ends)
             if first is not None:
-                good &= times[rows] >= first
+                good &= times[rows] > first
             refused += int((~good).sum())
             for k in np.unique(scan[good]).tolist():
                 late = rows[good & (scan == k)]
