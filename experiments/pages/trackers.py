@@ -17,8 +17,6 @@ SHOWN = {
     "joint-probabilistic": "`joint-probabilistic`",
 }
 """Trackers as the results name them, and in the tables; GNN is `nearest-neighbour` with the rule `assignment`."""
-CLOSE = {**SHOWN, "joint-probabilistic, all sensors": "the same, all sensors at once"}
-"""Those of close targets."""
 GOALS = (
     "close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark", "capacity", "live",
 )  # fmt: skip
@@ -90,11 +88,11 @@ def close_targets() -> str:
     rows = [
         [
             label,
-            *(f"{mean(r[f'{label}, {name}: GOSPA'])} / {_tenths(r[f'{label}, {name}: switches'])}" for name in CLOSE),
+            *(f"{mean(r[f'{label}, {name}: GOSPA'])} / {_tenths(r[f'{label}, {name}: switches'])}" for name in SHOWN),
         ]
         for label in labels(r, ", oracle: GOSPA")
     ]
-    return with_size(r, table(["GOSPA, m / switches", *CLOSE.values()], rows))
+    return with_size(r, table(["GOSPA, m / switches", *SHOWN.values()], rows))
 
 
 def close_times() -> str:
@@ -105,8 +103,8 @@ def close_times() -> str:
         time = number(r[f"{start}: CPU time of a scan"].ours, 2)
         return f"{number(r[f'{start}: OSPA(2)'].ours)} / {r[f'{start}: HOTA'].ours:.3f} / {time}"
 
-    rows = [[label, *(cell(f"{label}, {name}") for name in CLOSE)] for label in labels(r, ", oracle: GOSPA")]
-    return table(["OSPA(2), m / HOTA / time of a scan, ms", *CLOSE.values()], rows)
+    rows = [[label, *(cell(f"{label}, {name}") for name in SHOWN)] for label in labels(r, ", oracle: GOSPA")]
+    return table(["OSPA(2), m / HOTA / time of a scan, ms", *SHOWN.values()], rows)
 
 
 def bearings() -> str:

@@ -18,7 +18,6 @@ from experiments.trackers.running import through
 CUTOFF = 500.0
 """Of GOSPA (order 2), OSPA(2) and HOTA, metres."""
 NAMES = ("oracle", *TRACKERS, "GNN")
-AT_ONCE = "joint-probabilistic, all sensors"
 
 
 class Judged(NamedTuple):
@@ -41,8 +40,6 @@ def make(name: str, scene: Scene) -> Tracker:
         return OracleTracker(scene)
     if name == "GNN":
         return TRACKERS["nearest-neighbour"].for_scene(scene, rule="assignment")
-    if name == AT_ONCE:
-        return TRACKERS["joint-probabilistic"].for_scene(scene, all_sensors=True)
     return TRACKERS[name].for_scene(scene)
 
 

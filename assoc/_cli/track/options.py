@@ -56,8 +56,6 @@ _OF_TRACKERS = (
            {"tracker": ("mht-hypothesis",)}),
     Option("max_events", "N", "joint-probabilistic: joint events kept apart at a time (default 4096)", kinds.whole(1),
            {"tracker": ("joint-probabilistic",)}),
-    Option("all_sensors", "", "joint-probabilistic: all sensors of a scan at once, not one after the other",
-           only={"tracker": ("joint-probabilistic",)}),
     Option("rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver",
            kinds.OneOf(("greedy", "assignment")), {"tracker": ("nearest-neighbour",)}),
 )  # fmt: skip
@@ -197,6 +195,9 @@ def track_parser() -> Parser:
     parser.declare(*OF_SCENES, group="options for scenes")
     parser.declare(*OF_PLOTS, group="options for plots")
     parser.elsewhere = lambda: {flag_of(option.name): "assoc live" for option in LIVE[1:]}
+    parser.gone = {
+        "--all-sensors": "joint-probabilistic takes one sensor after the other; multi-sensor takes all at once"
+    }
     return parser
 
 

@@ -338,12 +338,10 @@ def _put(states: Any, rows: Array, new: Any) -> Any:
     return state_from(type(states), arrays)
 
 
-def grow_timed_tuples(
-    scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int, margin: float = 0.0
-) -> TimedTuples:
+def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TimedTuples:
     """Candidate tuples of tracks, or of new targets, and one measurement or none of each sensor.
 
-    `margin`: as in `assoc.costs.tracks.tuples.grow_track_tuples`. LimitExceededError for more than `max_tuples`.
+    LimitExceededError for more than `max_tuples`.
     """
     count, width = len(scan.states), len(scan.sensors)
     track, anchor = np.arange(count), np.arange(count)
@@ -369,9 +367,9 @@ def grow_timed_tuples(
         track = np.concatenate([track, track[new.parent], np.full(len(starts), -1)])
         anchor = np.concatenate([anchor, anchor[new.parent], start_anchor])
         done.append(s)
-    # with the margin not cheaper than a track all missed: its measurements are better false alarms, at cost 0
+    # not cheaper than a track all missed: its measurements are better false alarms, at cost 0
     good = (track < 0) | ~rows.any(axis=1)
-    good[~good] = costs[~good] < alone[track[~good]] + margin
+    good[~good] = costs[~good] < alone[track[~good]]
     order = np.flatnonzero(good)
     order = order[np.lexsort((*rows[order].T[::-1], track[order]))]
     return TimedTuples(track[order], rows[order], costs[order])

@@ -42,7 +42,6 @@ from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.pairs.permutations import without_permutations
-from assoc.tracking.associate import joint_tuples
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
 from assoc.tracking.method import Method
@@ -114,15 +113,12 @@ class JointProbabilistic(Method):
 
     max_events: int = 4096
     permutations: Permutations = "best"
-    all_sensors: bool = False
 
     def __post_init__(self) -> None:
         if self.permutations not in get_args(Permutations):
             raise InvalidInputError(f"permutations must be 'best' or 'all', got {self.permutations!r}")
         if not is_whole(self.max_events, 1):
             raise InvalidInputError(f"max_events must be a whole number above 0, got {self.max_events!r}")
-        if not isinstance(self.all_sensors, bool):
-            raise InvalidInputError(f"all_sensors must be True or False, got {self.all_sensors!r}")
         object.__setattr__(self, "max_events", int(self.max_events))
 
     def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> tuple[PairProbabilities, ...]:
@@ -147,8 +143,6 @@ class JointProbabilistic(Method):
 
     def at_once(self, progress: Progress) -> Association:
         """Process sensor after sensor; measurements that probably belong to no track start new ones."""
-        if self.all_sensors:
-            return _named(joint_tuples.at_once(progress, self.permutations, self.max_events))
         settings, time, tracks = progress.settings, progress.scan.time, progress.state.tracks
         terms = settings.terms
         seen = np.zeros(len(tracks), dtype=np.bool_)
@@ -177,8 +171,6 @@ class JointProbabilistic(Method):
 
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """The same where measurements have times of their own."""
-        if self.all_sensors:
-            return _named(joint_tuples.in_order(progress, timed, self.permutations, self.max_events))
         terms, tracks = progress.settings.terms, progress.state.tracks
         misses = timed.misses(terms)
         # the sensors processed so far: only they can have missed a track
@@ -240,11 +232,6 @@ class JointProbabilistic(Method):
         return PairProbabilities(track_id[track], measurement, *known, share), update
 
 
-def _named(found: Association) -> Association:
-    """An association with the probabilities of each sensor as users see them."""
-    return found._replace(method_state=tuple(PairProbabilities(*pairs) for pairs in found.method_state))
-
-
 def _take_in(
     tracks: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
 ) -> tuple[TrackBatch, Array]:
@@ -283,15 +270,11 @@ class JointProbabilisticTracker(Tracker):
         As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
     max_events : int
         Largest table of partially summed joint events for a cluster of tracks and measurements (4096). Where a cluster
-        would need more entries, its least likely pairs are left out: larger tables give narrower intervals. With
-        `all_sensors` nothing is left out of such a cluster: its probabilities are estimates, within wide bounds.
+        would need more entries, its least likely pairs are left out: larger tables give narrower intervals.
     permutations : "best" or "all"
         Which joint events that detect the same tracks by the same measurements determine the states: the best one
         (JPDA*), or all (JPDA, which draws tracks side by side together). Existence and `probabilities` always come
         from all.
-    all_sensors : bool
-        Whether to associate all sensors of a scan at once, by joint events of tracks and tuples of measurements, not
-        sensor after sensor; see `assoc.tracking.associate.joint_tuples`.
     **options
         As for `Tracker`.
     """
