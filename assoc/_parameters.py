@@ -125,7 +125,7 @@ def refuse_gone(given: Iterable[str], gone: Mapping[str, str]) -> None:
             raise InvalidInputError(f"{name} is gone: {gone[name]}")
 
 
-def checked_time_limit(time_limit: object) -> float | None:
+def checked_time_limit(time_limit: object, name: str = "time_limit") -> float | None:
     """Return a time limit as a float, or None; refuse anything but seconds above 0."""
     if time_limit is None:
         return None
@@ -133,7 +133,7 @@ def checked_time_limit(time_limit: object) -> float | None:
     if isinstance(limit, Real) and not isinstance(limit, bool) and limit > 0:  # type: ignore[operator]
         # clocks of libraries end before that
         return float(limit) if limit <= _FOREVER else math.inf
-    raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    raise InvalidInputError(f"{name}: expected seconds > 0, got {time_limit!r}")
 
 
 class Parameters:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +19,14 @@ from assoc._cli.options import Given, read_first
 from assoc._cli.program import Program
 from assoc._cli.progress import ProgressBar
 from assoc._cli.signals import Interruption
-from assoc._cli.sweep.options import SHOWN, make_study, read_options, tune_parameters
+from assoc._cli.sweep.options import OUTPUTS, SHOWN, make_study, read_comparison, read_options, tune_parameters
 from assoc._cli.sweep.options import parser as parser
 from assoc._text.plain import printable
+from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from assoc.sweeps.study import Counts, Study
 
 # seconds between two lines of -v
@@ -32,6 +35,12 @@ _INTERRUPTION = Interruption("assoc.sweep")
 
 
 def _sweep(words: list[str]) -> None:
+    if words[:1] == ["import"]:
+        _import(words[1:])
+        return
+    if words[:1] == ["compare"]:
+        _compare(read_comparison(words[1:]))
+        return
     import_modules(read_first(words, "import")["import"])
     given, tables = read_options(words)
     with messages(given):
@@ -57,30 +66,54 @@ def _report(folder: str, given: Given, study: Study | None) -> None:
     """Print the table of a folder, only of the study's settings if one is given; write the requested outputs."""
     from assoc._cli.sweep.tables import print_study
     from assoc.sweeps.frame import load
-    from assoc.sweeps.store import damaged_lines
-    from assoc.sweeps.summary import summarize
+    from assoc.sweeps.summary import summarize, summary_rows
 
     frame = load(folder)
     if study is not None:
         frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
     table = summarize(frame)
     print_study(table, len(table) if given["all"] else SHOWN)
-    damaged = damaged_lines(folder)
-    if damaged and study is None:
-        print_lines(f"{damaged} damaged lines of the log are ignored; the same sweep again repeats their runs")
-    if given["csv"]:
-        from assoc._files.output import write_text
+    _write_table(given["csv"], table, lambda: summary_rows(table))
+    if given["heatmap"] or given["convergence"]:
+        from assoc.plotting.study_figures import draw_convergence, draw_heat_maps
 
-        write_text(given["csv"], table.to_csv(index=False, lineterminator="\n"))
-    if given["plot"]:
-        from assoc.plotting.study_figures import draw_study
-
-        for path in draw_study(folder, frame):
+        drawn = draw_heat_maps(frame, given["heatmap"]) if given["heatmap"] else []
+        drawn += [draw_convergence(folder, given["convergence"], frame)] if given["convergence"] else []
+        for path in drawn:
             print_lines(f"drawn: {printable(str(path))}")
     if given["report"]:
         from assoc.plotting.report import write_sweep_report
 
         write_sweep_report(given["report"], folder, frame, words=given.words)
+
+
+def _write_table(file: str | None, table: pd.DataFrame, rows: Callable[[], tuple[list[str], list[list[str]]]]) -> None:
+    """Write a table as CSV, or its rows for LaTeX."""
+    from assoc._files.output import write_text
+    from assoc.sweeps.summary import latex
+
+    if file:
+        write_text(file, latex(*rows()) if file.endswith(".tex") else table.to_csv(index=False, lineterminator="\n"))
+
+
+def _compare(given: Given) -> None:
+    from assoc._cli.sweep.tables import print_comparison
+    from assoc.sweeps.comparison import compare
+    from assoc.sweeps.summary import comparison_rows
+
+    table = compare(given["folder"], given["first"], given["second"])
+    print_comparison(table, given["first"], given["second"])
+    _write_table(given["csv"], table, lambda: comparison_rows(table))
+
+
+def _import(words: list[str]) -> None:
+    from assoc.sweeps.old_form import import_study
+
+    if len(words) != 2:
+        raise InvalidInputError("import: expected two folders: assoc sweep import OLD NEW")
+    runs, damaged = import_study(*words)
+    left_out = f"; {damaged} damaged lines are left out" if damaged else ""
+    print_lines(f"{runs} runs in {printable(words[1])}{left_out}")
 
 
 def _tune(given: Given) -> None:
@@ -89,7 +122,7 @@ def _tune(given: Given) -> None:
     with _watched(given) as progress:
         report = tune_parameters(given, progress)
     print_tuning(report)
-    if given["plot"] or given["csv"] or given["report"]:
+    if any(given[name] for name in OUTPUTS):
         _report(given["output"], given, None)
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LABELS = {
+    "excess": "mean excess",
     "gap": "mean gap",
     "optimal": "certified optimal, %",
     "iterations": "mean iterations",
@@ -39,7 +40,7 @@ def plot_heat_map(
     study : DataFrame
         Runs of one solver, from ``assoc.sweeps.load``.
     measure : str
-        "gap", "optimal", "iterations", "time", "cost" or "correct".
+        "excess" (over the best known cost), "gap", "optimal", "iterations", "time", "cost" or "correct".
     parameters : sequence of two str, optional
         Horizontal and vertical; default: the first two that vary. Means are over all others.
     ax : matplotlib Axes, optional

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_atomically
-from assoc._files.reading import check_regular
 from assoc._system.imports import load_extra
 from assoc.errors import InvalidInputError
 from assoc.plotting.colours import DASHES, colour
@@ -23,31 +22,40 @@ from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 if TYPE_CHECKING:
     import pandas as pd
 
-_PANELS = ("gap", "optimal", "iterations", "time")
+_PANELS = ("excess", "gap", "optimal", "iterations", "time")
 _MOST_CELLS = 12
 _MOST_COLUMNS = 6
 _MOST_CURVES = 8
 
 
-def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> list[Path]:
-    """Draw the heat maps and the convergence curves of a study, or of the runs in `frame`, into its folder.
+def draw_heat_maps(frame: pd.DataFrame, path: str | os.PathLike[str]) -> list[Path]:
+    """Draw the heat maps of a study's runs as PNG, PDF or SVG, by the file's ending; returns the files.
 
-    The files are ``heatmap.png`` (one for each solver, with its name, if there are several) and ``convergence.png``. A
-    study without runs is refused.
+    With several solvers each has a file, with its name before the ending. None is drawn where no parameter varies.
     """
-    frame = load(folder) if frame is None else frame
-    if frame.empty:
-        raise InvalidInputError(f"{folder}: the study has no runs yet, there is nothing to draw")
+    _require_runs(frame)
+    path, drawn = Path(path), []
     parts = [(str(solver), part) for solver, part in frame.groupby("solver")]
-    drawn = []
     for solver, part in parts:
-        if not varied(part):
-            continue
-        # the solver's name comes from a file: it must not lead to another folder
-        name = "heatmap.png" if len(parts) == 1 else "heatmap-" + re.sub(r"[^\w.-]", "_", solver) + ".png"
-        drawn.append(_save(folder, name, heat_maps(part, new_figure())))
-    drawn.append(_save(folder, "convergence.png", convergence(frame, load_traces(folder), new_figure())))
+        if varied(part):
+            # the solver's name comes from a file: it must not lead to another folder
+            name = path.stem + ("" if len(parts) == 1 else "-" + re.sub(r"[^\w.-]", "_", solver))
+            drawn.append(save_figure(path.with_name(name + path.suffix), heat_maps(part, new_figure())))
     return drawn
+
+
+def draw_convergence(
+    folder: str | os.PathLike[str], path: str | os.PathLike[str], frame: pd.DataFrame | None = None
+) -> Path:
+    """Draw how the runs of a study, or those in `frame`, converged, as PNG, PDF or SVG; returns the file."""
+    frame = load(folder) if frame is None else frame
+    _require_runs(frame)
+    return save_figure(Path(path), convergence(frame, load_traces(folder), new_figure()))
+
+
+def _require_runs(frame: pd.DataFrame) -> None:
+    if frame.empty:
+        raise InvalidInputError("the study has no runs yet, there is nothing to draw")
 
 
 def new_figure() -> Any:
@@ -57,15 +65,9 @@ def new_figure() -> Any:
     return figure
 
 
-def _save(folder: Any, name: str, figure: Any) -> Path:
-    path = Path(folder) / name
-    check_regular(path)  # the folder may contain a symbolic link, which must not be followed
-    return save_png(path, figure)
-
-
-def save_png(path: Path, figure: Any) -> Path:
-    """Write a figure, whole or not at all; returns the path."""
-    write_atomically(path, lambda file: figure.savefig(file, format="png", dpi=130))
+def save_figure(path: Path, figure: Any) -> Path:
+    """Write a figure in the format of its file's ending, whole or not at all; returns the path."""
+    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower() or "png", dpi=130))
     return path
 
 
@@ -133,26 +135,26 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[str], figur
 def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     """Draw the mean cost above the best known, over iterations and over time, one curve for each setting.
 
-    The eight settings with the smallest mean gaps are named, the others are grey. Returns the figure.
+    The eight settings with the smallest mean excess are named, the others are grey. Returns the figure.
     """
     traces = with_excess(frame, traces)
-    summary = summarize(frame).sort_values(["gap", "time"], kind="stable")
+    summary = summarize(frame).sort_values(["excess", "time"], kind="stable")
     names = varied(frame)
     several = frame["solver"].nunique() > 1
     figure.set_size_inches(11, 4.5)
     axes = figure.subplots(1, 2, sharey=True)
-    for ax, column, label in zip(axes, ("iteration", "seconds"), ("iteration", "ms"), strict=True):
+    for ax, column, unit in zip(axes, ("iteration", "seconds"), ("iteration", "ms"), strict=True):
         # drawn from the last to the first, so that the best lie on top
         for rank, row in reversed([*enumerate(summary.to_dict("records"))]):
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if rank < _MOST_CURVES:
-                label = setting_title(row, names, several)
                 line = {"color": colour(rank), "linestyle": DASHES[rank % len(DASHES)]}
-                style = {**line, "linewidth": 1.6, "zorder": 3, "label": label}
+                style = {**line, "linewidth": 1.6, "zorder": 3}
+                style["label"] = setting_title(row, names, several)
             draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
             ax.set_xscale("log")
-        ax.set_xlabel(label)
+        ax.set_xlabel(unit)
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("mean cost above the best known")
     axes[0].set_yscale("symlog", linthresh=1e-3)

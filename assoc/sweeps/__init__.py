@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
+    from assoc.sweeps.comparison import compare
     from assoc.sweeps.design import grid, random_settings, settings_from
     from assoc.sweeps.frame import load, load_traces
     from assoc.sweeps.setting import Setting
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Setting",
     "Study",
+    "compare",
     "grid",
     "load",
     "load_traces",
@@ -35,6 +37,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "Setting": "setting",
         "Study": "study",
+        "compare": "comparison",
         "grid": "design",
         "load": "frame",
         "load_traces": "frame",

@@ -55,12 +55,11 @@ class Batches:
 
     def learn(self, result: Result) -> None:
         """Learn from the time of a batch; time outside the solvers is shared among its runs."""
-        columns = result.columns
-        times = [time or 0.0 for time in columns["time"]]
+        times = result.times()
         beside = max(0.0, result.seconds - sum(times)) / len(times)
         sums: dict[str, list[float]] = {}
-        for key, seconds in zip(columns["setting"], times, strict=True):
-            sums.setdefault(key, []).append(seconds + beside)
+        for row, seconds in zip(result.rows, times, strict=True):
+            sums.setdefault(row[0], []).append(seconds + beside)
         for setting in result.batch.settings:
             mean = sum(sums[setting.key]) / len(sums[setting.key])
             self._of_setting[setting.key] = _mixed(self._of_setting.get(setting.key), mean)

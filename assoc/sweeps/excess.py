@@ -15,7 +15,7 @@ _CURVE_POINTS = 60
 
 def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
     """Traces of the runs of a frame; the column ``excess`` is the cost above the best known one of the scan."""
-    best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
+    best = (frame["cost"] - frame["excess"]).groupby([frame["scene"], frame["scan"]]).min().rename("best")
     traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
     excess = traces["cost"] - traces["best"]
     # rounding errors do not count as excess

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from assoc._system.door import door
+from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
-from assoc.sweeps.store import COLUMNS, Manifest, read_log, read_manifest, run_keys
+from assoc.sweeps.store import COLUMNS, Store
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,6 +22,7 @@ RESULTS = (
     "scan",
     "cost",
     "lower_bound",
+    "excess",
     "gap",
     "optimal",
     "iterations",
@@ -49,7 +50,8 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
         ``solver``; the parameters (empty where a solver does not have one; a parameter with the name of a result,
         such as ``iterations``, is ``parameter_iterations``); ``repeat``; ``seed`` (``assoc.assign`` with this
         seed repeats the run); ``scene`` (the name of scene or problem), ``scan``; ``cost``,
-        ``lower_bound``, ``gap``, ``optimal``; ``iterations``; ``time`` in the solver, seconds; ``stopped_by``;
+        ``lower_bound``, ``excess`` (cost less the least that any run of the folder has found for this scan), ``gap``,
+        ``optimal``; ``iterations``; ``time`` in the solver, seconds; ``stopped_by``;
         ``true_tuples``, ``correct_tuples`` (empty if the truth is unknown); ``setting`` (its key).
 
     Raises
@@ -59,21 +61,22 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    manifest, settings, runs = _read(folder)
-    columns = {name: [run[i] for run in runs] for i, name in enumerate(COLUMNS)}
-    frame = pd.DataFrame({"solver": [settings[key]["solver"] for key in columns["setting"]]}, dtype="str")
-    parameters = list(dict.fromkeys(name for setting in settings.values() for name in setting["parameters"]))
-    for name in parameters:
-        values = {key: _plain(setting["parameters"].get(name)) for key, setting in settings.items()}
-        column = pd.Series([values[key] for key in columns["setting"]])
-        frame[column_of(name)] = column
+    with Store(folder) as store:
+        sources, settings = store.manifest.sources, store.settings()
+        runs = [run for run in store.select(f"{', '.join(COLUMNS[:-1])} FROM runs") if run[0] in settings]
+    columns = {name: [run[i] for run in runs] for i, name in enumerate(COLUMNS[:-1])}
+    frame = pd.DataFrame({"solver": [settings[key][0] for key in columns["setting"]]}, dtype="str")
+    for name in dict.fromkeys(name for _, parameters in settings.values() for name in parameters):
+        values = {key: _plain(parameters.get(name)) for key, (_, parameters) in settings.items()}
+        frame[column_of(name)] = pd.Series([values[key] for key in columns["setting"]])
     for name in ("repeat", "seed"):
         frame[name] = np.array(columns[name], dtype=np.int64)
-    frame["scene"] = pd.Series([manifest.sources.get(key, key) for key in columns["source"]], dtype="str")
+    frame["scene"] = pd.Series([sources.get(key, key) for key in columns["source"]], dtype="str")
     frame["scan"] = np.array(columns["scan"], dtype=np.int64)
     frame["cost"] = np.array(columns["cost"], dtype=float)
     bound = np.array(columns["lower_bound"], dtype=float)
     frame["lower_bound"] = np.where(np.isnan(bound) & ~np.isnan(frame["cost"]), -np.inf, bound)
+    frame["excess"] = _excess(frame)
     frame["gap"] = frame["cost"] - frame["lower_bound"]
     frame["optimal"] = frame["gap"] <= OPTIMALITY_TOLERANCE * np.maximum(1.0, frame["cost"].abs())
     frame["iterations"] = pd.array(columns["iterations"], dtype="Int64")
@@ -82,12 +85,19 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     for name in ("true_tuples", "correct_tuples"):
         frame[name] = pd.array(columns[name], dtype="Int64")
     frame["setting"] = pd.Series(columns["setting"], dtype="str")
-    order = ["solver", *map(column_of, parameters), "scene", "scan", "repeat"]
+    order = [*frame.columns[: list(frame.columns).index("repeat")], "scene", "scan", "repeat"]
     return frame.sort_values(order, kind="stable", ignore_index=True)
 
 
+def _excess(frame: pd.DataFrame) -> pd.Series[Any]:
+    """Cost above the best known one of the same scan; rounding errors do not count."""
+    best = frame.groupby(["scene", "scan"])["cost"].transform("min")
+    excess = frame["cost"] - best
+    return excess.mask(excess <= 1e-9 * best.abs().clip(lower=1.0), 0.0)
+
+
 def _plain(value: Any) -> Any:
-    """Return a value that can be sorted: lists, tables and long numbers of an edited log become text."""
+    """Return a value that can be sorted: lists, tables and long numbers of an edited file become text."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return str(value)
     return value if value is None or isinstance(value, (str, bool, int, float)) else str(value)
@@ -114,33 +124,13 @@ def load_traces(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    manifest, _, runs = _read(folder)
-    index = {name: i for i, name in enumerate(COLUMNS)}
-    rows = [
-        (run[index["setting"]], manifest.sources.get(run[index["source"]]), run[index["scan"]], run[index["repeat"]])
-        + tuple(point)
-        for run in runs
-        for point in run[index["trace"]]
-    ]
-    return pd.DataFrame(rows, columns=["setting", "scene", "scan", "repeat", "iteration", "seconds", "cost"])
-
-
-def _read(folder: str | os.PathLike[str]) -> tuple[Manifest, dict[str, Any], list[tuple[Any, ...]]]:
-    manifest = read_manifest(folder)
-    settings: dict[str, Any] = {}
-    runs: dict[Any, tuple[Any, ...]] = {}
-    for entry in read_log(folder):
-        if entry is None:
-            continue
-        if "setting_key" in entry:
-            settings[entry["setting_key"]] = entry
-            continue
-        for key, row in zip(run_keys(entry), _rows(entry), strict=True):
-            # each run once, even if two processes should have done it
-            runs.setdefault(key, row)
-    known = [row for row in runs.values() if row[0] in settings]
-    return manifest, settings, known
-
-
-def _rows(batch: dict[str, list[Any]]) -> Iterator[tuple[Any, ...]]:
-    return zip(*(batch[name] for name in COLUMNS), strict=True)
+    with Store(folder) as store:
+        sources, runs = store.manifest.sources, store.select("setting, source, scan, repeat, trace FROM runs")
+    keys = [(setting, sources.get(source, source), scan, repeat) for setting, source, scan, repeat, _ in runs]
+    traces = [np.frombuffer(run[-1], dtype="<f8").reshape(-1, 3) for run in runs]
+    points = np.concatenate([np.empty((0, 3)), *traces])
+    if not np.isfinite(points).all() or np.abs(points[:, 0]).max(initial=0.0) > 2.0**53:
+        raise InvalidInputError(f"{store.path}: is damaged (a trace holds what is no number)")
+    frame = pd.DataFrame(keys, columns=["setting", "scene", "scan", "repeat"])
+    frame = frame.loc[np.repeat(np.arange(len(runs)), [len(trace) for trace in traces])].reset_index(drop=True)
+    return frame.assign(iteration=points[:, 0].astype(np.int64), seconds=points[:, 1], cost=points[:, 2])

@@ -1,93 +1,125 @@
-"""The folder of a study: a manifest, and a log to which results are appended.
+"""The folder of a study: one SQLite file, beside its parameters as JSON for people to read.
 
-A line of the log is the checksum of the rest of the line, a blank, and JSON: a setting, or a batch of runs as columns.
-A truncated line (after a power failure or a killed process) fails its checksum and is skipped; the
-next entry begins on a new line of the file. So finished batches are never lost.
+A batch of runs is one transaction, so that whatever ends a process leaves all of a batch or none of it. The key of a
+run is the primary key of its table: nothing is there twice, also if several processes work on one study.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from assoc._files.output import write_text
-from assoc._files.reading import open_regular
+from assoc._files.reading import check_regular
+from assoc._parameters import checked_time_limit, is_whole
 from assoc.errors import InvalidInputError
 from assoc.sweeps.setting import Setting
 
 FORMAT = "assoc.study"
-VERSION = 1
-MANIFEST = "study.json"
-LOG = "runs.jsonl"
+VERSION = 2
+DATABASE = "study.sqlite"
+PARAMETERS = "study.json"
 REPORT = "tuning.json"
+OLD_LOG = "runs.jsonl"
+"""The file of runs of version 1."""
+FILES = (DATABASE, PARAMETERS, REPORT)
 
-# bytes of the manifest, and of a line of the log; a batch has a few thousand runs
+KEPT = "finished runs are kept, and the same command goes on from there"
+
+_APPLICATION = 0x6173736F
+# seconds to wait for another process that writes
+_PATIENCE = 60.0
+# bytes of a text or blob in the file
 _LONGEST = 32_000_000
-_NEW_MANIFEST = (
-    f"the runs in {LOG} are not affected: start the same sweep in a new folder, and copy its {MANIFEST} here"
-)
 
-COLUMNS = (
-    "setting",
-    "source",
-    "repeat",
-    "scan",
-    "seed",
-    "cost",
-    "lower_bound",
-    "iterations",
-    "time",
-    "stopped_by",
-    "true_tuples",
-    "correct_tuples",
-    "trace",
-)
-"""Columns of a batch, each a list with one entry per run. ``setting`` and ``source`` are keys."""
+_KINDS = {
+    **dict.fromkeys(("setting", "source"), ("text",)),
+    **dict.fromkeys(("repeat", "scan", "seed"), ("integer",)),
+    **dict.fromkeys(("cost", "lower_bound"), ("real", "null")),
+    "iterations": ("integer", "null"),
+    "time": ("real", "null"),
+    "stopped_by": ("text", "null"),
+    **dict.fromkeys(("true_tuples", "correct_tuples"), ("integer", "null")),
+    "trace": ("blob",),
+}
+COLUMNS = tuple(_KINDS)
+"""Columns of a run. ``setting`` and ``source`` are keys; ``trace``: iteration, seconds, cost as float64 in turn."""
 
 RunKey = tuple[str, str, int, int]
 """Key of the setting, fingerprint of the source, repeat, scan."""
+
+
+def _table(name: str, kinds: Mapping[str, Sequence[str]], *rest: str) -> str:
+    """SQL of a table whose columns hold values of some kinds alone: `PRAGMA quick_check` looks at them."""
+    columns = [
+        f"{column} {kind[0].upper()} CHECK (typeof({column}) IN ({', '.join(map(repr, kind))}))"
+        for column, kind in kinds.items()
+    ]
+    return f"CREATE TABLE {name} ({', '.join([*columns, *rest])}) WITHOUT ROWID"
+
+
+_TABLES = (
+    _table("study", {"manifest": ("text",)}, "PRIMARY KEY (manifest)"),
+    _table("settings", dict.fromkeys(("key", "solver", "parameters"), ("text",)), "PRIMARY KEY (key)"),
+    _table("runs", _KINDS, "CHECK (length(trace) % 24 = 0)", "PRIMARY KEY (setting, source, repeat, scan)"),
+)
 
 
 @dataclass(frozen=True)
 class Manifest:
     """Properties that all runs of a study share; a folder takes the runs of one study only."""
 
-    package: str
+    assoc: str
     """Version of assoc."""
     seed: int
     sources: Mapping[str, str]
     """Fingerprint to name."""
     time_limit: float | None
+    cpu_limit: float | None
     gating: Mapping[str, Any]
     """Options of ``assoc.build_problem``."""
-    code: str = ""
+    code: str
     """Digest of the solvers' and costs' source files; empty if unknown."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of the file."""
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "assoc": self.package,
-            "code": self.code,
-            "seed": self.seed,
-            "sources": [{"fingerprint": key, "name": name} for key, name in self.sources.items()],
-            "time_limit": self.time_limit,
-            "gating": dict(self.gating),
-        }
+    def to_text(self) -> str:
+        """Return the manifest as JSON."""
+        return json.dumps({"format": FORMAT, "version": VERSION, **asdict(self)}, indent=1) + "\n"
+
+    @staticmethod
+    def from_text(text: str | bytes, path: Path) -> Manifest:
+        """Read a manifest, of this version or of version 1."""
+        content = parsed(text, path)
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}")
+        if content.get("version") not in (1, VERSION):
+            raise InvalidInputError(
+                f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}"
+            )
+        try:
+            sources = content["sources"]
+            if isinstance(sources, list):  # version 1
+                sources = {source["fingerprint"]: source["name"] for source in sources}
+            time, cpu = (checked_time_limit(content.get(name), name) for name in ("time_limit", "cpu_limit"))
+            code = content.get("code", "")
+            texts = [content["assoc"], code, *sources, *sources.values()]
+            if not all(isinstance(one, str) for one in texts) or not is_whole(content["seed"], 0):
+                raise TypeError("a text or number of another kind")
+            return Manifest(content["assoc"], content["seed"], dict(sources), time, cpu, dict(content["gating"]), code)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
 
     def check_same(self, new: Manifest, folder: Path) -> None:
         """Refuse to continue with another study."""
         elsewhere = "take another folder"
-        if self.package != new.package:
+        if self.assoc != new.assoc:
             raise InvalidInputError(
-                f"{folder}: this study was made by version {self.package} of assoc, this is {new.package}; {elsewhere}"
+                f"{folder}: this study was made by version {self.assoc} of assoc, this is {new.assoc}; {elsewhere}"
             )
         if self.code and new.code and self.code != new.code:
             raise InvalidInputError(
@@ -98,243 +130,164 @@ class Manifest:
             missing = [name for key, name in self.sources.items() if key not in new.sources]
             what = f"{strange[0]} is not among its sources" if strange else f"{missing[0]} of it is not given"
             raise InvalidInputError(f"{folder}: holds a study of other scenes or problems: {what}; {elsewhere}")
-        for name in ("seed", "time_limit", "gating"):
+        for name in ("seed", "time_limit", "cpu_limit", "gating"):
             old, now = getattr(self, name), getattr(new, name)
             if old != now:
                 raise InvalidInputError(f"{folder}: this study was begun with {name} {old}, not {now}; {elsewhere}")
 
 
-class Store:
-    """An open study folder, made if missing; only one process at a time may write to it.
+def parsed(text: str | bytes, path: Path) -> Any:
+    """Return JSON that holds no infinite number and no half of a character, or refuse it in a line."""
+    try:
+        content = json.loads(text)
+        json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{path}: is damaged ({str(error)[:100]})") from None
+    return content
 
-    Refused is a folder that holds another study (by its manifest) or something else, or that is used or not writable.
+
+class Store:
+    """An open study.
+
+    With a manifest its folder is made if missing, and refused if it holds another study or something else; without, the
+    study must be there.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest) -> None:
+    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest | None = None) -> None:
         self.folder = Path(folder)
+        self.path = self.folder / DATABASE
+        if manifest is not None:
+            self._make_folder()
+        elif not self.folder.is_dir():
+            raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")
+        for name in (DATABASE, *(DATABASE + ending for ending in ("-journal", "-wal", "-shm")), PARAMETERS):
+            check_regular(self.folder / name)
+        new = not self.path.exists()
+        if new and (self.folder / OLD_LOG).exists():
+            raise InvalidInputError(
+                f"{folder}: this study has the form of an earlier version; read it into a new folder: "
+                f"assoc sweep import {folder} NEW"
+            )
+        if new and manifest is None:
+            raise InvalidInputError(f"{folder}: holds no study ({DATABASE} is missing)")
+        if new and not all(path.name.startswith(FILES) for path in self.folder.glob("[!.]*")):
+            raise InvalidInputError(f"{folder}: contains other files and no study; use a new or an empty folder")
+        with self._explained("read" if manifest is None else "written"):
+            mode = "rw" if manifest is None else "rwc"
+            uri = f"{self.path.absolute().as_uri()}?mode={mode}"
+            self._db = sqlite3.connect(uri, timeout=_PATIENCE, isolation_level=None, uri=True)
+        try:
+            self._begin(manifest)
+        except BaseException:
+            self._db.close()
+            raise
+
+    def _make_folder(self) -> None:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InvalidInputError(f"{self.folder}: cannot be made ({reason})") from None
-        if not (self.folder / MANIFEST).exists() and (self.folder / LOG).exists():
-            raise InvalidInputError(f"{self.folder}: {MANIFEST} is missing; {_NEW_MANIFEST}")
-        if not (self.folder / MANIFEST).exists() and any(self.folder.glob("[!.]*")):
-            raise InvalidInputError(f"{self.folder}: contains other files and no study; use a new or an empty folder")
-        self._lock = _lock(self.folder)
+
+    def _begin(self, manifest: Manifest | None) -> None:
+        """Make the tables where there are none, and look whether all is as it was written."""
+        with self._explained("read" if manifest is None else "written"):
+            self._db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
+            self._db.execute("PRAGMA trusted_schema = OFF")
+            if manifest is not None:
+                self._db.execute("BEGIN IMMEDIATE")
+                if not self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+                    for table in _TABLES:
+                        self._db.execute(table)
+                    self._db.execute("INSERT INTO study VALUES (?)", (manifest.to_text(),))
+                    self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
+                    self._db.execute(f"PRAGMA user_version = {VERSION}")
+                self._db.execute("COMMIT")
+            self._check()
+            (text,) = self._db.execute("SELECT manifest FROM study").fetchone() or ("",)
+        self.manifest = Manifest.from_text(text, self.path)
+        if manifest is not None:
+            self.manifest.check_same(manifest, self.folder)
+            if not (self.folder / PARAMETERS).exists():
+                write_text(self.folder / PARAMETERS, self.manifest.to_text())
+
+    def _check(self) -> None:
+        """Refuse what is no study, or damaged: with these tables alone, reading takes no longer than the file is."""
+        identity = [self._db.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version")]
+        if identity[0] != _APPLICATION:
+            raise InvalidInputError(f"{self.path}: is no study of assoc")
+        if identity[1] != VERSION:
+            raise InvalidInputError(f"{self.path}: has version {identity[1]}, this program reads version {VERSION}")
+        tables = [sql for (sql,) in self._db.execute("SELECT sql FROM sqlite_master ORDER BY rootpage LIMIT 9")]
+        if tables != list(_TABLES):
+            raise InvalidInputError(f"{self.path}: is damaged (its tables are not those of a study)")
+        (found,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+        if found != "ok":
+            reason = " ".join(str(found).split())[:100]
+            raise InvalidInputError(f"{self.path}: is damaged ({reason})")
+
+    @contextmanager
+    def _explained(self, what: str) -> Iterator[None]:
+        """Turn errors of SQLite into one line."""
         try:
-            if (self.folder / MANIFEST).exists():
-                read_manifest(self.folder).check_same(manifest, self.folder)
-            else:
-                write_text(self.folder / MANIFEST, json.dumps(manifest.to_dict(), indent=1) + "\n")
-            self.settings: set[str] = set()
-            self.done: set[RunKey] = set()
-            for entry in filter(None, read_log(self.folder)):
-                if "setting_key" in entry:
-                    self.settings.add(entry["setting_key"])
-                else:
-                    self.done.update(run_keys(entry))
-            self._log = self._open_log()
-        except BaseException:
-            self._lock.close()
-            raise
+            yield
+        except (sqlite3.Error, OSError, UnicodeError) as error:
+            reason = " ".join(str(error).split())[:200]
+            raise InvalidInputError(f"{self.path}: cannot be {what} ({reason})") from None
 
-    def _open_log(self) -> IO[bytes]:
-        path = self.folder / LOG
-        try:
-            log = open_regular(path, "ab")
-            if log.tell() > 0:
-                with open_regular(path) as written:
-                    written.seek(-1, os.SEEK_END)
-                    if written.read(1) != b"\n":
-                        log.write(b"\n")
-        except OSError as error:
-            raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        return log
+    def select(self, words: str, values: Sequence[object] = ()) -> list[tuple[Any, ...]]:
+        """Rows of a query."""
+        with self._explained("read"):
+            return self._db.execute(f"SELECT {words}", values).fetchall()
 
-    def append(self, settings: Sequence[Setting], batch: Mapping[str, list[Any]]) -> int:
-        """Write a batch (`COLUMNS`) with its new settings, wait until it is on the disk; return the number of new runs.
+    def done(self) -> frozenset[RunKey]:
+        """Keys of the runs that are there."""
+        return frozenset(self.select("setting, source, repeat, scan FROM runs"))
 
-        Runs that are already saved are left out. If the file cannot be written (the disk is full), what was saved
+    def settings(self) -> dict[str, tuple[str, dict[str, Any]]]:
+        """By its key, the solver and the parameters of each setting."""
+        found = {}
+        for key, solver, text in self.select("key, solver, parameters FROM settings ORDER BY solver, key"):
+            parameters = parsed(text, self.path)
+            if not isinstance(parameters, dict):
+                raise InvalidInputError(f"{self.path}: is damaged (parameters that are no table)")
+            found[key] = solver, parameters
+        return found
+
+    def append(self, settings: Sequence[Setting], rows: Sequence[Sequence[Any]]) -> int:
+        """Write runs (`COLUMNS`) with their settings, wait until they are on the disk; return the number of new ones.
+
+        Runs that are there are left as they are. If the file cannot be written (the disk is full), what was saved
         stays.
         """
-        keys = list(run_keys(batch))
-        fresh = [i for i, key in enumerate(keys) if key not in self.done]
-        if len(fresh) < len(keys):
-            batch = {name: [batch[name][i] for i in fresh] for name in COLUMNS}
-        if not fresh:
-            return 0
-        new = {setting.key: setting for setting in settings if setting.key not in self.settings}
-        entries: list[Mapping[str, Any]] = [
-            {"setting_key": key, "solver": setting.solver, "parameters": dict(setting.parameters)}
-            for key, setting in new.items()
-        ]
-        data = memoryview(b"".join(log_line(entry) for entry in [*entries, batch]))
-        path = self.folder / LOG
-        before = os.fstat(self._log.fileno()).st_size
+        return self.insert([(one.key, one.solver, json.dumps(dict(one.parameters))) for one in settings], rows)
+
+    def insert(self, settings: Sequence[Sequence[Any]], rows: Sequence[Sequence[Any]]) -> int:
+        """Do the same with settings as rows."""
+        places = ", ".join("?" * len(COLUMNS))
         try:
-            while data:
-                data = data[self._log.write(data) :]
-            os.fsync(self._log.fileno())
+            self._db.execute("BEGIN IMMEDIATE")
+            self._db.executemany("INSERT INTO settings VALUES (?, ?, ?) ON CONFLICT DO NOTHING", settings)
+            before = self._db.total_changes
+            self._db.executemany(f"INSERT INTO runs VALUES ({places}) ON CONFLICT DO NOTHING", rows)
+            new = self._db.total_changes - before
+            self._db.execute("COMMIT")
         except BaseException as error:
-            # remove a partial line, which would damage the next one
-            with suppress(OSError):
-                os.ftruncate(self._log.fileno(), before)
-            if not isinstance(error, OSError):
+            # where SQLite has not done so itself
+            with suppress(sqlite3.Error):
+                self._db.execute("ROLLBACK")
+            if not isinstance(error, sqlite3.OperationalError):
                 raise
-            raise InvalidInputError(
-                f"{path}: cannot be written ({error.strerror or error}); {len(self.done)} finished runs are kept, "
-                "and the same command goes on from there"
-            ) from None
-        self.settings |= {*new}
-        self.done.update(keys)
-        return len(fresh)
+            (kept,) = self.select("count(*) FROM runs")[0]
+            raise InvalidInputError(f"{self.path}: cannot be written ({error}); {kept} {KEPT}") from None
+        return new
 
     def close(self) -> None:
-        """Close the files and release the folder."""
-        self._log.close()
-        self._lock.close()
+        """Close the file."""
+        self._db.close()
 
     def __enter__(self) -> Store:
         return self
 
     def __exit__(self, *exception: object) -> None:
         self.close()
-
-
-def run_keys(batch: Mapping[str, list[Any]]) -> Iterator[RunKey]:
-    """Keys of the runs of a batch."""
-    return zip(batch["setting"], batch["source"], batch["repeat"], batch["scan"], strict=True)
-
-
-def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
-    """Read the manifest of a study; one that is missing, damaged, or of a later version is refused."""
-    path = Path(folder) / MANIFEST
-    if not Path(folder).is_dir():
-        raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")
-    try:
-        with open_regular(path) as file:
-            text = file.read(_LONGEST + 1)
-        if len(text) > _LONGEST:
-            raise InvalidInputError(f"{path}: is larger than {_LONGEST} bytes; {_NEW_MANIFEST}")
-        content = json.loads(text)
-    except InvalidInputError:
-        raise
-    except FileNotFoundError:
-        raise InvalidInputError(f"{folder}: holds no study ({MANIFEST} is missing)") from None
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error}); {_NEW_MANIFEST}") from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}; {_NEW_MANIFEST}")
-    if content.get("version") != VERSION:
-        raise InvalidInputError(f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}")
-    try:
-        sources = {str(source["fingerprint"]): str(source["name"]) for source in content["sources"]}
-        limit = None if content["time_limit"] is None else float(content["time_limit"])
-        gating, code = dict(content["gating"]), str(content.get("code", ""))
-        return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, gating, code)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error}); {_NEW_MANIFEST}") from None
-
-
-def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
-    """Yield the entries of the log in order; None for a line with a wrong checksum."""
-    path = Path(folder) / LOG
-    try:
-        with open_regular(path) as file:
-            while line := file.readline(_LONGEST + 1):
-                if len(line) > _LONGEST:
-                    raise InvalidInputError(f"{path}: has a line of more than {_LONGEST} bytes")
-                if line != b"\n":
-                    yield _read_log_line(line)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-
-
-def damaged_lines(folder: str | os.PathLike[str]) -> int:
-    """Count the lines of the log that are truncated or were changed."""
-    return sum(entry is None for entry in read_log(folder))
-
-
-def log_line(entry: Mapping[str, Any]) -> bytes:
-    """Return a line of the log: the checksum of an entry, and the entry as JSON."""
-    body = json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
-    return b"%08x %s\n" % (zlib.crc32(body), body)
-
-
-def _read_log_line(line: bytes) -> dict[str, Any] | None:
-    body = line[9:-1]
-    if line[-1:] != b"\n" or line[:9] != b"%08x " % zlib.crc32(body):
-        return None
-    # the checksum detects accidents, not manipulation
-    try:
-        entry = json.loads(body)
-    except (ValueError, RecursionError):
-        return None
-    return entry if isinstance(entry, dict) and _sound(entry) else None
-
-
-def _sound(entry: Mapping[str, Any]) -> bool:
-    """Whether an entry has the expected form: a setting, or a batch of runs."""
-    if "setting_key" in entry:
-        kinds = {"setting_key": str, "solver": str, "parameters": dict}
-        return all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
-    columns = [entry.get(name) for name in COLUMNS]
-    if not all(isinstance(column, list) for column in columns):
-        return False
-    plain = all(_KINDS[name](value) for name in COLUMNS for value in entry[name])
-    return plain and len({len(column) for column in columns if column is not None}) == 1
-
-
-def _text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-def _whole(value: object) -> bool:
-    # within the range of 64 bits
-    return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
-
-
-def _real(value: object) -> bool:
-    return value is None or isinstance(value, float) or _whole(value)
-
-
-def _trace(value: object) -> bool:
-    return isinstance(value, list) and all(
-        isinstance(point, list) and len(point) == 3 and all(map(_real, point)) for point in value
-    )
-
-
-_KINDS: Mapping[str, Callable[[object], bool]] = {
-    **dict.fromkeys(("setting", "source"), _text),
-    **dict.fromkeys(("repeat", "scan", "seed"), _whole),
-    **dict.fromkeys(("cost", "lower_bound", "time"), _real),
-    **dict.fromkeys(("iterations", "true_tuples", "correct_tuples"), lambda value: value is None or _whole(value)),
-    "stopped_by": lambda value: value is None or _text(value),
-    "trace": _trace,
-}
-
-
-def _lock(folder: Path) -> IO[bytes]:
-    """Lock the folder against a second process; the lock ends with the process in any case."""
-    path = folder / ".lock"
-    try:
-        file = open_regular(path, "ab")
-    except OSError as error:
-        raise InvalidInputError(f"{folder}: cannot be written ({error.strerror or error})") from None
-    try:
-        import fcntl
-    except ImportError:  # not a POSIX system: users must then avoid two processes at once
-        return file
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        file.close()
-        raise InvalidInputError(f"{folder}: another sweep is running in this folder") from None
-    except OSError:  # a file system without locks
-        pass
-    return file

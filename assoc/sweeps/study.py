@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -19,10 +20,8 @@ from assoc.sweeps.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import study_sources
-from assoc.sweeps.store import Manifest, RunKey, Store
-from assoc.sweeps.worker import Job, Result, run_batch
-
-KEPT = "finished runs are kept, and the same command goes on from there"
+from assoc.sweeps.store import KEPT, Manifest, RunKey, Store
+from assoc.sweeps.worker import Job, run_batch
 
 Progress = Callable[["Counts"], object]
 
@@ -33,7 +32,7 @@ class Counts:
 
     total: int
     before: int
-    """Runs that were saved before."""
+    """Runs that were saved before, or meanwhile by another process."""
     new: int = 0
     """Runs done since the start."""
     solving: float = 0.0
@@ -66,6 +65,8 @@ class Study(Shown):
         Options of ``assoc.build_problem``.
     scans : sequence of range, optional
         Scans of each source; by default all.
+    cpu_limit : float, optional
+        Seconds of processor time for each run: what runs find does not depend on what else the machine does.
 
     Raises
     ------
@@ -80,6 +81,7 @@ class Study(Shown):
     time_limit: float | None = None
     gating: Mapping[str, Any] = field(default_factory=dict)
     scans: Sequence[Sequence[int]] | None = None
+    cpu_limit: float | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -90,7 +92,11 @@ class Study(Shown):
             if not is_whole(self.repeats, 1):
                 raise InvalidInputError(f"repeats: expected a whole number >= 1, got {self.repeats!r}")
             put(self, "repeats", range(self.repeats))
-        put(self, "time_limit", checked_time_limit(self.time_limit))
+        for name in ("time_limit", "cpu_limit"):
+            limit = checked_time_limit(getattr(self, name), name)
+            put(self, name, None if limit == math.inf else limit)
+        if self.cpu_limit is not None and any(setting.solver == "milp" for setting in self.settings):
+            raise InvalidInputError("cpu_limit: milp cannot be stopped by its processor time, only by time_limit")
         if self.scans is None:
             put(self, "scans", [range(source.num_scans) for source in self.sources])
         if not all(isinstance(scans, Sequence) and all(map(is_whole, scans)) for scans in self.scans or ()):
@@ -105,7 +111,8 @@ class Study(Shown):
     def manifest(self) -> Manifest:
         """The manifest that a folder must have to hold this study."""
         names = {source.fingerprint: source.name for source in self.sources}
-        return Manifest(__version__, whole_seed(self.seed), names, self.time_limit, dict(self.gating), code_digest())
+        limits = self.time_limit, self.cpu_limit
+        return Manifest(__version__, whole_seed(self.seed), names, *limits, dict(self.gating), code_digest())
 
     @property
     def size(self) -> int:
@@ -123,10 +130,8 @@ class Study(Shown):
                     for scan in scans:
                         yield setting, source, repeat, scan
 
-    def missing(self, store: Store) -> Iterator[RunNumbers]:
-        """Runs that the store does not have."""
-        # a copy: the store grows meanwhile
-        done = frozenset(store.done)
+    def missing(self, done: Set[RunKey]) -> Iterator[RunNumbers]:
+        """Runs that are not done."""
         return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
 
     def keys(self) -> Iterator[RunKey]:
@@ -180,27 +185,28 @@ class Study(Shown):
         jobs: int = 1,
         scheduler: str | None = None,
         progress: Progress | None = None,
-        on_result: Callable[[Result], object] | None = None,
         batch_seconds: float | None = None,
     ) -> Counts:
-        """Do the same as `run` with an open store; ``on_result`` is called with each saved result."""
-        missing = sum(1 for _ in self.missing(store))
+        """Do the same as `run` with an open store."""
+        done = store.done()
+        missing = sum(1 for _ in self.missing(done))
         counts = Counts(self.size, self.size - missing)
         if progress is not None:
             progress(counts)
         if missing == 0:
             return counts
-        job = Job(tuple(self.sources), whole_seed(self.seed), self.time_limit, self.gating, __version__, code_digest())
-        batches = Batches(self.settings, self.missing(store), batch_seconds or (0.2 if scheduler is None else 0.5))
+        job = Job(tuple(self.sources), self.manifest)
+        batches = Batches(self.settings, self.missing(done), batch_seconds or (0.2 if scheduler is None else 0.5))
         work = partial(run_batch, job)
         results = spread(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
         try:
             for result in results:
-                counts.new += store.append(result.batch.settings, result.columns)
-                counts.solving += sum(time or 0.0 for time in result.columns["time"])
+                new = store.append(result.batch.settings, result.rows)
+                counts.new += new
+                # the others were done by another process meanwhile
+                counts.before += len(result.rows) - new
+                counts.solving += sum(result.times())
                 batches.learn(result)
-                if on_result is not None:
-                    on_result(result)
                 if progress is not None:
                     progress(counts)
         except (LimitExceededError, LostError) as error:

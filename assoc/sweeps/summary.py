@@ -21,8 +21,22 @@ if TYPE_CHECKING:
 INTERVAL = "95 %"
 """Header of the interval of the measure in the column before."""
 
-MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
-"""Measures that are averaged; "correct" is the share of the true tuples that were found."""
+MEASURES = ("excess", "gap", "cost", "optimal", "iterations", "time", "correct")
+"""Measures that are averaged; "excess" is the cost above the best known, "correct" the share of the true tuples found.
+
+Gaps are not comparable between solvers, whose bounds differ; excesses are.
+"""
+
+TITLES = {
+    "excess": "mean excess",
+    "gap": "mean gap",
+    "cost": "mean cost",
+    "optimal": "optimal %",
+    "time": "ms",
+    "correct": "correct %",
+    "score": "PAR10, s",
+}
+"""Headers of the measures, in the units of `FACTORS`."""
 
 FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 """Factors of measures in printed tables: per cent, milliseconds."""
@@ -41,8 +55,9 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
     -------
     DataFrame
         One row per setting: ``solver``, the parameters that differ, ``setting``, ``runs``, and for each of
-        ``cost``, ``gap``, ``optimal`` (the share certified optimal), ``iterations``, ``time`` (seconds) and
-        ``correct`` its mean and its 95 % interval (``_low``, ``_high``) by the bootstrap over problems and repeats.
+        ``excess`` (cost above the best known), ``gap``, ``cost``, ``optimal`` (the share certified optimal),
+        ``iterations``, ``time`` (seconds) and ``correct`` its mean and its 95 % interval (``_low``, ``_high``) by the
+        bootstrap over problems and repeats.
         ``infeasible`` counts the runs without a solution; no mean includes them.
     """
     import pandas as pd
@@ -115,18 +130,17 @@ def summary_rows(summary: pd.DataFrame, *, brief: bool = False) -> tuple[list[st
     parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
     measures = [name for name in MEASURES if summary[name].notna().any()]
     infeasible = ["infeasible"] if summary["infeasible"].any() else []
-    titles = {"gap": "mean gap", "cost": "mean cost", "optimal": "optimal %", "time": "ms", "correct": "correct %"}
     headers = ["solver", *map(str, parameters), "runs", *infeasible]
     for name in measures:
-        headers += [titles.get(name, name), INTERVAL]
+        headers += [TITLES.get(name, name), INTERVAL]
     cells = []
     for row in summary.to_dict("records"):
         line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
         line += [str(row[name]) for name in infeasible]
         for name in measures:
             factor = FACTORS.get(name, 1.0)
-            line.append(_number(factor * row[name], name))
-            line.append(_interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
+            line.append(number(factor * row[name], name))
+            line.append(interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
         cells.append(line)
     if brief:
         kept = [i for i, header in enumerate(headers) if header != INTERVAL or any(_spread(row, i) for row in cells)]
@@ -140,7 +154,34 @@ def _value(value: Any) -> str:
     return "" if value is None else str(value)
 
 
-def _number(value: float, name: str) -> str:
+def comparison_rows(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """Headers and cells of a comparison (`assoc.sweeps.compare`)."""
+    cells = []
+    for row in table.to_dict("records"):
+        name, factor = row["measure"], FACTORS.get(row["measure"], 1.0)
+        means = [number(factor * row[column], name) for column in ("first", "second", "difference")]
+        ends = interval([factor * row["low"], factor * row["high"]], name)
+        cells.append([TITLES.get(name, name), *means, ends, str(row["pairs"])])
+    return ["", "first", "second", "difference", INTERVAL, "pairs"], cells
+
+
+def latex(headers: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+    """A table for LaTeX, without a package; text stands left, numbers right."""
+    escapes = {ord(sign): f"\\{sign}" for sign in "&%$#_{}"} | {
+        ord("\\"): r"\textbackslash{}", ord("~"): r"\textasciitilde{}", ord("^"): r"\textasciicircum{}"
+    }  # fmt: skip
+    kinds = "".join("r" if all(_is_numeric(row[i]) for row in cells) else "l" for i in range(len(headers)))
+    lines = [" & ".join(cell.translate(escapes).replace(" .. ", " -- ") for cell in row) for row in (headers, *cells)]
+    body = "".join(f"{line} \\\\\n" for line in lines[1:])
+    return f"\\begin{{tabular}}{{{kinds}}}\n\\hline\n{lines[0]} \\\\\n\\hline\n{body}\\hline\n\\end{{tabular}}\n"
+
+
+def _is_numeric(cell: str) -> bool:
+    return all(part in ("", "-") or part.lstrip("-")[:1].isdigit() for part in cell.split(" .. "))
+
+
+def number(value: float, name: str) -> str:
+    """Return a value of a measure as text."""
     if np.isnan(value):
         return "-"
     if name == "cost":
@@ -153,5 +194,6 @@ def _spread(row: Sequence[str], column: int) -> bool:
     return row[column] not in ("-", f"{row[column - 1]} .. {row[column - 1]}")
 
 
-def _interval(ends: Sequence[float], name: str) -> str:
-    return "-" if np.isnan(ends[0]) else f"{_number(ends[0], name)} .. {_number(ends[1], name)}"
+def interval(ends: Sequence[float], name: str) -> str:
+    """Return an interval of a measure as text."""
+    return "-" if np.isnan(ends[0]) else f"{number(ends[0], name)} .. {number(ends[1], name)}"

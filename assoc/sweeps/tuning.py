@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,18 +15,19 @@ from assoc._files.output import write_text
 from assoc._files.reading import check_regular
 from assoc._parameters import is_whole
 from assoc._system.door import door
+from assoc._system.imports import load_extra
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers import registry
-from assoc.sweeps.bootstrap import mean_interval
+from assoc.sweeps.comparison import paired
 from assoc.sweeps.frame import load
 from assoc.sweeps.setting import Setting, parameter
 from assoc.sweeps.sources import StudySource, study_sources
 from assoc.sweeps.space import Range, Space, Values
-from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
+from assoc.sweeps.store import REPORT, Store
 from assoc.sweeps.study import Counts, Study
-from assoc.sweeps.summary import by_problem
+from assoc.sweeps.summary import MEASURES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +38,7 @@ PENALTY = 10.0
 """Factor of the cutoff that a run without optimum counts in "time" (PAR10)."""
 
 _WIDTH = 4.0
+_SCORED = ("cost", "lower_bound", "time")
 # a larger value of these never worsens the gap: they are a budget, not something to tune
 _BUDGETS = ("iterations", "patience", "nodes", "workers")
 
@@ -54,9 +55,7 @@ class Report:
     training: tuple[float, float]
     """Target of default and tuned setting on the training runs."""
     table: pd.DataFrame
-    """Default and tuned setting on the held-out runs: one row each with means and intervals."""
-    difference: tuple[float, float, float]
-    """Tuned less default in the target, held out: mean, ends of the 95 % interval over pairs."""
+    """Tuned and default setting on the held-out runs, as from `assoc.sweeps.compare`; ``score`` is the target."""
     held_out: str
     """Description of the held-out runs."""
 
@@ -73,6 +72,7 @@ def tune(
     repeats: int = 3,
     seed: int = 0,
     time_limit: float | None = None,
+    cpu_limit: float | None = None,
     gating: Mapping[str, Any] | None = None,
     scans: Sequence[Sequence[int]] | None = None,
     jobs: int = 1,
@@ -98,7 +98,7 @@ def tune(
     repeats : int, default 3
         Seeds for the training of a setting; as many others are held out. With four scans or more, training uses only
         the even ones, and the others are held out too.
-    seed, time_limit, gating, scans, jobs, scheduler, progress
+    seed, time_limit, cpu_limit, gating, scans, jobs, scheduler, progress
         As in `Study`.
 
     Returns
@@ -114,32 +114,41 @@ def tune(
     if target not in TARGETS:
         raise InvalidInputError(f"target: expected gap or time, got {target!r}")
     _require_counts(trials=trials, repeats=repeats)
-    optuna, ranges = _optuna(), _ranges(solver, space)
+    optuna, ranges = load_extra("optuna", "tune"), _ranges(solver, space)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     sources = study_sources(sources)
     every = [range(source.num_scans) for source in sources] if scans is None else scans
     training, test, words = _split([list(numbers) for numbers in every], repeats)
 
     def study(settings: Sequence[Setting], held_out: bool = False) -> Study:
         seeds = range(repeats, 2 * repeats) if held_out else range(repeats)
-        return Study(sources, settings, seeds, seed, time_limit, gating or {}, test if held_out else training)
+        return Study(
+            sources, settings, seeds, seed, time_limit, gating or {}, test if held_out else training, cpu_limit
+        )
 
     default = _default(solver, ranges)
     size = study([default]).size * trials + study([default], held_out=True).size * 2
     with Store(folder, study([default]).manifest) as store:
         runs = _Runs(store, size, progress, {"jobs": jobs, "scheduler": scheduler})
         first = runs.of(study([default]))
-        cutoff = time_limit if time_limit is not None else float(np.nanmax(first[2], initial=1e-6))
-        values: dict[Setting, float] = {}
-        for setting, learn in _proposed(optuna, solver, ranges, default, trials, seed):
-            if setting not in values:
-                values[setting] = float(scores(*runs.of(study([setting])), target, cutoff).mean())
-            learn(values[setting])
-        tuned = min(values, key=lambda setting: values[setting])
-        training_scores = float(scores(*first, target, cutoff).mean()), values[tuned]
+        limit = time_limit if time_limit is not None else cpu_limit
+        cutoff = limit if limit is not None else float(np.nanmax(first[2], initial=1e-6))
+
+        def setting(trial: Any) -> Setting:
+            return Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
+
+        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+        search.enqueue_trial(_point(default, ranges))
+        search.optimize(lambda trial: _score(runs.of(study([setting(trial)])), target, cutoff), n_trials=trials)
+        tuned = setting(search.best_trial)
+        training_scores = _score(first, target, cutoff), float(search.best_value)
         last = study([default, tuned], held_out=True)
         runs.of(last)
-        held = _frame(folder, last)
-    report = _report(solver, target, trials, tuned, default, training_scores, held, cutoff, words)
+    held = _frame(folder, last)
+    cost, bound, time = (held[name].to_numpy(dtype=float) for name in _SCORED)
+    held = held.assign(score=scores(cost, bound, time, target, cutoff))
+    table = paired(held, tuned.key, default.key, ("score", *MEASURES))
+    report = Report(solver, target, trials, tuned, default, training_scores, table, words)
     _save(Path(folder) / REPORT, report)
     return report
 
@@ -161,29 +170,6 @@ def _default(solver: str, ranges: Mapping[str, Space]) -> Setting:
     """The default setting, but for parameters that have a single value here."""
     single = {name: choice.values for name, choice in ranges.items() if isinstance(choice, Values)}
     return Setting(solver, {name: values[0] for name, values in single.items() if len(values) == 1})
-
-
-def _optuna() -> Any:
-    try:
-        import optuna
-    except ImportError:
-        raise InvalidInputError(
-            "--tune: needs optuna, which is not installed: python -m pip install 'assoc[tune]'"
-        ) from None
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
-
-
-def _proposed(
-    optuna: Any, solver: str, ranges: Mapping[str, Space], default: Setting, trials: int, seed: int
-) -> Iterator[tuple[Setting, Callable[[float], object]]]:
-    """Settings to try, each with the function that takes its score; the first is the default."""
-    search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
-    search.enqueue_trial(_point(default, ranges))
-    for _ in range(trials):
-        trial = search.ask()
-        setting = Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
-        yield setting, partial(search.tell, trial)
 
 
 def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[list[int]], str]:
@@ -270,15 +256,6 @@ class _Runs:
     ) -> None:
         self._store, self._size, self._progress, self._where = store, size, progress, where
         self._total = Counts(0, 0)
-        self._known: dict[RunKey, tuple[float | None, float | None, float | None]] = {}
-        for entry in read_log(store.folder):
-            if entry is not None and "setting_key" not in entry:
-                self._add(entry)
-
-    def _add(self, columns: Mapping[str, list[Any]]) -> None:
-        values = zip(columns["cost"], columns["lower_bound"], columns["time"], strict=True)
-        for key, value in zip(run_keys(columns), values, strict=True):
-            self._known.setdefault(key, value)
 
     def of(self, study: Study) -> tuple[Floats, Floats, Floats]:
         """Costs, bounds and times of the runs of a study, NaN where there are none."""
@@ -290,19 +267,24 @@ class _Runs:
             if self._progress is not None:
                 self._progress(total)
 
-        study.run_in(self._store, **self._where, progress=shown, on_result=lambda result: self._add(result.columns))
-        cost, bound, time = np.array([self._known[key] for key in study.keys()], dtype=float).T
+        study.run_in(self._store, **self._where, progress=shown)
+        query = f"setting, source, repeat, scan, {', '.join(_SCORED)} FROM runs WHERE setting = ?"
+        known = {row[:4]: row[4:] for one in study.settings for row in self._store.select(query, (one.key,))}
+        cost, bound, time = np.array([known[key] for key in study.keys()], dtype=float).T
         return cost, bound, time
 
 
 def _frame(folder: str | os.PathLike[str], study: Study) -> pd.DataFrame:
     """The runs of a study as a table."""
     frame = load(folder)
-    # the folder may hold a scene under an earlier file name
-    names = read_manifest(folder).sources
-    keys = {(key[0], names[key[1]], *key[2:]) for key in study.keys()}
-    columns = (frame[name] for name in ("setting", "scene", "repeat", "scan"))
-    return frame[[key in keys for key in zip(*columns, strict=True)]].reset_index(drop=True)
+    keys = [setting.key for setting in study.settings]
+    return frame[frame["setting"].isin(keys) & frame["repeat"].isin({key[2] for key in study.keys()})].reset_index(
+        drop=True
+    )
+
+
+def _score(runs: tuple[Floats, Floats, Floats], target: str, cutoff: float) -> float:
+    return float(scores(*runs, target, cutoff).mean())
 
 
 def scores(cost: Floats, bound: Floats, time: Floats, target: str, cutoff: float) -> Floats:
@@ -314,49 +296,18 @@ def scores(cost: Floats, bound: Floats, time: Floats, target: str, cutoff: float
     return np.where(optimal, np.minimum(time, PENALTY * cutoff), PENALTY * cutoff)
 
 
-def _report(
-    solver: str,
-    target: str,
-    trials: int,
-    tuned: Setting,
-    default: Setting,
-    training: tuple[float, float],
-    held: pd.DataFrame,
-    cutoff: float,
-    words: str,
-) -> Report:
-    from assoc.sweeps.summary import summarize
-
-    cost, bound, time = (held[name].to_numpy(dtype=float) for name in ("cost", "lower_bound", "time"))
-    held = held.assign(score=scores(cost, bound, time, target, cutoff))
-    held_by = {setting: held[held["setting"] == setting.key] for setting in (default, tuned)}
-    tables = {setting: by_problem(runs, runs["score"].to_numpy(dtype=float)) for setting, runs in held_by.items()}
-    pairs = tables[tuned] - tables[default]
-    low, high = mean_interval(pairs)
-    summary = summarize(held).set_index("setting")
-    rows = summary.loc[[default.key, tuned.key]].reset_index()
-    rows.insert(0, "parameters", ["default", "tuned"])
-    rows["score"] = [float(np.nanmean(tables[setting])) for setting in (default, tuned)]
-    difference = float(np.nanmean(pairs)), low, high
-    return Report(solver, target, trials, tuned, default, training, rows, difference, words)
-
-
 def _save(path: Path, report: Report) -> None:
-    def plain(values: Mapping[Any, Any]) -> dict[str, Any]:
-        return {str(key): value if value == value else None for key, value in values.items()}
-
     content = {
         "format": "assoc.tuning",
-        "version": 1,
+        "version": 2,
         "solver": report.solver,
         "target": report.target,
         "trials": report.trials,
         "tuned": dict(report.tuned.parameters),
         "default": dict(report.default.parameters),
-        "training": plain(dict(zip(("default", "tuned"), report.training, strict=True))),
+        "training": dict(zip(("default", "tuned"), report.training, strict=True)),
         "held_out": report.held_out,
-        "table": [plain(row) for row in report.table.to_dict("records")],
-        "difference": dict(zip(("mean", "low", "high"), report.difference, strict=True)),
+        "table": report.table.to_dict("records"),
     }
     check_regular(path)
     write_text(path, json.dumps(content, indent=1) + "\n")

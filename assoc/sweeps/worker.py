@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import StudySource
-from assoc.sweeps.store import COLUMNS
+from assoc.sweeps.store import COLUMNS, Manifest
 
 if TYPE_CHECKING:
     from assoc.problem import AssignmentProblem
@@ -40,11 +41,15 @@ class Batch:
 
 @dataclass(frozen=True)
 class Result:
-    """The results of a batch: the columns of `store.COLUMNS`, and the seconds that the batch took."""
+    """The results of a batch: its rows (`store.COLUMNS`), and the seconds that the batch took."""
 
     batch: Batch
-    columns: dict[str, list[Any]]
+    rows: list[tuple[Any, ...]]
     seconds: float
+
+    def times(self) -> list[float]:
+        """Seconds of each run in the solver."""
+        return [row[COLUMNS.index("time")] or 0.0 for row in self.rows]
 
 
 @dataclass(frozen=True)
@@ -52,14 +57,8 @@ class Job:
     """Data that all runs share; a worker gets it once."""
 
     sources: tuple[StudySource, ...]
-    seed: int
-    time_limit: float | None
-    gating: Mapping[str, Any]
-    """Options of ``assoc.build_problem``."""
-    package: str
-    """Version of assoc; the worker's must be the same."""
-    code: str
-    """Digest of the solvers' code; the worker's must be the same."""
+    manifest: Manifest
+    """Seed, limits and gating; a worker's version and code of assoc must be those in it."""
     _problems: OrderedDict[tuple[int, int], tuple[AssignmentProblem, Tuples | None]] = field(
         default_factory=OrderedDict, compare=False
     )
@@ -69,7 +68,7 @@ class Job:
 
     def __reduce__(self) -> Any:
         # without the cache of this process
-        return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package, self.code)
+        return Job, (self.sources, self.manifest)
 
     def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
         """Return a problem and its true tuples (None if they are unknown); recent ones are cached."""
@@ -97,7 +96,7 @@ class Job:
             prepare(content)
             return content, None
         measured = content.scan(scan)
-        problem, truth = build_problem(content, measured, **self.gating), measured.true_tuples()
+        problem, truth = build_problem(content, measured, **self.manifest.gating), measured.true_tuples()
         # runs share the problem: its preparation must not count as time of the first run
         prepare(problem)
         return problem, None if truth is None else {*map(tuple, truth.tolist())}
@@ -105,7 +104,7 @@ class Job:
     def seed_of(self, setting: Setting, source: int, repeat: int, scan: int) -> int:
         """Seed of a run; it depends on what is run, not on where or when."""
         words = (*setting.words, int(self.sources[source].fingerprint[:8], 16), repeat, scan)
-        sequence = np.random.SeedSequence(self.seed, spawn_key=words)
+        sequence = np.random.SeedSequence(self.manifest.seed, spawn_key=words)
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
@@ -114,12 +113,21 @@ class Job:
 
         if setting.family in self._warm:
             return
-        limit = min(_WARM_UP_SECONDS, self.time_limit or _WARM_UP_SECONDS)
+        limit = min(_WARM_UP_SECONDS, self.manifest.time_limit or _WARM_UP_SECONDS)
         try:
             assign(problem, setting.solver, time_limit=limit, **setting.parameters)
         except InfeasibleError:
             pass
         self._warm.add(setting.family)
+
+    def _stop(self, setting: Setting) -> Callable[[object], bool] | None:
+        """What stops a run that has had its processor time: after a point of its trace, about twice a second."""
+        limit = self.manifest.cpu_limit
+        if limit is None:
+            return None
+        clock = time.process_time if setting.parameters.get("workers", 1) != 1 else time.thread_time
+        end = clock() + limit
+        return lambda point: clock() >= end
 
     def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
         """Solve a problem, with the solver's time alone.
@@ -133,7 +141,10 @@ class Job:
         with with_foreign_kernels():
             for _ in range(_ATTEMPTS):
                 before = loaded()
-                solution = assign(problem, setting.solver, seed=seed, time_limit=self.time_limit, **setting.parameters)
+                limit, stop = self.manifest.time_limit, self._stop(setting)
+                solution = assign(
+                    problem, setting.solver, seed=seed, time_limit=limit, callback=stop, **setting.parameters
+                )
                 if loaded() == before:
                     break
         return solution
@@ -141,21 +152,16 @@ class Job:
 
 def run_batch(job: Job, batch: Batch) -> Result:
     """Do the runs of a batch one after the other; refused by a worker with another version of assoc."""
-    import time
-
     started = time.perf_counter()
-    if __version__ != job.package:
-        raise InvalidInputError(f"a worker has version {__version__} of assoc, this is {job.package}")
-    if code_digest() != job.code:
+    if __version__ != job.manifest.assoc:
+        raise InvalidInputError(f"a worker has version {__version__} of assoc, this is {job.manifest.assoc}")
+    if code_digest() != job.manifest.code:
         raise InvalidInputError("a worker has other code of assoc than this process, with the same version")
-    columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
-    for run in batch.runs:
-        for name, value in zip(COLUMNS, _row(job, batch.settings[run[0]], *run[1:]), strict=True):
-            columns[name].append(value)
-    return Result(batch, columns, time.perf_counter() - started)
+    rows = [_row(job, batch.settings[run[0]], *run[1:]) for run in batch.runs]
+    return Result(batch, rows, time.perf_counter() - started)
 
 
-def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Sequence[Any]:
+def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> tuple[Any, ...]:
     problem, truth = job.problem(source, scan)
     seed = job.seed_of(setting, source, repeat, scan)
     head = (setting.key, job.sources[source].fingerprint, repeat, scan, seed)
@@ -163,7 +169,7 @@ def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Seq
     try:
         solution = job.solve(setting, problem, seed)
     except InfeasibleError:
-        return (*head, None, None, None, None, "infeasible", number, None, [])
+        return (*head, None, None, None, None, "infeasible", number, None, b"")
     except InvalidInputError as error:
         raise InvalidInputError(f"{setting.solver} {dict(setting.parameters)}: {error}") from None
     correct = None if truth is None else len(truth.intersection(map(tuple, solution.tuples.tolist())))
@@ -174,20 +180,21 @@ def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Seq
         None if bound is None else float(bound),
         int(solution.iterations),
         round(solution.runtime, 9),
-        solution.stopped_by,
+        # nothing else asks a run to stop
+        "cpu_limit" if solution.stopped_by == "callback" else solution.stopped_by,
         number,
         correct,
         _thinned(solution),
     )
 
 
-def _thinned(solution: Solution) -> list[tuple[int, float, float]]:
+def _thinned(solution: Solution) -> bytes:
     """Iteration, seconds and cost at some improvements, among them the first and the last."""
-    points: list[tuple[int, float, float]] = []
+    points: list[tuple[float, float, float]] = []
     for point in solution.trace:
         if np.isfinite(point.cost) and (not points or point.cost < points[-1][2]):
-            points.append((int(point.iteration), round(point.seconds, 6), float(point.cost)))
-    if len(points) > TRACE_POINTS:
-        kept = np.linspace(0, len(points) - 1, TRACE_POINTS).round().astype(int)
-        points = [points[i] for i in kept]
-    return points
+            points.append((point.iteration, round(point.seconds, 6), point.cost))
+    if not points:
+        return b""
+    kept = np.unique(np.linspace(0, len(points) - 1, TRACE_POINTS).round().astype(int))
+    return np.array(points, dtype="<f8")[kept].tobytes()

@@ -314,10 +314,6 @@ TABLES = {
     "speed-ratios": speed_ratios,
     "batch": batch,
     "traffic": traffic,
-    "overhead": partial(
-        _plain, "sweep_overhead", "ms",
-        ("overhead a run", "processor time of the sweep, a run", "in the solver, a run"), 2,
-    ),
     "ant-colony": ant_colony,
     "readings": readings,
     "large-components": partial(

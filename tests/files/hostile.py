@@ -5,14 +5,13 @@ python -m tests.files.hostile [NAME ...]        a table: the file, its size, the
 
 import bz2
 import gzip
-import json
 import lzma
 import os
+import sqlite3
 import subprocess
 import sys
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -108,18 +107,30 @@ def _scene(scans: int) -> dict[str, Any]:
     return {**one, "times": np.arange(scans), "measurement_values": np.zeros(0), "measurement_offsets": offsets}
 
 
-def _study(log: bytes | None, manifest: bytes | None = None) -> Callable[[Path], object]:
+def _study(*words: str, tables: bool = True) -> Callable[[Path], object]:
+    """A study changed by SQL."""
+
     def make(folder: Path) -> None:
-        folder.mkdir()
-        whole = {"format": "assoc.study", "version": 1, "assoc": "0", "code": "", "seed": 0, "sources": []}
-        plain = json.dumps({**whole, "time_limit": None, "gating": {}}).encode()
-        (folder / "study.json").write_bytes(manifest or plain)
-        if log is None:
-            (folder / "runs.jsonl").symlink_to("/dev/zero")
-        else:
-            (folder / "runs.jsonl").write_bytes(b"%08x %s\n" % (zlib.crc32(log), log))
+        from assoc.sweeps.store import DATABASE, Manifest, Store
+
+        Store(folder, Manifest("0", 0, {}, None, None, {}, "")).close()
+        if not tables:
+            (folder / DATABASE).unlink()
+        with sqlite3.connect(folder / DATABASE) as base:
+            base.execute("PRAGMA ignore_check_constraints = ON")
+            for one in words:
+                base.execute(one)
+        base.close()
 
     return make
+
+
+_QUERY = "CREATE VIEW %s AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x FROM n"
+
+
+def _endless_study(folder: Path) -> None:
+    folder.mkdir()
+    (folder / "study.sqlite").symlink_to("/dev/zero")
 
 
 def _counted(head: bytes, again: bytes, size: int) -> Callable[[Path], object]:
@@ -215,9 +226,19 @@ HOSTILE = [
     Hostile("asterix.ast", _asterix, "assoc.track {} -o /dev/null"),
     Hostile("config.toml", lambda path: path.symlink_to("/dev/zero"), "assoc.solve x --config {}"),
     Hostile("plots.csv", lambda path: path.symlink_to("/dev/zero"), "assoc.track {} -o /dev/null"),
-    Hostile("study", _study(b'{"a": [1' + b",[]" * 20_000_000 + b"]}"), "assoc.sweep --summary {}"),
-    Hostile("study-without-end", _study(None), "assoc.sweep --summary {}"),
-    Hostile("manifest", _study(b"", b"[[]" + b",[]" * 20_000_000 + b"]"), "assoc.sweep --summary {}"),
+    Hostile(
+        "study",
+        _study(
+            "INSERT INTO settings VALUES ('a', 'aco', '[[]' || replace(hex(zeroblob(10000000)), '00', ',[]') || ']')"
+        ),
+        "assoc.sweep --summary {}",
+    ),
+    Hostile("study-without-end", _endless_study, "assoc.sweep --summary {}"),
+    Hostile(
+        "study-of-a-query",
+        _study(*(f"{_QUERY % name}" for name in ("study", "settings", "runs")), tables=False),
+        "assoc.sweep --summary {}",
+    ),
     Hostile("zeros.npz", _scene_file, LIVE, "zeros", 0),
 ]
 

@@ -182,7 +182,7 @@ EXTRAS = [
     (solve.main, ["s.npz", "--report", "r.html"], "plotly", "report"),
     (track.main, ["s.npz", "-o", "t.csv", "--report", "r.html"], "plotly", "report"),
     (track.main, ["s.npz", "-o", "t.parquet"], "pyarrow", "parquet"),
-    (sweep.main, ["s.npz", "-o", "study", "--plot"], "matplotlib", "plot"),
+    (sweep.main, ["s.npz", "-o", "study", "--heatmap", "h.png"], "matplotlib", "plot"),
     (sweep.main, ["s.npz", "-o", "study", "--tune", "3"], "optuna", "tune"),
     (sweep.main, ["s.npz", "-o", "study", "--scheduler", "tcp://127.0.0.1:9"], "distributed", "dask"),
 ]

@@ -26,9 +26,8 @@ def start(words, cwd, **how):
 
 def wait_for_runs(folder, process):
     """Wait until some runs are kept."""
-    log = folder / "runs.jsonl"
     deadline = time.monotonic() + 600
-    while not log.exists() or log.read_bytes().count(b"\n") < 4:
+    while not (folder / "study.json").exists() or len(load(folder)) < 100:
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
 
@@ -36,7 +35,8 @@ def wait_for_runs(folder, process):
 @pytest.fixture(scope="module")
 def whole(run, scene_file, tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep") / "study"
-    done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder, "--plot", "--csv", folder / "t.csv")
+    figures = ["--heatmap", folder / "heatmap.png", "--convergence", folder / "convergence.png"]
+    done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder, *figures, "--csv", folder / "t.csv")
     assert (done.returncode, done.stderr) == (0, "")
     return folder, done.stdout
 
@@ -46,7 +46,7 @@ def test_a_study_is_run_summarised_and_drawn(whole, run):
     lines = out.splitlines()
     assert lines[0].split()[:5] == ["solver", "alpha", "rho", "runs", "mean"] and lines[1].split()[0] == "aco"
     assert "48 runs in" in lines[-1] and "48 new, 0 there before" in lines[-1]
-    assert {"study.json", "runs.jsonl", "heatmap.png", "convergence.png", "t.csv"} <= {*os.listdir(folder)}
+    assert {"study.json", "study.sqlite", "heatmap.png", "convergence.png", "t.csv"} <= {*os.listdir(folder)}
     for name in ("heatmap.png", "convergence.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG") and (folder / name).stat().st_size > 10_000
     done = run("assoc.sweep", "--summary", folder)
@@ -58,12 +58,30 @@ def test_a_study_is_run_summarised_and_drawn(whole, run):
     )
 
 
+def test_two_settings_are_compared(whole, run, tmp_path):
+    folder, _ = whole
+    words = ["compare", folder, "alpha=1,rho=0.3", "alpha=2,rho=0.9"]
+    done = run("assoc.sweep", *words, "--csv", tmp_path / "t.tex")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0].split()[:3] == ["first", "second", "difference"] and "mean excess" in lines[1]
+    assert lines[-1].startswith("first: alpha=1,rho=0.3; second: alpha=2,rho=0.9; ")
+    assert (tmp_path / "t.tex").read_text().startswith(r"\begin{tabular}")
+    for more, message in (
+        ([*words[:3], "alpha=1"], "names 2 settings"),
+        (["compare"], "FOLDER"),
+        (["import"], "OLD NEW"),
+    ):
+        done = run("assoc.sweep", *more)
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1) and message in done.stderr
+
+
 @pytest.mark.slow
 def test_the_same_command_again_runs_nothing_and_a_larger_grid_the_rest(whole, run, scene_file):
     folder, _ = whole
-    before = (folder / "runs.jsonl").read_bytes()
+    before = load(folder)
     done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder)
-    assert "0 new, 48 there before" in done.stdout and (folder / "runs.jsonl").read_bytes() == before
+    assert "0 new, 48 there before" in done.stdout and load(folder).equals(before)
     done = run(
         "assoc.sweep", scene_file, "--solver", "greedy", "aco", *GRID[2:], "beta=1,2", "--scans", "0:3", "-o", folder
     )
@@ -140,17 +158,17 @@ def test_on_a_terminal_there_is_a_rate_and_the_time_left(long_scene, tmp_path):
 @pytest.mark.slow
 def test_a_full_disk_keeps_what_was_finished(run, long_scene, tmp_path):
     # a limit on the size of files stands for the full disk
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
-    words = [long_scene, *GRID, "--repeats", 2, "-o", "study"]
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))  # noqa: E731
+    words = [long_scene, *GRID, "--repeats", 4, "-o", "study"]
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
     process = start(words, tmp_path, preexec_fn=limit, env=environment)
     out, err = process.communicate(timeout=600)
     assert (process.returncode, out) == (2, "") and err.count("\n") == 1
-    assert "runs.jsonl: cannot be written (File too large)" in err and "finished runs are kept" in err
+    assert "study.sqlite: cannot be written (disk I/O error)" in err and "finished runs are kept" in err
     kept = len(load(tmp_path / "study"))
     assert kept > 0 and f" {kept} finished runs" in err
     done = run("assoc.sweep", *words, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "") and f"{320 - kept} new, {kept} there before" in done.stdout
+    assert (done.returncode, done.stderr) == (0, "") and f"{640 - kept} new, {kept} there before" in done.stdout
 
 
 @pytest.mark.slow
@@ -159,7 +177,7 @@ def test_tuning_reports_on_what_was_held_out(run, scene_file, tmp_path):
     done = run("assoc.sweep", *words, "--tune", 4, "--target", "time", "--repeats", 2, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "held out: scans that training did not see, with seeds 2 to 3" in done.stdout
-    assert "default" in done.stdout and "95 % interval" in done.stdout
+    assert "default" in done.stdout and "PAR10, s" in done.stdout
     first = (tmp_path / "tuned" / "tuning.json").read_text()
     again = run("assoc.sweep", *words, "--tune", 4, "--target", "time", "--repeats", 2, cwd=tmp_path)
     assert again.stdout == done.stdout and (tmp_path / "tuned" / "tuning.json").read_text() == first
@@ -186,6 +204,9 @@ BAD = [
     (["--summary", "study"], "--summary: runs nothing"),
     (["--solver", "aco", "-o", "/proc/nowhere"], "/proc/nowhere: cannot be made"),
     (["--solver", "aco", "-o", "a-file"], "is a file"),
+    (["--heatmap", "t.csv"], "expected a name that ends in .png or .svg or .pdf"),
+    (["--cpu-limit", "0"], "--cpu-limit"),
+    (["--solver", "milp", "--cpu-limit", "1"], "milp cannot be stopped by its processor time"),
     (["--csv", "nowhere/t.csv"], "nowhere does not exist"),
 ]
 
@@ -244,7 +265,7 @@ def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeyp
     for package, words, extra in (
         ("distributed", ["--scheduler", "tcp://127.0.0.1:9"], "assoc[dask]"),
         ("optuna", ["--tune", "2"], "assoc[tune]"),
-        ("matplotlib", ["--plot", "--scans", "0"], "assoc[plot]"),
+        ("matplotlib", ["--heatmap", "h.png", "--scans", "0"], "assoc[plot]"),
     ):
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, package, None)
@@ -253,6 +274,8 @@ def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeyp
 
 
 def test_nothing_and_help(run, tmp_path):
+    done = run("assoc.sweep", "s.npz", "--plot")
+    assert done.returncode == 2 and "--plot is gone: write --heatmap FILE.png --convergence FILE.png" in done.stderr
     done = run("assoc.sweep", "--help")
     assert (done.returncode, done.stderr) == (0, "") and "--tune" in done.stdout
     for words, message in (([], "no scene.npz"), (["--summary", tmp_path], "holds no study")):

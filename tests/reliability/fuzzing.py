@@ -71,12 +71,11 @@ def run_case(seed: int, number: int, made: dict[str, list[Path]], folder: Path) 
 
 
 def _spoil_study(rng: np.random.Generator, source: Path, path: Path) -> None:
-    """Copy a study and spoil its log or its manifest."""
+    """Copy a study and spoil its file."""
     shutil.rmtree(path, ignore_errors=True)
     shutil.copytree(source, path)
-    inside = sorted(one for one in path.iterdir() if one.stat().st_size)
-    chosen = inside[int(rng.integers(len(inside)))]
-    chosen.write_bytes(spoil(rng, chosen.read_bytes(), "log" if chosen.suffix != ".json" else "text"))
+    chosen = path / "study.sqlite"
+    chosen.write_bytes(spoil(rng, chosen.read_bytes(), "sqlite"))
 
 
 def judge(room: Room, path: Path) -> str | None:

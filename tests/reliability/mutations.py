@@ -6,7 +6,6 @@ import pickle
 import re
 import warnings
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ class Trap:
 
 
 def spoil(rng: np.random.Generator, content: bytes, kind: str) -> bytes:
-    """Return a spoiled copy of a file's content; ``kind`` is "npz", "text" or "log"."""
+    """Return a spoiled copy of a file's content; ``kind`` is "npz", "text" or "sqlite"."""
     draw = rng.random()
     if draw < 0.05:
         return rng.bytes(int(rng.integers(0, 3000)))
@@ -85,13 +84,14 @@ def _text(rng: np.random.Generator, content: bytes) -> bytes:
     return text.encode("utf-8", "surrogatepass")
 
 
-def _log(rng: np.random.Generator, content: bytes) -> bytes:
-    """Spoil one line of a log with checksums, and put the checksum right again: an intruder would."""
-    lines = content.split(b"\n")
-    at = int(rng.integers(len(lines)))
-    body = _text(rng, lines[at][9:])
-    lines[at] = b"%08x %s" % (zlib.crc32(body), body)
-    return b"\n".join(lines)
+def _sqlite(rng: np.random.Generator, content: bytes) -> bytes:
+    """Spoil a text within, in place: JSON, or the SQL of a table."""
+    texts = list(re.finditer(rb"[ -~\n]{12,}", content))
+    if not texts:
+        return _bytes(rng, content)
+    text = texts[int(rng.integers(len(texts)))]
+    spoiled = _text(rng, text[0])[: len(text[0])]
+    return content[: text.start()] + spoiled.ljust(len(text[0])) + content[text.end() :]
 
 
 def _npz(rng: np.random.Generator, content: bytes) -> bytes:
@@ -178,7 +178,7 @@ def _saved(array: np.ndarray[Any, np.dtype[Any]]) -> bytes:
     return buffer.getvalue()
 
 
-_OF_KIND = {"npz": _npz, "text": _text, "log": _log}
+_OF_KIND = {"npz": _npz, "text": _text, "sqlite": _sqlite}
 
 
 def bombs(folder: Path, template: bytes, size: int = 3_000_000_000) -> list[Path]:

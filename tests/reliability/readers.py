@@ -19,7 +19,7 @@ class Room:
     ----------
     name : str
     kind : str
-        How it is spoiled: "npz", "text" or "log".
+        How it is spoiled: "npz", "text" or "sqlite".
     make : callable
         Writes valid files into a folder; returns those to be spoiled.
     read : callable
@@ -79,7 +79,7 @@ def _design(folder: Path) -> list[Path]:
 
 
 def _study(folder: Path) -> list[Path]:
-    """A finished study; the log and the manifest are spoiled in place."""
+    """A finished study; its file is spoiled in place."""
     from tests.oracles import small_problems
 
     next(iter(small_problems(1, seed=3, dummy=True))).save(folder / "p.npz")
@@ -152,5 +152,5 @@ ROOMS = [
     Room("plots.csv", "text", _plots, _use_plots),
     Room("solve.toml", "text", _solver_config, _use_solver_config),
     Room("design.toml", "text", _design, _use_design),
-    Room("study", "log", _study, _use_study),
+    Room("study", "sqlite", _study, _use_study),
 ]

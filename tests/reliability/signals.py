@@ -43,7 +43,7 @@ WAYS = {
     "library, warm_up": ["-c", IMPORT + "assoc.warm_up()"],
 }
 RADAR_SCANS = 12
-OUTPUTS = ("o.json", "t.csv", "study/runs.jsonl")
+OUTPUTS = ("o.json", "t.csv", "study/study.sqlite")
 # a program that compiles is to end within a second, and the library after a step of the compiler; on a busy machine
 PATIENCE = 120.0
 BUSY = 4.0

@@ -55,7 +55,7 @@ def work(tmp_path, monkeypatch):
         "assoc.sweep scene.npz --solver greedy -o study --csv scene.npz",
         "assoc.sweep --config sweep.toml --report sweep.toml",
         "assoc.sweep scene.npz --solver greedy -o study --csv study/study.json",
-        "assoc.sweep --summary study --csv study/runs.jsonl",
+        "assoc.sweep --summary study --csv study/study.sqlite",
         "assoc.sweep --summary study --csv o --report o",
     ],
 )

@@ -20,7 +20,7 @@ Writer = Callable[[Path], object]
 def writers() -> Mapping[str, Writer]:
     """Return the functions; what they write is a kilobyte at the least, and made before."""
     from assoc.plotting.report import write_association_report, write_tracking_report
-    from assoc.plotting.study_figures import new_figure, save_png
+    from assoc.plotting.study_figures import new_figure, save_figure
     from assoc.recordings import write_plots, write_tracks
     from assoc.simulation import simulate, simulate_recording
     from assoc.tracking import MultiSensorTracker, track_scene
@@ -43,7 +43,7 @@ def writers() -> Mapping[str, Writer]:
         "tracks": table.to_csv,
         "plots of a radar": lambda path: write_plots(path, recording.recording),
         "truth": lambda path: write_tracks(path, truth.ids, truth.times, truth.positions, recording.velocities),
-        "picture": lambda path: save_png(path, new_figure()),
+        "picture": lambda path: save_figure(path, new_figure()),
         "report": lambda path: write_association_report(path, found, sources, ["scene"] * len(sources)),
         "report of tracks": lambda path: write_tracking_report(path, table.to_frame(), scene),
     }

@@ -2,23 +2,35 @@
 
 import json
 import os
+import shutil
+import sqlite3
+import time
 import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import assoc
 from assoc.errors import InvalidInputError
-from assoc.plotting.study_figures import draw_study
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
+from assoc.sweeps.code_digest import code_digest
+from assoc.sweeps.old_form import import_study
 from assoc.sweeps.sources import StudySource, named_sources
-from assoc.sweeps.store import LOG, MANIFEST, Store, damaged_lines, log_line, run_keys
+from assoc.sweeps.store import COLUMNS, DATABASE, PARAMETERS, Store
+from tests.sizes import few_or_all
 
 
 def same(one, other):
     return one.drop(columns="time").equals(other.drop(columns="time"))
+
+
+def rows_of(folder):
+    with Store(folder) as store:
+        return store.select(f"{', '.join(COLUMNS)} FROM runs")
 
 
 @pytest.fixture
@@ -55,94 +67,123 @@ def test_traces_end_at_the_cost_of_their_run(whole):
     assert (traces.groupby(["setting", "scene", "scan", "repeat"])["cost"].diff().dropna() < 0).all()
 
 
-def test_a_log_cut_anywhere_keeps_what_was_finished_and_goes_on(study, whole, tmp_path):
-    expected = load(whole)
-    log = (whole / LOG).read_bytes()
-    lines = log.splitlines(keepends=True)
-    ends = np.cumsum([len(line) for line in lines])
-    cuts = [*range(0, len(log), max(1, len(log) // 40)), *ends, *(ends - 1), *(ends[:-1] + 1), ends[-1] - 2]
-    for cut in cuts:
-        folder = tmp_path / f"cut-{cut}"
-        folder.mkdir(exist_ok=True)
-        (folder / MANIFEST).write_bytes((whole / MANIFEST).read_bytes())
-        (folder / LOG).write_bytes(log[:cut])
-        with Store(folder, study.manifest) as store:
-            finished = [json.loads(line[9:]) for line, end in zip(lines, ends, strict=True) if end <= cut]
-            runs = {key for entry in finished if "scan" in entry for key in run_keys(entry)}
-            assert store.done == runs
-    for cut in (len(log) // 2, int(ends[-2]) + 3):
-        folder = tmp_path / f"cut-{cut}"
-        folder.mkdir(exist_ok=True)
-        (folder / MANIFEST).write_bytes((whole / MANIFEST).read_bytes())
-        (folder / LOG).write_bytes(log[:cut])
-        counts = study.run(folder)
-        assert counts.done == study.size and same(load(folder), expected)
-        assert damaged_lines(folder) == (cut not in ends)
-        assert study.run(folder).new == 0
+def test_a_kill_at_any_moment_of_writing_leaves_whole_batches(study, whole, tmp_path):
+    """Copies of the folder between all steps of SQLite while a batch is written: what a killed process leaves."""
+    rows = rows_of(whole)
+    states = []
+    with Store(tmp_path / "new", study.manifest) as store:
+
+        def copy():
+            shutil.copytree(tmp_path / "new", tmp_path / f"copy-{len(states)}")
+            states.append(tmp_path / f"copy-{len(states)}")
+
+        for start in (0, 20):
+            store._db.set_progress_handler(copy, 40)
+            assert store.append(study.settings, rows[start : start + 20]) == 20
+            store._db.set_progress_handler(None, 0)
+            copy()
+    assert len(states) > 20
+    found = [len(load(folder)) for folder in states]
+    assert sorted(found) == found and {*found} == {0, 20, 40}
+    study.run(states[len(states) // 2])
+    assert same(load(states[len(states) // 2]), load(whole))
 
 
-def test_a_changed_byte_costs_its_line_alone(study, whole):
-    expected = load(whole)
-    log = bytearray((whole / LOG).read_bytes())
-    log[len(log) - 30] ^= 1
-    (whole / LOG).write_bytes(log)
-    assert len(load(whole)) < study.size and damaged_lines(whole) == 1
-    study.run(whole)
-    assert same(load(whole), expected)
+def spoiled(folder, words, *values):
+    """A study changed by SQL."""
+    with sqlite3.connect(folder / DATABASE) as db:
+        db.execute("PRAGMA ignore_check_constraints = ON")
+        db.execute(words, values)
+    db.close()
 
 
 @pytest.mark.parametrize(
     ("column", "value"),
     [
-        ("repeat", "1"), ("scan", True), ("seed", 2**70), ("seed", None), ("setting", 3), ("cost", "-1"),
-        ("time", {}), ("iterations", 1.5), ("true_tuples", 10**30), ("stopped_by", ["x"]), ("trace", [[1, 2]]),
-        ("trace", [["a", 0, 0]]),
+        ("seed", "one"), ("seed", None), ("cost", "much"), ("time", b"{}"), ("iterations", 1.5),
+        ("true_tuples", "x"), ("stopped_by", b"7"), ("trace", b"1234"), ("trace", "a"),
     ],
 )  # fmt: skip
-def test_a_line_with_a_right_checksum_and_wrong_content_is_passed_over(whole, column, value):
-    lines = (whole / LOG).read_bytes().splitlines(keepends=True)
-    at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
-    entry = json.loads(lines[at][9:])
-    entry[column][-1] = value
-    lines[at] = log_line(entry)
-    (whole / LOG).write_bytes(b"".join(lines))
-    assert damaged_lines(whole) == 1
-    assert len(load(whole)) == 40 - len(entry["scan"]) and len(load_traces(whole)) > 0
+def test_values_of_another_kind_are_one_line(whole, column, value):
+    spoiled(whole, f"UPDATE runs SET {column} = ? WHERE (scan, repeat) = (1, 1)", value)
+    with pytest.raises(InvalidInputError, match="study.sqlite: is damaged") as raised:
+        load(whole)
+    assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("value", [{"a": 1}, [1, 2], "high", None, True, 10**400, float("inf")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "CREATE VIEW more AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x FROM n) SELECT x FROM n",
+        "CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END",
+        "DROP TABLE settings",
+        "ALTER TABLE runs ADD COLUMN mine TEXT",
+        "PRAGMA user_version = 9",
+        "PRAGMA application_id = 0",
+        "UPDATE study SET manifest = '{}'",
+        "UPDATE settings SET parameters = '[1]'",
+        'UPDATE settings SET parameters = \'{"a": "\\ud800"}\'',
+        "UPDATE settings SET parameters = '{\"a\": 1e999}'",
+        "UPDATE study SET manifest = replace(manifest, '\"seed\": 0', '\"seed\": 1e999')",
+        "UPDATE study SET manifest = replace(manifest, 'scene', '\\ud800')",
+        "UPDATE study SET manifest = replace(manifest, '\"gating\": {}', '\"gating\": Infinity')",
+    ],
+)
+def test_a_foreign_file_is_one_line(study, whole, words):
+    spoiled(whole, words)
+    for use in (load, study.run):
+        with pytest.raises(InvalidInputError, match="study.sqlite: (is|has)") as raised:
+            use(whole)
+            load(whole)
+        assert "\n" not in str(raised.value)
+
+
+@few_or_all("count", 60, 2000)
+def test_spoiled_bytes_are_read_or_refused_in_one_line(whole, count):
+    good, refused = (whole / DATABASE).read_bytes(), 0
+    for number in range(count):
+        rng, data = np.random.default_rng(number), bytearray(good)
+        for at in rng.integers(len(data), size=int(rng.integers(1, 40))):
+            data[at] = rng.integers(256)
+        (whole / DATABASE).write_bytes(data[: int(rng.integers(1, len(data)))] if number % 5 == 0 else data)
+        started = time.process_time()
+        try:
+            load(whole)
+            load_traces(whole)
+        except InvalidInputError as error:
+            refused += 1
+            assert "\n" not in str(error) and DATABASE in str(error)
+        assert time.process_time() - started < 5.0
+    assert refused > count / 4
+
+
+@pytest.mark.parametrize("value", [{"a": 1}, [1, 2], "high", None, True, 10**400])
 def test_parameters_of_any_kind_are_shown(whole, value):
     """One setting has a value that no other has the like of: columns of mixed kinds are sorted all the same."""
-    lines = (whole / LOG).read_bytes().splitlines(keepends=True)
-    entry = json.loads(lines[0][9:])
-    entry["parameters"]["alpha"] = value
-    with open(whole / LOG, "wb") as file:
-        body = json.dumps(entry).encode()
-        file.write(b"%08x %s\n" % (zlib.crc32(body), body) + b"".join(lines[1:]))
+    with Store(whole) as store:
+        key, (_, parameters) = next(iter(store.settings().items()))
+    text = json.dumps({**parameters, "alpha": value})
+    spoiled(whole, "UPDATE settings SET parameters = ? WHERE key = ?", text, key)
     frame = load(whole)
     assert len(frame) == 40
     assert str(value) in set(map(str, frame["alpha"])) or value in (None, True) and frame["alpha"].nunique() >= 1
 
 
 def test_a_changed_design_adds(study, whole):
-    before = (whole / LOG).read_bytes()
+    before = rows_of(whole)
     more = replace(study, settings=[*study.settings, *grid("greedy")], repeats=3)
     counts = more.run(whole)
     assert (counts.before, counts.new) == (40, 4 * 5 + 3 * 5)
-    assert (whole / LOG).read_bytes().startswith(before)
+    assert {*before} <= {*rows_of(whole)}
     frame = load(whole)
     assert len(frame) == 75 and not frame.duplicated(["setting", "scene", "scan", "repeat"]).any()
 
 
 def test_a_run_is_kept_once(study, whole):
-    entries = [json.loads(line[9:]) for line in (whole / LOG).read_bytes().splitlines()]
-    batch = next(entry for entry in entries if "scan" in entry)
+    before = rows_of(whole)
     with Store(whole, study.manifest) as store:
-        assert store.append(study.settings, batch) == 0
-    # also if two processes should have written it
-    with open(whole / LOG, "ab") as file:
-        file.write((whole / LOG).read_bytes())
-    assert len(load(whole)) == study.size
+        assert store.append(study.settings, [(*row[:5], 1.0, *row[6:]) for row in before]) == 0
+    assert rows_of(whole) == before
 
 
 def test_another_study_is_refused(study, whole, scene, tmp_path):
@@ -156,19 +197,17 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
     ]:
         with pytest.raises(InvalidInputError, match=message):
             changed.run(whole)
-    content = json.loads((whole / MANIFEST).read_text())
-    (whole / MANIFEST).write_text(json.dumps({**content, "assoc": "0.0.1"}))
-    with pytest.raises(InvalidInputError, match="made by version 0.0.1 of assoc, this is"):
-        study.run(whole)
-    (whole / MANIFEST).write_text(json.dumps({**content, "code": "0" * 16}))
-    with pytest.raises(InvalidInputError, match="solvers or costs of assoc were changed"):
-        study.run(whole)
-    # a study from before there was a digest goes on
-    (whole / MANIFEST).write_text(json.dumps({key: content[key] for key in content if key != "code"}))
+    for old, now, message in [
+        (f'"assoc": "{assoc.__version__}"', '"assoc": "0.0.1"', "made by version 0.0.1 of assoc, this is"),
+        (code_digest(), "0" * 16, "solvers or costs of assoc were changed"),
+    ]:
+        spoiled(whole, "UPDATE study SET manifest = replace(manifest, ?, ?)", old, now)
+        with pytest.raises(InvalidInputError, match=message):
+            study.run(whole)
+        spoiled(whole, "UPDATE study SET manifest = replace(manifest, ?, ?)", now, old)
+    # where the code is unknown the study goes on
+    spoiled(whole, "UPDATE study SET manifest = replace(manifest, ?, '')", code_digest())
     assert study.run(whole).new == 0
-    (whole / MANIFEST).write_text(json.dumps({**content, "version": 2}))
-    with pytest.raises(InvalidInputError, match="has version 2"):
-        study.run(whole)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
     with pytest.raises(InvalidInputError, match="contains other files and no study"):
@@ -183,10 +222,16 @@ def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
         named_sources([scene, again.content], ["a.npz", "b.npz"])
 
 
-def test_one_sweep_at_a_time(study, whole):
-    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is running"):
-        study.run(whole)
-    assert study.run(whole).new == 0
+def test_two_sweeps_at_once_share_a_study(study, whole, tmp_path):
+    """The other one does everything while the first is at its first batch."""
+
+    def other(counts):
+        if not done:
+            done.append(study.run(tmp_path / "s").new)
+
+    done = []
+    counts = study.run(tmp_path / "s", progress=other, batch_seconds=0.01)
+    assert done == [40] and (counts.new, counts.before) == (0, 40) and same(load(tmp_path / "s"), load(whole))
 
 
 def test_problems_and_problems_without_a_solution(tmp_path):
@@ -200,60 +245,53 @@ def test_problems_and_problems_without_a_solution(tmp_path):
     assert not frame.loc["none", "optimal"].any()
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{", '{"format": "assoc.study", "version": 1}', "\x00"])
-def test_a_damaged_manifest_is_one_clear_line(tmp_path, content):
-    (tmp_path / MANIFEST).write_text(content)
-    with pytest.raises(InvalidInputError, match=MANIFEST):
-        load(tmp_path)
+OLD = Path(__file__).parent / "study_of_version_1"
 
 
-def test_without_its_manifest_the_runs_can_be_had_again(study, whole, tmp_path):
-    """The message says how; and it works."""
-    lost = (whole / MANIFEST).read_text()
-    for spoil in (lambda: (whole / MANIFEST).unlink(), lambda: (whole / MANIFEST).write_text(lost[:40])):
-        spoil()
-        with pytest.raises(InvalidInputError, match="start the same sweep in a new folder, and copy its study.json"):
-            study.run(whole)
-        with Store(tmp_path / "new", study.manifest):
-            pass
-        (whole / MANIFEST).write_bytes((tmp_path / "new" / MANIFEST).read_bytes())
-        assert study.run(whole).new == 0
-
-
-def test_half_a_line_on_a_full_disk_is_taken_back(study, whole, tmp_path):
-    """The same open store can go on once there is room."""
-
-    class Full:
-        def __init__(self, log):
-            self.log, self.room = log, 100
-
-        def write(self, data):
-            if self.room == 0:
-                raise OSError(28, "No space left on device")
-            self.room = 0
-            return self.log.write(data[:100])
-
-        def __getattr__(self, name):
-            return getattr(self.log, name)
-
-    entries = [json.loads(line[9:]) for line in (whole / LOG).read_bytes().splitlines()]
+def test_a_study_of_version_1_is_read_into_a_new_folder(scene, tmp_path):
+    for use in (load, lambda folder: Study([scene], grid("greedy")).run(folder)):
+        with pytest.raises(InvalidInputError, match=f"assoc sweep import {OLD} NEW"):
+            use(OLD)
+    assert import_study(OLD, tmp_path / "new") == (12, 1)
+    assert import_study(OLD, tmp_path / "new") == (12, 1)
+    lines = (OLD / "runs.jsonl").read_text().splitlines()
+    entries = [json.loads(line[9:]) for line in lines[:-1]]
     batches = [entry for entry in entries if "scan" in entry]
-    with Store(tmp_path / "new", study.manifest) as store:
-        log, store._log = store._log, Full(store._log)
-        with pytest.raises(InvalidInputError, match="No space left on device"):
-            store.append(study.settings, batches[0])
-        store._log = log
-        assert sum(store.append(study.settings, batch) for batch in batches) == study.size
-    assert damaged_lines(tmp_path / "new") == 0 and same(load(tmp_path / "new"), load(whole))
+    frame, traces = load(tmp_path / "new"), load_traces(tmp_path / "new")
+    assert {*frame["setting"]} == {entry["setting_key"] for entry in entries if "solver" in entry}
+    for name in ("setting", "scan", "repeat", "seed", "cost", "iterations", "time", "correct_tuples"):
+        assert sorted(frame[name]) == sorted(value for batch in batches for value in batch[name])
+    points = [tuple(point) for batch in batches for trace in batch["trace"] for point in trace]
+    assert sorted(points) == sorted(traces[["iteration", "seconds", "cost"]].itertuples(index=False, name=None))
+    assert set(frame["scene"]) == {"scene.npz"} and set(frame["alpha"].dropna()) == {1.0, 2.0}
+    with pytest.raises(InvalidInputError, match="holds no study of an earlier version"):
+        import_study(tmp_path / "new", tmp_path / "again")
+
+
+def test_what_is_wrong_in_an_old_study_is_left_out_or_refused(tmp_path):
+    shutil.copytree(OLD, tmp_path / "old")
+    lines = (OLD / "runs.jsonl").read_bytes().splitlines(keepends=True)
+    for number, (name, value) in enumerate([("cost", "much"), ("scan", 10**30), ("trace", [[1, 2]]), ("seed", None)]):
+        changed = [*lines]
+        at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
+        entry = json.loads(lines[at][9:])
+        entry[name][-1] = value
+        body = json.dumps(entry).encode()
+        changed[at] = b"%08x %s\n" % (zlib.crc32(body), body)
+        (tmp_path / "old" / "runs.jsonl").write_bytes(b"".join(changed))
+        assert import_study(tmp_path / "old", tmp_path / str(number)) == (12 - len(entry["scan"]), 2)
+    (tmp_path / "old" / "study.json").write_text('{"format": "assoc.study", "version": 1, "seed": 1e999}')
+    with pytest.raises(InvalidInputError, match="study.json: is damaged"):
+        import_study(tmp_path / "old", tmp_path / "n")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes that have names")
-@pytest.mark.parametrize("name", [LOG, MANIFEST, ".lock"])
+@pytest.mark.parametrize("name", [DATABASE, DATABASE + "-journal", PARAMETERS])
 @pytest.mark.parametrize("planted", ["link", "link to nothing", "pipe", "device"])
 def test_what_others_put_into_the_folder_is_not_followed(study, whole, tmp_path, name, planted):
     victim = tmp_path / "victim"
-    kept = (whole / name).read_bytes()
-    (whole / name).unlink()
+    kept = (whole / name).read_bytes() if (whole / name).exists() else b"mine"
+    (whole / name).unlink(missing_ok=True)
     if planted == "pipe":
         os.mkfifo(whole / name)
     elif planted == "device":
@@ -267,14 +305,3 @@ def test_what_others_put_into_the_folder_is_not_followed(study, whole, tmp_path,
     assert str(whole) in str(caught.value) and "\n" not in str(caught.value)
     assert victim.read_bytes() == kept if planted == "link" else not victim.exists()
     assert planted == "pipe" or (whole / name).is_symlink()
-    if name == LOG:
-        with pytest.raises(InvalidInputError, match="is a link, a pipe"):
-            load(whole)
-
-
-def test_a_picture_or_report_is_not_written_through_a_link(whole, tmp_path):
-    (tmp_path / "victim").write_text("mine")
-    (whole / "convergence.png").symlink_to(tmp_path / "victim")
-    with pytest.raises(InvalidInputError, match=r"convergence.png: is a link"):
-        draw_study(whole)
-    assert (tmp_path / "victim").read_text() == "mine"

@@ -6,11 +6,13 @@ import pytest
 from scipy import stats
 
 from assoc.errors import InvalidInputError
-from assoc.plotting.study_figures import draw_study
-from assoc.sweeps import grid, load, summarize
+from assoc.plotting.study_figures import convergence, draw_convergence, draw_heat_maps, new_figure
+from assoc.problem import AssignmentProblem
+from assoc.sweeps import compare, grid, load, load_traces, summarize
 from assoc.sweeps.bootstrap import mean_interval, resampled_means, weighted_mean
-from assoc.sweeps.store import Store
+from assoc.sweeps.comparison import paired
 from assoc.sweeps.study import Study
+from assoc.sweeps.summary import latex
 
 
 def test_one_problem_many_repeats_is_the_ordinary_bootstrap():
@@ -70,12 +72,77 @@ def test_the_summary_is_the_mean_of_the_rows(study, tmp_path):
 @pytest.mark.slow
 def test_every_kind_of_design_can_be_drawn(study, scene, tmp_path):
     study.run(tmp_path / "a")
-    assert [path.name for path in draw_study(tmp_path / "a")] == ["heatmap.png", "convergence.png"]
+    frame = load(tmp_path / "a")
+    drawn = [*draw_heat_maps(frame, tmp_path / "h.png"), draw_convergence(tmp_path / "a", tmp_path / "c.pdf")]
     settings = [*grid("aco", {"alpha": [1, 2]}), *grid("milp", {"backend": ["scip", "highs"]}), *grid("greedy")]
     Study(study.sources, settings, 1).run(tmp_path / "b")
-    drawn = [path.name for path in draw_study(tmp_path / "b")]
-    assert drawn == ["heatmap-aco.png", "heatmap-milp.png", "convergence.png"]
-    for path in [*tmp_path.glob("*/*.png")]:
-        assert path.read_bytes().startswith(b"\x89PNG\r\n") and path.stat().st_size > 10_000
-    with Store(tmp_path / "empty", study.manifest), pytest.raises(InvalidInputError, match="no runs yet"):
-        draw_study(tmp_path / "empty")
+    drawn += draw_heat_maps(load(tmp_path / "b"), tmp_path / "h.svg")
+    assert [path.name for path in drawn] == ["h.png", "c.pdf", "h-aco.svg", "h-milp.svg"]
+    for path in drawn:
+        begin = {".png": b"\x89PNG\r\n", ".pdf": b"%PDF", ".svg": b"<?xml"}[path.suffix]
+        assert path.read_bytes().startswith(begin) and path.stat().st_size > 8_000
+    with pytest.raises(InvalidInputError, match="no runs yet"):
+        draw_heat_maps(frame.iloc[:0], tmp_path / "h.png")
+
+
+def test_the_curves_are_labelled(study, tmp_path):
+    study.run(tmp_path / "s")
+    figure = convergence(load(tmp_path / "s"), load_traces(tmp_path / "s"), new_figure())
+    assert [ax.get_xlabel() for ax in figure.axes] == ["iteration", "ms"]
+
+
+def made(rows):
+    """Runs of two settings: (scan, repeat) to costs and times of both."""
+    tables = [
+        {"solver": "aco", "alpha": alpha, "repeat": repeat, "scene": "s", "scan": scan, "cost": value, "time": value,
+         "setting": f"key{alpha}"}
+        for (scan, repeat), values in rows.items()
+        for alpha, value in zip((1.0, 2.0), values, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(tables)
+
+
+def test_settings_are_compared_in_pairs():
+    """Problems differ by far more than the settings do; a run without a partner does not count."""
+    rng = np.random.default_rng(1)
+    rows = {
+        (scan, repeat): (100.0 * scan + 1.0 + x, 100.0 * scan + y)
+        for scan in range(30) for repeat in range(4) for x, y in [rng.normal(0.0, 0.1, 2)]
+    }  # fmt: skip
+    pairs = np.diff([*rows.values()])[:, 0]
+    frame = made({**rows, (30, 0): (5.0, np.nan)})
+    table = paired(frame, "key1.0", "key2.0", ("cost",))
+    (row,) = table.to_dict("records")
+    assert row["pairs"] == 120 and row["difference"] == pytest.approx(-pairs.mean())
+    assert row["first"] - row["second"] == pytest.approx(row["difference"])
+    # by the central limit theorem
+    half = 1.96 * pairs.std() / np.sqrt(120)
+    assert (row["low"], row["high"]) == pytest.approx((-pairs.mean() - half, -pairs.mean() + half), abs=half)
+
+
+def test_settings_are_named_by_words(study, tmp_path):
+    study.run(tmp_path / "s")
+    table = compare(tmp_path / "s", "aco,alpha=1,rho=0.3", "alpha=2,rho=0.9").set_index("measure")
+    frame = load(tmp_path / "s")
+    means = [frame[(frame["alpha"] == a) & (frame["rho"] == r)]["iterations"].mean() for a, r in ((1, 0.3), (2, 0.9))]
+    assert table.loc["iterations", ["first", "second"]].tolist() == pytest.approx(means)
+    assert table.loc["cost", "difference"] == pytest.approx(table.loc["excess", "difference"])
+    for words, message in (
+        ("alpha=1", "names 2 settings of the study, expected one; they differ in rho"),
+        ("greedy", "names 0 settings"),
+        ("colour=1", "no setting of the study has a parameter 'colour'"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            compare(frame, words, "alpha=2,rho=0.9")
+
+
+def test_the_excess_is_over_the_best_of_all_solvers(scene, tmp_path):
+    problem = AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-3.0, -2.0, -2.0], [2, 2])
+    Study(problem, [*grid("greedy"), *grid("exact")]).run(tmp_path / "s")
+    assert load(tmp_path / "s").set_index("solver")["excess"].to_dict() == {"greedy": 1.0, "exact": 0.0}
+
+
+def test_a_table_for_latex():
+    text = latex(["solver", "mean cost", "95 %"], [["my_own", "-1.50", "-2 .. 3"], ["b", "-", "-"]])
+    assert text.splitlines()[0] == r"\begin{tabular}{lrr}"
+    assert r"my\_own & -1.50 & -2 -- 3 \\" in text and r"95 \%" in text

@@ -1,6 +1,7 @@
 """The time of a run is the solver's own: never that of compiling, loading or importing."""
 
 import sys
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -72,6 +73,6 @@ def test_a_run_done_again_has_the_same_random_numbers(tmp_path, monkeypatch):
 def test_a_worker_with_other_code_is_refused(study):
     from assoc.sweeps.worker import Batch, Job, run_batch
 
-    job = Job(tuple(study.sources), 0, None, {}, assoc.__version__, "0" * 16)
+    job = Job(tuple(study.sources), replace(study.manifest, code="0" * 16))
     with pytest.raises(assoc.InvalidInputError, match="other code"):
         run_batch(job, Batch(study.settings, [(0, 0, 0, 0)]))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.options import COMMON, Given, Option, Parser, check_scheduler, flag_of, read_config, verbosity
 from assoc._cli.program import command
-from assoc._cli.values import OneOf, csv_table, html_page, scan_range, whole
+from assoc._cli.values import OneOf, Output, html_page, scan_range, seconds, whole
 from assoc._parameters import parameters_of
 from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
@@ -25,6 +25,7 @@ DEFAULT_SOLVER = "aco"
 SHOWN = 20
 """Number of settings that a terminal shows."""
 
+_FIGURE = Output(".png", ".svg", ".pdf", strict=True, streams=False, extras={"": ("matplotlib", "plot")})
 _OF_FILE = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "*"}),
     Option("solver", "NAME", f"one or more solvers (default {DEFAULT_SOLVER})", rest={"nargs": "+"}),
@@ -33,7 +34,9 @@ _OF_FILE = (
     Option("random", "N", "run N random settings from the values and ranges of --grid", whole(1)),
     Option("repeats", "N", "runs of each setting on each scan, each with its own seed (default 1)", whole(1)),
     Option("scans", "A:B", "only scans A to B-1 of each scene, counted from 0; A alone is one scan"),
-    *(COMMON[name] for name in ("seed", "time_limit", "gate_probability", "max_tuples")),
+    *(COMMON[name] for name in ("seed", "time_limit")),
+    Option("cpu_limit", "S", "processor time of each run, seconds (not for milp)", seconds),
+    *(COMMON[name] for name in ("gate_probability", "max_tuples")),
     Option("output", "FOLDER", "folder of the study", short="-o"),
     COMMON["jobs"],
     COMMON["scheduler"],
@@ -41,15 +44,18 @@ _OF_FILE = (
     Option("target", "NAME", "what --tune minimises: gap (mean gap, default) or time (time to optimum)",
            OneOf(("gap", "time"))),
 )  # fmt: skip
+_OF_TABLE = (
+    Option("all", "", f"print all settings on a terminal, not only the first {SHOWN}"),
+    Option("csv", "FILE", "write the table as CSV, or for LaTeX into a file .tex", Output(".csv", ".tex")),
+)
 _OF_SUMMARY = (
     Option("summary", "FOLDER", "print the table of a study; run nothing"),
-    Option("all", "", f"print all settings on a terminal, not only the first {SHOWN}"),
-    Option("csv", "FILE", "write the table as CSV", csv_table),
+    *_OF_TABLE,
     Option("report", "FILE", "write an HTML page: table, heat maps, convergence (needs assoc[report])", html_page),
-    Option("plot", "", "draw heatmap.png and convergence.png into the folder"),
+    Option("heatmap", "FILE", "draw the means over two parameters: FILE.png, .pdf or .svg", _FIGURE),
+    Option("convergence", "FILE", "draw the excess over the best known cost over time: .png, .pdf or .svg", _FIGURE),
 )
-_EXTRAS = {"plot": ("matplotlib", "plot"), "tune": ("optuna", "tune")}
-"""By option: the package that it needs, and the extra that installs it."""
+OUTPUTS = tuple(option.name for option in _OF_SUMMARY[2:])
 
 
 def parser() -> Parser:
@@ -59,7 +65,9 @@ def parser() -> Parser:
         prog="assoc.sweep",
         usage=f"{called} FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
         f"       {called} --config STUDY.toml\n"
-        f"       {called} --summary FOLDER [--all] [--plot] [--csv FILE] [--report FILE]",
+        f"       {called} --summary FOLDER [--all] [--csv FILE] [--report FILE] [--heatmap FILE] [--convergence FILE]\n"
+        f"       {called} compare FOLDER SETTING SETTING [--csv FILE]     settings as in aco,alpha=1,rho=0.3\n"
+        f"       {called} import OLD NEW     a study of an earlier version into a new folder",
         description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
         "The same command again runs only what is missing.",
     )
@@ -74,16 +82,15 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
 
     made = parser()
     made.elsewhere = lambda: _of_grid(words)
+    made.gone = {"--plot": "write --heatmap FILE.png --convergence FILE.png"}
     given = made.read(words)
-    for name, (package, extra) in _EXTRAS.items():
-        if given[name] is not None:
-            check_extra(package, extra)
+    if given["tune"] is not None:
+        check_extra("optuna", "tune")
     if given["summary"] is not None:
         others = [option.name for option in (*_OF_FILE, COMMON["config"]) if given.of_line(option.name)]
         if others:
             raise InvalidInputError(
-                "--summary: runs nothing and can be combined only with --all, --plot, --csv and --report, "
-                f"not with {others[0]}"
+                f"--summary: runs nothing and can be combined only with --all and outputs, not with {others[0]}"
             )
         _check_outputs(given, given["summary"])
         return given, {}
@@ -92,6 +99,21 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
     _check_combinations(given, tables)
     _check_outputs(given, given["output"])
     return given, tables
+
+
+def read_comparison(words: Sequence[str]) -> Given:
+    """Read the words after ``compare``."""
+    made = Parser(prog="assoc.sweep compare", description="Compare two settings of a study, run by run.")
+    made.declare(
+        Option("folder", "FOLDER", "folder of the study", positional=True),
+        Option("first", "SETTING", "a solver, parameters, or both, as in aco,alpha=1,rho=0.3", positional=True),
+        Option("second", "SETTING", "the other", positional=True),
+        _OF_TABLE[1],
+        *verbosity("nothing more here"),
+    )
+    given = made.read(words)
+    _check_outputs(given, given["folder"])
+    return given
 
 
 def _of_grid(words: Sequence[str]) -> dict[str, str]:
@@ -122,12 +144,12 @@ def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:
 
 def _check_outputs(given: Given, folder: str) -> None:
     """Refuse, before the work, outputs that cannot be written or would overwrite the study or its sources."""
-    from assoc.sweeps.store import LOG, MANIFEST, REPORT
+    from assoc.sweeps.store import FILES
 
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
-    study = [os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT)]
-    given.check_outputs([*given["files"], given["config"]], reserved=study, new_folder=folder)
+    study = [os.path.join(folder, name) for name in FILES]
+    given.check_outputs([*given.get("files", ()), given.get("config")], reserved=study, new_folder=folder)
 
 
 def _solvers(given: Given) -> list[str]:
@@ -157,7 +179,7 @@ def make_study(given: Given, tables: Mapping[str, Any]) -> Study:
         settings = settings_from(tables, given["random"], given["seed"] or 0, f"{given.file}: ")
     else:
         settings = designed(list(_spaces(given).items()), given["random"], given["seed"] or 0, given.label("grid"))
-    return Study(settings=settings, **_scenes(given), **given.some(("seed", "time_limit", "repeats")))
+    return Study(settings=settings, **_scenes(given), **given.some(("seed", "time_limit", "cpu_limit", "repeats")))
 
 
 def tune_parameters(given: Given, progress: Callable[[Any], object]) -> Report:
@@ -174,7 +196,7 @@ def tune_parameters(given: Given, progress: Callable[[Any], object]) -> Report:
         given["tune"],
         progress=progress,
         **sources,
-        **given.some(("seed", "time_limit", "repeats", "target", "jobs", "scheduler")),
+        **given.some(("seed", "time_limit", "cpu_limit", "repeats", "target", "jobs", "scheduler")),
     )
 
 

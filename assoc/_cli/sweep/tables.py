@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from assoc._cli.lines import print_lines
 from assoc._cli.table import print_table
-from assoc.sweeps.summary import INTERVAL, summary_rows
+from assoc._text.plain import printable
+from assoc.sweeps.summary import INTERVAL, comparison_rows, summary_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,17 +70,14 @@ def print_tuning(report: Report) -> None:
     print_lines(f"{report.solver}, {report.trials} trials: {words or 'the defaults are best'}")
     print_lines(f"training: {what} {factor * report.training[0]:.4g} -> {factor * report.training[1]:.4g} {unit}")
     print_lines(f"held out: {report.held_out}")
-    rows = [
-        [
-            row["parameters"],
-            *([f"{factor * row['score']:.4g}"] if report.target == "time" else []),
-            f"{row['gap']:.3g}",
-            f"{100 * row['optimal']:.2f}",
-            f"{1e3 * row['time']:.3g}",
-        ]
-        for row in report.table.to_dict("records")
-    ]
-    print_table(["", *([what] if report.target == "time" else []), "mean gap", "optimal %", "ms"], rows, left=[""])
-    mean, low, high = (factor * value for value in report.difference)
-    verdict = "better" if high < 0 else "worse" if low > 0 else "no difference that shows"
-    print_lines(f"tuned less default: {mean:.4g} {unit}, 95 % interval {low:.4g} .. {high:.4g}: {verdict}")
+    table = report.table
+    print_comparison(table if report.target == "time" else table[table["measure"] != "score"], "tuned", "default")
+
+
+def print_comparison(table: pd.DataFrame, first: str, second: str) -> None:
+    """Print the paired differences of two settings."""
+    headers, rows = comparison_rows(table)
+    print_table(headers, rows, left=[""], joined=[INTERVAL])
+    print_lines(
+        f"first: {printable(first)}; second: {printable(second)}; difference: first less second, in pairs of runs"
+    )

@@ -19,7 +19,7 @@ from assoc.plotting.report.views import number
 from assoc.plotting.study_figures import setting_title
 from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import RESULTS, load, load_traces
-from assoc.sweeps.store import read_manifest
+from assoc.sweeps.store import Store
 from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ brackets, on a narrow screen where it is pointed at.</p>"""
 _CURVES = """<div class="controls"><label>over <select id="trace-axis"><option value="iteration">iterations</option>
 <option value="seconds">time</option></select></label><span id="chosen-setting"></span></div>
 <div id="curves-plot" class="plot large"></div>
-<p class="note">A run counts with the best it has found by then. The settings of least mean gap are in colour,
+<p class="note">A run counts with the best it has found by then. The settings of least mean excess are in colour,
 the one chosen in the table is black.</p>"""
 
 
@@ -72,9 +72,15 @@ def write_sweep_report(
     """
     check_report()
     frame = load(folder) if frame is None else frame
-    manifest = read_manifest(folder).to_dict()
-    used = {key: manifest[key] for key in ("seed", "time_limit")} | dict(manifest["gating"])
-    sources = "".join(f"<li>{escape(source['name'])}</li>" for source in manifest["sources"])
+    with Store(folder) as store:
+        manifest = store.manifest
+    used = {
+        "seed": manifest.seed,
+        "time_limit": manifest.time_limit,
+        "cpu_limit": manifest.cpu_limit,
+        **manifest.gating,
+    }
+    sources = "".join(f"<li>{escape(name)}</li>" for name in manifest.sources.values())
     settings = f"<h3>Sources</h3><ul>{sources}</ul><h3>Study</h3>{definitions(used)}"
     settings += "".join(f"<h3>Parameters of {escape(solver)}</h3>{definitions(same)}" for solver, same in _fixed(frame))
     settings = settings_section(settings, "assoc.sweep", words)
@@ -84,7 +90,7 @@ def write_sweep_report(
         sections = [("summary", "Summary", "<p>The study has no runs yet.</p>"), ("settings", "Settings", settings)]
         Page(name, lead, sections, {"settings": []}, ["sweep.js"]).write(path)
         return
-    table = summarize(frame).sort_values(["gap", "time"], kind="stable").reset_index(drop=True)
+    table = summarize(frame).sort_values(["excess", "time"], kind="stable").reset_index(drop=True)
     names = varied(frame)
     titles = [setting_title(row, names, frame["solver"].nunique() > 1) for row in table.to_dict("records")]
     sections = [
@@ -122,7 +128,7 @@ def _summary(frame: pd.DataFrame, table: pd.DataFrame, titles: Sequence[str]) ->
         "Runs": (f"{len(frame):,}", f"{problems:,} scans or problems, {frame['repeat'].nunique():,} repeats"),
         "Certified optimal": (f"{100 * frame['optimal'].astype(float).mean():.1f} %", "of all runs"),
         "Time": (f"{frame['time'].astype(float).sum():.3g} s", "in the solvers"),
-        "Least mean gap": (f"{best['gap']:.3g}", f"interval {best['gap_low']:.3g} .. {best['gap_high']:.3g}"),
+        "Least mean excess": (f"{best['excess']:.3g}", "cost above the best known of each scan"),
         "Setting of it": (titles[0], "ties are broken by time; see whether intervals differ"),
     }
     return cards(content)
