@@ -19,7 +19,7 @@ from assoc.solution import Solution
 _FAR, _SMALL = 2.0**12, 2.0**-10
 
 
-class Conditioned(NamedTuple):
+class CappedCosts(NamedTuple):
     """A replacement for another problem, with costs in a range that doubles can order."""
 
     problem: AssignmentProblem
@@ -28,7 +28,7 @@ class Conditioned(NamedTuple):
     """The unit of its costs, a power of two."""
     lowered: NDArray[np.bool_] | None = None
     """Tuples that cost less than in the other problem, (M,); None if the problem is unchanged."""
-    known: float = math.inf
+    trace_ceiling: float = math.inf
     """Solutions that cost less than this, in the other problem's unit, have no lowered tuple."""
 
     def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
@@ -79,7 +79,7 @@ class Prepared:
         return PreparedArrays(*given, self.single, packing.row_ptr, packing.row_cols)
 
 
-def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
+def with_capped_costs(problem: AssignmentProblem) -> Iterator[CappedCosts]:
     """Yield the problem with far too large costs lowered, then with fewer of them lowered, until none is.
 
     A cost that is meant to exclude a tuple (a "big M") destroys the digits of all costs added to it. If the best (or
@@ -89,7 +89,7 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
     low, high = (float(costs.min()), float(costs.max())) if costs.size else (0.0, 0.0)
     least = abs(low) or float(np.min(costs, where=costs > 0.0, initial=1.0))
     if high <= _FAR * least and not 0.0 < max(-low, high) < _SMALL:
-        yield Conditioned(problem)
+        yield CappedCosts(problem)
         return
     # every solution has a tuple of at least this cost: the largest of the measurements' least costs
     counts = max(-low, _dearest_need(problem)) or least
@@ -100,11 +100,11 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
         ceiling = 8.0 * size if high > _FAR * counts else np.inf
         lowered = costs > ceiling
         if shift == 0 and not lowered.any():
-            yield Conditioned(problem)
+            yield CappedCosts(problem)
             return
         new_costs = np.ldexp(np.minimum(costs, ceiling), -shift)
         new_problem = AssignmentProblem(problem.tuples, new_costs, problem.sizes, dummy=problem.dummy)
-        yield Conditioned(new_problem, math.ldexp(1.0, shift), lowered, ceiling - size)
+        yield CappedCosts(new_problem, math.ldexp(1.0, shift), lowered, ceiling - size)
         if not lowered.any():
             return
         counts = float(costs[costs <= max(_FAR * counts, float(costs[lowered].min()))].max())

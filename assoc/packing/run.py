@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import get_ident
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from assoc._parameters import Parameters
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import end_is_asked
+from assoc.errors import InfeasibleError
 from assoc.solution import TracePoint
 
 if TYPE_CHECKING:
@@ -27,6 +28,64 @@ Callback = Callable[[TracePoint], object]
 _TRACE = 100_000
 # seconds after which a risen bound gets a point
 _NEWS = 0.5
+FIRST_NODES = 20_000
+"""Nodes of a search for a first solution of a component: some minutes on the hardest seen."""
+
+
+class TreeSearch(Protocol):
+    """A branch and bound that can be stopped and continued: `assoc.packing.branching.search.BranchAndBound`."""
+
+    weight: float
+    nodes: int
+    columns: NDArray[np.int32] | None
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left to search."""
+        ...
+
+    @property
+    def lower_bound(self) -> float:
+        """A lower bound on all solutions."""
+        ...
+
+    @property
+    def out_of_memory(self) -> bool:
+        """Whether the search ended for want of memory."""
+        ...
+
+    def run(self, nodes: int) -> object:
+        """Search some nodes."""
+        ...
+
+
+class Improver(Protocol):
+    """A search at work on one component, whose best cover it improves."""
+
+    def iterate(self) -> None:
+        """Do one iteration."""
+        ...
+
+
+@dataclass(frozen=True)
+class Methods:
+    """Exact methods that a search may use beside itself; it does without those that are None.
+
+    `assign` hands them in (`assoc.solvers.methods`), so that a metaheuristic can be read, and measured, alone.
+    """
+
+    first_solution: Callable[[Packing, Run], NDArray[np.int32] | None] | None = None
+    """The last resort of what must cover rows: the columns of any solution."""
+    tree_search: Callable[..., TreeSearch] | None = None
+    """Branch and bound, called as `BranchAndBound` is: it raises bounds, and ends where it proves the cover."""
+    bound_by_linear_program: Callable[[Any, Run], None] | None = None
+    """Raises the bound of a `Priced` to that of the linear program."""
+    diver: Any = None
+    """The class of what builds covers in the linear program (`Diver`)."""
+    clusters: Any = None
+    """The class of what improves covers by exact sub-steps (`ClusterSearch`)."""
+    improver: Callable[[Any, Run], Improver] | None = None
+    """Makes what improves the incumbent of a `Component` between turns of branching."""
 
 
 def never() -> float:
@@ -51,8 +110,8 @@ class Run:
         Packing weight plus offset is the problem's cost (the offset is the cost of all singletons).
     unit : float
         A packing weight of 1 in the problem's unit, which the trace uses.
-    known : float
-        The trace has ``inf`` for this cost and more: some costs were lowered (`assoc.packing.prepare.Conditioned`).
+    trace_ceiling : float
+        The trace has ``inf`` for this cost and more: some costs were lowered (`assoc.packing.prepare.CappedCosts`).
     time_limit : float or None
         Seconds from ``started``; those spent compiling do not count.
     callback : callable or None
@@ -69,12 +128,14 @@ class Run:
         Seconds that the thread of the run had spent compiling before it.
     thread : int
         The thread that began the run.
+    methods : Methods
+        Exact methods that a search may use beside itself.
     """
 
     seed: int | np.random.SeedSequence | np.random.Generator
     offset: float = 0.0
     unit: float = 1.0
-    known: float = math.inf
+    trace_ceiling: float = math.inf
     time_limit: float | None = None
     callback: Callback | None = None
     watch: Callable[[Any], object] | None = None
@@ -86,6 +147,7 @@ class Run:
     start: NDArray[np.integer] | None = None
     compiled: float = field(default_factory=compile_seconds)
     thread: int = field(default_factory=get_ident)
+    methods: Methods = Methods()
     _rng: np.random.Generator | None = None
 
     @property
@@ -97,7 +159,9 @@ class Run:
 
     def part(self, seed: np.random.Generator | int, time_limit: float | None) -> Run:
         """Return a run with the same clock, for a part of the work."""
-        return Run(seed, time_limit=time_limit, started=self.started, compiled=self.compiled, thread=self.thread)
+        run = Run(seed, time_limit=time_limit, started=self.started, compiled=self.compiled, thread=self.thread)
+        run.methods = self.methods
+        return run
 
     def compile_time(self) -> float:
         """Seconds since the start spent compiling kernels, or loading kernels and the solver's modules."""
@@ -134,7 +198,7 @@ class Run:
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""
         cost, lower_bound = (weight + self.offset) * self.unit, (bound + self.offset) * self.unit
-        point = TracePoint(iteration, self.runtime(), cost if cost < self.known else math.inf, lower_bound)
+        point = TracePoint(iteration, self.runtime(), cost if cost < self.trace_ceiling else math.inf, lower_bound)
         self.trace.append(point)
         if len(self.trace) > _TRACE:
             # for a search that improves for days every second point is enough; the first and the last stay
@@ -168,3 +232,16 @@ class Outcome:
 
 
 SolveFunction = Callable[["Packing", "Parameters", Run], Outcome]
+
+
+def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
+    """Return the error for a problem without dummies in which no solution was found (in the time of a run)."""
+    uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
+    if uncovered:
+        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+    if run is not None and run.stopped_by == "iterations":
+        nodes = f"{FIRST_NODES:,} nodes"
+        return InfeasibleError(f"no complete solution was found in {nodes}; solver exact searches to the end")
+    if run is not None and run.should_stop():
+        return InfeasibleError("no complete solution was found in the time limit")
+    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
-from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.packing import Packing
-from assoc.packing.run import Run
+from assoc.packing.run import Run, infeasible
 from assoc.ranking.columns import AllColumns
 from assoc.ranking.component_ranking import FIRST_BUDGET, ComponentRanking, rank_components
 from assoc.ranking.enumeration import Wanted

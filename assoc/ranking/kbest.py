@@ -22,9 +22,8 @@ from assoc._system import memory
 from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.prepare import Prepared, conditioned, prepare
-from assoc.packing.run import Outcome, Run
+from assoc.packing.prepare import Prepared, prepare, with_capped_costs
+from assoc.packing.run import Outcome, Run, infeasible
 from assoc.problem import AssignmentProblem, check_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.component_ranking import FIRST_BUDGET
@@ -36,6 +35,7 @@ from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.solvers.greedy.solve import greedy_choice
+from assoc.solvers.methods import EXACT_METHODS
 
 # bytes of a solution and of each measurement in it: in the search's stores while they grow, and as an answer
 _SOLUTION, _MEASUREMENT = 2_000, 130
@@ -83,10 +83,10 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     Research 16, 682-687 (1968).
     """
     check_problem(problem)
-    k, clock = checked_k(k), Run(0, time_limit=checked_time_limit(time_limit))
+    k, clock = checked_k(k), Run(0, time_limit=checked_time_limit(time_limit), methods=EXACT_METHODS)
     known: list[Solution] = []
     with interruptible():
-        for version in conditioned(problem):
+        for version in with_capped_costs(problem):
             run = clock.part(0, clock.time_limit)
             found = [version.restored(problem, solution) for solution in rank(version.problem, k, None, run).solutions]
             listed = {solution.tuples.tobytes() for solution in known}
@@ -125,7 +125,7 @@ def rank(
 
     A component is branched on after ``budget`` decisions of enumeration beyond one for each row.
     """
-    run = run or Run(0, time_limit=checked_time_limit(time_limit))
+    run = run or Run(0, time_limit=checked_time_limit(time_limit), methods=EXACT_METHODS)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
     prepared = prepare(problem)

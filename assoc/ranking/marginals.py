@@ -14,9 +14,8 @@ from assoc._system.interrupts import interruptible
 from assoc._text.shown import Shown
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
-from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
-from assoc.packing.run import Run
+from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem
 from assoc.ranking.block_prices import LIGHTEST, ROUNDING
 from assoc.ranking.clusters import cluster_problems, distinct
@@ -29,6 +28,7 @@ from assoc.ranking.partition_function import log_partition
 from assoc.ranking.tuple_sums import WIDEST, sums_and_bounds
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
+from assoc.solvers.methods import EXACT_METHODS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -149,7 +149,7 @@ def marginals(
     checked_k(k)
     if method not in METHODS:
         raise InvalidInputError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    return bounded(problem, k, Run(0, time_limit=checked_time_limit(time_limit)), method)
+    return bounded(problem, k, Run(0, time_limit=checked_time_limit(time_limit), methods=EXACT_METHODS), method)
 
 
 def bounded(problem: AssignmentProblem, k: int, run: Run, method: str, widest: int = WIDEST) -> Marginals:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
-from assoc.packing.run import Run
+from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import AllColumns, distinct_columns, priced, slack_of
 from assoc.ranking.iterative_deepening import Found

@@ -14,7 +14,7 @@ from assoc.packing.run import Outcome, Run
 from assoc.solvers.registry import names, parameters, register
 
 if TYPE_CHECKING:
-    from assoc.packing.neighbourhoods.cover import Cover
+    from assoc.packing.cover import Cover
     from assoc.packing.packing import Packing
     from assoc.solvers.aco.pheromone_history import pheromone
 
@@ -23,7 +23,7 @@ __all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "paramet
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "Cover": "assoc.packing.neighbourhoods.cover",
+        "Cover": "assoc.packing.cover",
         "Packing": "assoc.packing.packing",
         "pheromone": "assoc.solvers.aco.pheromone_history",
     },

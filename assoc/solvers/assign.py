@@ -20,13 +20,14 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
-from assoc.packing.prepare import Prepared, conditioned, prepare
+from assoc.packing.prepare import Prepared, prepare, with_capped_costs
 from assoc.packing.run import Callback, Outcome, Run, SolveFunction
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify, costs_of
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
+from assoc.solvers.methods import EXACT_METHODS
 from assoc.solvers.pairs import proved_pairs
 from assoc.solvers.plausibility import cost_warnings
 from assoc.solvers.start import start_columns
@@ -118,8 +119,8 @@ def assign(
     return solution
 
 
-def _require_functions(**given: object) -> None:
-    for name, function in given.items():
+def _require_functions(**functions: object) -> None:
+    for name, function in functions.items():
         if function is not None and not callable(function):
             raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
 
@@ -145,9 +146,10 @@ def _solution(
     at_once = proved_pairs(problem, make_run(), chosen) if called[0] == "exact" and start is None else None
     if at_once is not None:
         return at_once
-    for posed in conditioned(problem):
+    for posed in with_capped_costs(problem):
         run = make_run()
-        run.unit, run.known = posed.unit, posed.known
+        run.methods = EXACT_METHODS
+        run.unit, run.trace_ceiling = posed.unit, posed.trace_ceiling
         solution = start = posed.restored(problem, _answer(problem, posed.problem, called, chosen, run, start))
         if not posed.alters(solution) or run.stopped_by in _EARLY:
             break
@@ -155,7 +157,7 @@ def _solution(
 
 
 def _answer(
-    given: AssignmentProblem,
+    whole: AssignmentProblem,
     problem: AssignmentProblem,
     called: tuple[str, SolveFunction],
     chosen: Parameters,
@@ -182,15 +184,15 @@ def _answer(
     try:
         outcome = solve(packing, chosen, run)
     except InfeasibleError:
-        known = run.start if run.fallback is None else run.fallback
-        if known is None:
+        last_resort = run.start if run.fallback is None else run.fallback
+        if last_resort is None:
             raise
-        outcome = Outcome(known, 0)
+        outcome = Outcome(last_resort, 0)
     others = [] if run.start is None else [run.start]
     if run.stopped_by == "time_limit":
         others.append(better_of(packing, np.asarray(outcome.columns, dtype=np.int64), run))
     for other in others:
-        outcome = _cheaper(given, prepared, outcome, other, run)
+        outcome = _cheaper(whole, prepared, outcome, other, run)
     return certify(problem, prepared, outcome, run, solver, chosen)
 
 
@@ -209,14 +211,10 @@ def _warn_of_rounding(problem: AssignmentProblem, solution: Solution) -> None:
 
 def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packing: Packing) -> Callable[[Any], object]:
     """Add tuples to the cycles that a solver reports: it knows only columns and rows."""
-    # imported here: only calls with ``watch`` need it
-    from assoc.solvers.aco.cycle import Cycle, tuples_of
 
     def with_tuples(state: Any) -> object:
-        if isinstance(state, Cycle):
-            nodes = tuples_of(problem.tuples, problem.sizes, packing, state.columns, state.rows)
-            state = state._replace(tuples=nodes)
-        return watch(state)
+        add = getattr(state, "with_tuples", None)
+        return watch(state if add is None else add(problem.tuples, problem.sizes, packing))
 
     return with_tuples
 
@@ -225,9 +223,9 @@ def _cheaper(
     problem: AssignmentProblem, prepared: Prepared, outcome: Outcome, other: NDArray[np.integer], run: Run
 ) -> Outcome:
     """Take the other choice if it costs less than the solver's: by costs, as sums of weights lose the last digits."""
-    found, its = costs_of(problem, prepared, outcome.columns), costs_of(problem, prepared, other)
+    costs, its = costs_of(problem, prepared, outcome.columns), costs_of(problem, prepared, other)
     # a sum that is rounded only once has the sign of the exact one
-    if found is None or its is None or math.fsum([*its, *-found]) >= 0.0:
+    if costs is None or its is None or math.fsum([*its, *-costs]) >= 0.0:
         return outcome
     weight = float(prepared.packing.weights[other].sum())
     run.record(outcome.iterations, weight, min(outcome.lower_bound, weight))

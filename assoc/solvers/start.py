@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc.errors import InvalidInputError
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.cover import Cover
 from assoc.packing.prepare import Prepared
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem

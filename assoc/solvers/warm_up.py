@@ -21,12 +21,14 @@ from assoc.errors import InfeasibleError
 from assoc.packing import prepare as packing_form
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.compiling import compile_all_branching_ahead
-from assoc.packing.components.component import split_components
+from assoc.packing.component import split_components
 from assoc.packing.kernels.sorting import ascending
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
+from assoc.solvers.methods import EXACT_METHODS
 
 # measurements of each sensor, and tuples: enough for large components, few enough for tenths of a second
 _ROWS = 24
@@ -89,7 +91,7 @@ class _Line:
 def _begin_searches(names: list[str]) -> None:
     """Compile the kernels that solvers use before their first branch and bound, and between two of them."""
     packing = packing_form.prepare(_small_problem()).packing
-    run = Run(0)
+    run = Run(0, methods=EXACT_METHODS)
     if "exact" in names:
         from assoc.solvers.exact.reduction import Reduction
 
@@ -98,12 +100,13 @@ def _begin_searches(names: list[str]) -> None:
         # the sum that decides whether these multipliers alone are a proof
         _ = reduction.proof
     component = split_components(packing, dual_bound(packing, run=run), np.arange(packing.num_columns))[0]
-    component.offer_greedy()
+    search = LocalSearch(component, run)
+    search.offer_greedy()
     if "tabu" in names:
         from assoc.solvers.tabu.moves import TabuSearch
         from assoc.solvers.tabu.parameters import TabuParameters
 
-        TabuSearch(component, TabuParameters()).iterate(component, run.rng)
+        TabuSearch(component, TabuParameters()).iterate(search)
     if "genetic" in names:
         from assoc.solvers.genetic.parameters import GeneticParameters
         from assoc.solvers.genetic.population import Breeding
@@ -111,12 +114,12 @@ def _begin_searches(names: list[str]) -> None:
         breeding = Breeding(component, GeneticParameters())
         for _ in range(2):
             # a population, then its children
-            breeding.iterate(component, run.rng)
+            breeding.iterate(search)
     if "aco" in names:
-        from assoc.solvers.aco.max_min import Colony
+        from assoc.solvers.aco.colony import Colony
         from assoc.solvers.aco.parameters import AcoParameters
 
-        Colony(component, AcoParameters(), lambda component, colony: None).iterate(component, run.rng)
+        Colony(component, AcoParameters(), lambda component, colony: None).iterate(search)
 
 
 def prepare(names: Iterable[str]) -> None:

@@ -2,8 +2,9 @@
 
 import inspect
 import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 from unittest import mock
@@ -11,16 +12,18 @@ from unittest import mock
 import numba  # noqa: TID251  (a changed kernel is not kept)
 import numpy as np
 
+from assoc.packing import local_search
 from assoc.packing.branching.root import Root, plain_root
-from assoc.packing.components import component
-from assoc.packing.components.component import Component
-from assoc.packing.components.team import Team
-from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.component import Component
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.packing import Packing
-from assoc.solvers.aco import max_min
+from assoc.solvers import assign
+from assoc.solvers.aco import colony
 from assoc.solvers.genetic import population
 from assoc.solvers.genetic.population import Breeding
+from assoc.solvers.improve import Team
+from assoc.solvers.methods import EXACT_METHODS
 from assoc.solvers.tabu import moves
 
 SOLVERS = ("aco", "genetic", "tabu")
@@ -47,10 +50,6 @@ class Part(NamedTuple):
     base: str = WHOLE
 
 
-def _never(*_: Any) -> bool:
-    return False
-
-
 def _uncut(packing: Packing, duals: Any, *_: Any) -> Root:
     """The root of dives without cuts."""
     return plain_root(packing, duals)
@@ -60,36 +59,22 @@ def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextMa
     return lambda: mock.patch.object(owner, name, new)
 
 
-_no_dives = _replaced(Component, "dives", property(_never))
-_no_clusters = _replaced(ClusterSearch, "improve", lambda self, packing, owner, weight, *_: weight)
-_no_rematching = _replaced(component, "improve_dimensionwise", lambda *_: 0.0)
+def _without(*methods: str) -> Callable[[], AbstractContextManager[Any]]:
+    """Some exact methods are not handed in."""
+    less = replace(EXACT_METHODS, **dict.fromkeys(methods))
+    return _replaced(assign, "EXACT_METHODS", less)
 
 
-@contextmanager
-def _both(*contexts: Callable[[], AbstractContextManager[Any]]) -> Iterator[None]:
-    with ExitStack() as stack:
-        for context in contexts:
-            stack.enter_context(context())
-        yield
+_no_rematching = _replaced(local_search, "improve_dimensionwise", lambda *_: 0.0)
 
 
-@contextmanager
-def _no_ants() -> Iterator[None]:
-    """The best cover known in place of the ants'."""
-    iterate = max_min.Colony.iterate
+_walk = LocalSearch.walk
 
-    def without(self: Any, component: Component, rng: Any) -> None:
-        def walk(*_: Any) -> Any:
-            # where nothing is known yet one ant has to walk
-            if component.best is None:
-                return component.random_cover(1.0, rng), 0.0
-            return component.best.copy(), component.weight
 
-        with mock.patch.object(max_min, "walk", walk):
-            iterate(self, component, rng)
-
-    with mock.patch.object(max_min.Colony, "iterate", without):
-        yield
+def _best_known(self: Any, trail: Any, ants: int) -> Any:
+    """The best cover known in place of the ants'; where nothing is known yet one ant has to walk."""
+    best = self.component.best
+    return _walk(self, trail, 1) if best is None else best.copy()
 
 
 _child, _parent = Breeding._child, Breeding._parent
@@ -116,9 +101,9 @@ def _admit_equals(self: Any, component: Component, owner: Any, weight: float) ->
         self.members[worst], self.fitness[worst] = owner, weight
 
 
-def _deposit_unlimited(self: Any, cols: Any, owner: Any, share: float) -> None:
+def _deposit_unlimited(self: Any, owner: Any, share: float) -> None:
     """Pheromone that may fade away."""
-    max_min._update(self.pheromone, self.slack_pheromone, owner, share, 0.0)
+    colony._update(self.pheromone, self.slack_pheromone, owner, share, 0.0)
 
 
 def _rewritten(kernel: Any, old: str, new: str, **kernels: Any) -> Any:
@@ -146,13 +131,13 @@ def _no_moves(*arguments: Any) -> int:
 
 
 OWN = (
-    Part("no ants that walk", ("aco",), without=_no_ants),
+    Part("no ants that walk", ("aco",), without=_replaced(LocalSearch, "walk", _best_known)),
     Part("no ants that dive", ("aco",), {"divers": 0}),
     Part("alpha 0: pheromone ignored", ("aco",), {"alpha": 0.0}),
     Part("beta 0: visibility ignored", ("aco",), {"beta": 0.0}),
-    Part("no pheromone laid", ("aco",), without=_replaced(max_min.Colony, "_deposit", lambda *_: None)),
-    Part("no lower limit of pheromone", ("aco",), without=_replaced(max_min.Colony, "_deposit", _deposit_unlimited)),
-    Part("pheromone never laid anew", ("aco",), without=_replaced(max_min, "_RENEWAL", _NEVER)),
+    Part("no pheromone laid", ("aco",), without=_replaced(colony.Colony, "_deposit", lambda *_: None)),
+    Part("no lower limit of pheromone", ("aco",), without=_replaced(colony.Colony, "_deposit", _deposit_unlimited)),
+    Part("pheromone never laid anew", ("aco",), without=_replaced(colony, "_RENEWAL", _NEVER)),
     Part("no crossover", ("genetic",), without=_replaced(Breeding, "_child", _child_of_one)),
     Part("no selection", ("genetic",), {"tournament": 1}),
     Part("selection inverted", ("genetic",), without=_replaced(Breeding, "_parent", _worst_parent)),
@@ -167,12 +152,12 @@ OWN = (
 """Parts that one of the three has and the others have not."""
 
 SHARED = (
-    Part(_UNDIVED, SOLVERS, without=_no_dives),
+    Part(_UNDIVED, SOLVERS, without=_without("diver")),
     Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(Diver, "root", staticmethod(_uncut))),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Team, "_branch", lambda self: None)),
-    Part("no cluster search", SOLVERS, without=_no_clusters),
+    Part("no cluster search", SOLVERS, without=_without("clusters")),
     Part("no dimensionwise search", SOLVERS, without=_no_rematching),
-    Part("no dives, no cluster search", SOLVERS, without=lambda: _both(_no_dives, _no_clusters), base=_UNDIVED),
+    Part("no dives, no cluster search", SOLVERS, without=_without("diver", "clusters"), base=_UNDIVED),
     Part(_LOCAL, SOLVERS, {"refinement": "local"}),
     Part("local, no dimensionwise search", SOLVERS, {"refinement": "local"}, _no_rematching, _LOCAL),
     Part(ALONE, SOLVERS, {"refinement": "none"}),

@@ -23,8 +23,8 @@ import numpy as np
 
 import assoc
 from assoc._types import Floats
-from assoc.packing.components import search
 from assoc.problem import AssignmentProblem
+from assoc.solvers import improve
 from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.sources import StudySource
@@ -87,7 +87,7 @@ def excesses(case: Case, problems: Sequence[AssignmentProblem], optima: Floats, 
     made = [_setting(case.how, values) for values in settings(grid)]
     sources = [StudySource(instance, f"{number:03d}") for number, instance in enumerate(problems)]
     # what an answer proves is not asked for: it would take longer than the ants
-    without = mock.patch.object(search, "close", lambda component, run: None)
+    without = mock.patch.object(improve, "close", lambda component, run: None)
     with tempfile.TemporaryDirectory(prefix="assoc-") as folder, without:
         Study(sources, made, 1, seed).run(folder)
         frame = load(folder)

@@ -31,7 +31,7 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     assert wanted
     reach = np.sqrt(gate * np.einsum("bii->bi", S)) * (1 + 1e-9)
     boxed = set(zip(*np.nonzero((np.abs(v) <= reach[:, None]).all(axis=2)), strict=True))
-    rows, columns = gating.near_pairs(Expected(h, S), z, tuple(2 * math.pi * turning), gate)
+    rows, columns = gating.near_pairs(Expected(h, S), z, angular, gate)
     assert set(zip(rows, columns, strict=True)) == boxed >= wanted
     assert (np.diff(rows * 1000 + columns) > 0).all()
     # the box is not everything
@@ -40,9 +40,9 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     track, narrow = np.arange(tracks)[::-1].copy(), Expected(h[::-1].copy(), S[::-1] / 4.0)
     near = gating.Near(np.searchsorted(rows, np.arange(tracks + 1)), columns)
     half = {(t, k) for t, k in boxed if (np.abs(v[t, k]) <= reach[t] / 2.0).all()}
-    both = gating.near_both(narrow, track, near, z, tuple(2 * math.pi * turning), gate, 10**6)
+    both = gating.near_both(narrow, track, near, z, angular, gate, 10**6)
     assert list(zip(*both, strict=True)) == sorted((tracks - 1 - t, k) for t, k in half)
-    assert gating.near_both(narrow, track, near, z, tuple(2 * math.pi * turning), gate, 2)[0].size == min(len(half), 3)
+    assert gating.near_both(narrow, track, near, z, angular, gate, 2)[0].size == min(len(half), 3)
 
 
 CUBE = np.array([[0.0, 1e3]] * 3)

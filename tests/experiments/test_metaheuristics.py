@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import assoc
-from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 from assoc.solvers.aco.parameters import AcoParameters
 from experiments.common.claims import Claim, load_json
@@ -50,11 +49,11 @@ def test_parts_are_taken_out_and_put_back(part):
     # two targets' worth of work is enough for what is tested: feasible, not below the optimum, and as before after it
     one = problem("ghosts 10", 1)
     optimum = assoc.assign(one).cost
-    before = Component.dives, parts.moves._moves, parts.max_min.walk, parts.Breeding._parent, parts.Breeding._child
+    before = parts.moves._moves, parts.LocalSearch.walk, parts.Breeding._parent, parts.Breeding._child
     for solver in part.solvers:
         with part.without():
             assert running.run(one, solver, 5.0, 0, iterations=2, **part.parameters) >= optimum - 1e-9
-    after = Component.dives, parts.moves._moves, parts.max_min.walk, parts.Breeding._parent, parts.Breeding._child
+    after = parts.moves._moves, parts.LocalSearch.walk, parts.Breeding._parent, parts.Breeding._child
     assert before == after
 
 
@@ -86,10 +85,10 @@ def test_equal_members_are_admitted_without_the_rule():
 
 def test_pheromone_fades_away_without_its_limit():
     for words, fades in ((parts.WHOLE, False), ("no lower limit of pheromone", True)):
-        colony = parts.max_min.Colony.__new__(parts.max_min.Colony)
+        colony = parts.colony.Colony.__new__(parts.colony.Colony)
         colony.pheromone, colony.slack_pheromone, colony.lowest = np.full(2, 0.3), np.full(1, 0.3), 0.25
         with next(part for part in parts.PARTS if part.words == words).without():
-            colony._deposit(np.zeros((2, 1), np.int32), np.zeros(1, np.int32), 0.5)
+            colony._deposit(np.zeros(1, np.int32), 0.5)
         assert (colony.pheromone[1] < 0.25) == fades and colony.pheromone[0] == pytest.approx(0.65)
 
 

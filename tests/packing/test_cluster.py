@@ -6,10 +6,11 @@ import pytest
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.bounds.priced import Priced
+from assoc.packing.cover import Cover
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.solvers.methods import EXACT_METHODS
 from experiments.common.instances.synthetic import axial_known_optimum, axial_random
 from tests.oracles import brute_force, gated_problem, small_problems
 from tests.packing.test_dimensionwise import feasible
@@ -28,7 +29,7 @@ def _searched(problem, steps, size, rng):
         search.size = size
         cover = Cover.empty(piece)
         cover.add_greedily(np.argsort(piece.weights, kind="stable"))
-        if not cover.complete(Run(rng)):
+        if not cover.complete(Run(rng, methods=EXACT_METHODS)):
             raise InfeasibleError("no solution")
         before = cover.weight
         change, _ = search.search(piece.arrays, cover.owner, rng, steps, nodes=10**6)

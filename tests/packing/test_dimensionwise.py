@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from assoc.errors import InfeasibleError
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.cover import Cover
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise, splits
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
+from assoc.solvers.methods import EXACT_METHODS
 from experiments.common.instances.synthetic import planar_random
 from tests.oracles import axial_problem, brute_force, gated_problem, small_problems
 from tests.packings import is_cover
@@ -17,7 +18,7 @@ from tests.packings import is_cover
 def _random_cover(packing, rng):
     cover = Cover.empty(packing)
     cover.add_greedily(rng.permutation(packing.num_columns).astype(np.int64))
-    if not cover.complete(Run(rng)):
+    if not cover.complete(Run(rng, methods=EXACT_METHODS)):
         raise InfeasibleError("none")
     return cover
 

@@ -1,6 +1,5 @@
 """Dives: covers from the linear program, drawn by pheromone and LP value, and far better than greedy ones."""
 
-from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,22 +9,32 @@ import assoc
 from assoc._system import memory
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import plain_root
-from assoc.packing.components.component import Component
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
 from assoc.packing.run import Run
 from assoc.packing.simplex.dual import OPTIMAL
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.simulation import simulate
-from assoc.solvers.aco.max_min import Colony
+from assoc.solvers.aco.colony import Colony
 from assoc.solvers.aco.parameters import AcoParameters
+from assoc.solvers.exact.search import bound_by_linear_program
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
+from assoc.solvers.methods import EXACT_METHODS
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 from experiments.common.instances.synthetic import axial_known_optimum, wide_gates
 from tests.packings import optimum
-from tests.solvers.pieces import columns_of, component, cover_of, open_problem
+from tests.solvers.pieces import (
+    columns_of,
+    component,
+    cover_of,
+    open_problem,
+    random_covers,
+    search_of,
+    with_greedy_cover,
+)
 
 # no cover is known
 NONE = np.zeros(0, dtype=np.int64)
@@ -38,8 +47,8 @@ def ghosts():
 @pytest.fixture(scope="module")
 def priced():
     """One component of a ghost scene with the multipliers of its linear program."""
-    one = component(ghosts(), "full")
-    one.sharpen(Run(0))
+    one = component(ghosts())
+    bound_by_linear_program(one, Run(0))
     return one
 
 
@@ -71,8 +80,7 @@ def test_dives_are_near_the_bound(priced):
     assert min(left) >= -1e-9
     # the share first left to branch and bound is most of such a small component
     assert Diver(priced, NONE, np.inf).share * priced.packing.num_rows >= 39.0
-    rng = np.random.default_rng(0)
-    greedy = [priced.weight_of(priced.random_cover(8.0, rng)) - priced.bound for _ in range(20)]
+    greedy = [priced.weight_of(owner) - priced.bound for owner in random_covers(priced, 8.0, 20)]
     assert np.median(left) < 0.5 * np.median(greedy)
 
 
@@ -148,7 +156,7 @@ def test_dives_begin_in_a_program_with_cuts(priced, plain):
 
 def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced):
     """If it had none, dives would find none."""
-    owner = priced.random_cover(1.0, np.random.default_rng(0))
+    (owner,) = random_covers(priced, 1.0, 1)
     assert priced.is_complete(owner)
     known = np.array(columns_of(owner))
     without = Diver(priced, NONE, np.inf, core=2)._core
@@ -160,10 +168,9 @@ def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced):
 def test_the_core_is_what_the_program_with_cuts_would_take():
     """Chosen by the multipliers without cuts it lacks the optimum; in the end no column is missing."""
     problem, optimum = axial_known_optimum(14, 1)
-    one = component(problem, "full")
-    one.sharpen(Run(0))
-    one.offer_greedy()
-    assert optimum < one.weight
+    one = component(problem)
+    bound_by_linear_program(one, Run(0))
+    assert optimum < with_greedy_cover(one).weight
     bounds, least = [], []
     for rounds in (1, 3):
         diver = Diver(one, one.best_columns(), np.inf, core=4, rounds=rounds)
@@ -174,48 +181,50 @@ def test_the_core_is_what_the_program_with_cuts_would_take():
 
 
 def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
-    one = component(open_problem(), "full")
-    assert one.packing.num_rows < 30 and not one.dives
-    assert component(ghosts(), "full").dives
-    assert not component(ghosts(), "local").dives
+    def dives(problem, refinement="full"):
+        return search_of(component(problem), 0, refinement).escapes
+
+    assert component(open_problem()).packing.num_rows < 30 and not dives(open_problem())
+    assert dives(ghosts()) and not dives(ghosts(), "local")
+    assert not LocalSearch(component(ghosts()), Run(0)).escapes, "nothing was handed in"
     assert [Diver.pays(SimpleNamespace(num_rows=rows)) for rows in (30, 900, 901)] == [True, True, False]
     large = wide_gates(280, 2)
-    assert component(large, "full").dives
-    one = component(large, "full")
+    assert dives(large)
     monkeypatch.setattr(memory, "available", lambda here=True: 50e6)
-    assert not one.dives
+    assert not dives(large)
 
 
 @pytest.mark.parametrize("over", [1, 2])
 def test_a_program_that_takes_too_long_is_given_up(over):
     """It is tried again where something else took the time; without it, covers are random and dives end."""
-    one = component(ghosts(), "full")
+    one = component(ghosts())
     ends, shares = [-1.0] * over + [np.inf] * 5, []
     left = SimpleNamespace(
         remaining=lambda: 1.0,
         deadline=lambda share=1.0: np.inf if share == 1.0 else shares.append(share) or ends.pop(0),
+        rng=np.random.default_rng(0),
+        methods=EXACT_METHODS,
+        memory_allows=lambda needed: True,
     )
-    one.run = left
-    rng = np.random.default_rng(0)
-    owner = one.dive(0, rng)
-    cover_of(one.packing, columns_of(owner))
+    search = LocalSearch(one, left)
+    assert search.escapes
+    cover_of(one.packing, columns_of(search.escape(0)))
     assert shares == [0.25] * 2
-    assert one.dives is (over == 1)
-    one.dive(1, rng)
+    assert search.escapes is (over == 1)
+    search.escape(1)
     assert len(shares) == 2
 
 
-class Watched(Component):
-    """A component that keeps the number and beta of each dive."""
+class Watched(LocalSearch):
+    """A search that keeps the number and beta of each dive."""
 
-    def dive(self, number, rng, trail=None, beta=1.0):
+    def escape(self, number, trail=None, beta=1.0):
         self.dived.append((number, beta))
-        return super().dive(number, rng, trail, beta)
+        return super().escape(number, trail, beta)
 
 
 def watched():
-    one = component(ghosts(), "full")
-    found = Watched(**{field.name: getattr(one, field.name) for field in fields(one)})
+    found = Watched(component(ghosts()), Run(0, methods=EXACT_METHODS), clusters=1)
     found.dived = []
     return found
 
@@ -223,19 +232,24 @@ def watched():
 def test_the_colony_dives():
     """The number of divers in a cycle; also zero."""
     for divers in (2, 0):
-        one = watched()
-        colony = Colony(one, AcoParameters(divers=divers, beta=0.5, ants=3, clusters=1), lambda *_: None)
+        search = watched()
+        colony = Colony(search.component, AcoParameters(divers=divers, beta=0.5, ants=3), lambda *_: None)
         for _ in range(2):
-            colony.iterate(one, np.random.default_rng(0))
-        assert one.dived == [(number, 0.5) for number in range(2 * divers)]
+            colony.iterate(search)
+        assert search.dived == [(number, 0.5) for number in range(2 * divers)]
 
 
 def test_dives_are_of_four_strictnesses():
     """Each twice that of the dive before."""
 
     def covers(number, beta):
-        one = component(assoc.build_problem(simulate("bearing-only", seed=2, targets=24, scans=1), 0), "full")
-        return [columns_of(one.dive(number, np.random.default_rng(seed), None, beta)) for seed in range(8)]
+        found = []
+        for seed in range(8):
+            problem = assoc.build_problem(simulate("bearing-only", seed=2, targets=24, scans=1), 0)
+            search = search_of(component(problem), seed, "full")
+            assert search.escapes
+            found.append(columns_of(search.escape(number, None, beta)))
+        return found
 
     strict = [covers(number, 1 / 16) for number in range(4)]
     assert len({str(found) for found in strict}) > 1
@@ -246,16 +260,16 @@ def test_dives_are_of_four_strictnesses():
 @pytest.mark.parametrize("searcher", [Breeding, TabuSearch])
 def test_others_dive_once_an_iteration(searcher):
     """In addition to the covers with which a search begins."""
-    one = watched()
-    small = {"clusters": 1, "moves": 3} if searcher is TabuSearch else {"clusters": 1, "population": 6, "offspring": 1}
+    search = watched()
+    small = {"moves": 3} if searcher is TabuSearch else {"population": 6, "offspring": 1}
     parameters = (TabuParameters if searcher is TabuSearch else GeneticParameters)(**small)
-    search, rng = searcher(one, parameters), np.random.default_rng(0)
-    search.iterate(one, rng)
-    one.dived.clear()
-    before = search.dives
-    search.iterate(one, rng)
-    search.iterate(one, rng)
-    assert one.dived == [(before + 1, 1.0), (before + 2, 1.0)]
+    at_work = searcher(search.component, parameters)
+    at_work.iterate(search)
+    search.dived.clear()
+    before = at_work.escapes
+    at_work.iterate(search)
+    at_work.iterate(search)
+    assert search.dived == [(before + 1, 1.0), (before + 2, 1.0)]
 
 
 def test_columns_are_fixed_in_their_order(plain):

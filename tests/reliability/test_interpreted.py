@@ -19,7 +19,7 @@ from tests.sizes import sample
 _CALLS = """
 import numpy as np
 from assoc._system import interpreted
-from assoc.packing.neighbourhoods.cover import chosen_columns
+from assoc.packing.cover import chosen_columns
 
 asked = []
 interpreted.beside.ask = lambda module, name, kinds: asked.append(name)

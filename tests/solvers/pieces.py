@@ -4,9 +4,12 @@ import numpy as np
 
 import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components.component import split_components
+from assoc.packing.component import split_components
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.prepare import prepare
+from assoc.packing.run import Run
 from assoc.simulation import simulate
+from assoc.solvers.methods import EXACT_METHODS
 from experiments.common.instances.synthetic import axial_random
 from tests.oracles import gated_problem
 
@@ -28,16 +31,30 @@ def open_problem():
     return gated_problem(np.random.default_rng(3), (8, 8, 7), 0.3, "mixed")
 
 
-def component(problem, refinement="none"):
+def component(problem):
     """Return the largest component of a problem, with multipliers that leave its gap open."""
     packing = prepare(problem).packing
     duals = dual_bound(packing)
     # looser multipliers: what is reduced to nothing shows no difference between one choice and another
     duals = np.where(packing.slack, np.minimum(1.02 * duals - 0.05, 0.0), duals - 0.05)
     parts = split_components(packing, duals, np.arange(packing.num_columns))
-    one = max(parts, key=lambda part: part.packing.num_columns)
-    one.refinement = refinement
+    return max(parts, key=lambda part: part.packing.num_columns)
+
+
+def search_of(one, seed=0, refinement="none", clusters=5):
+    """Return the local search of a component, with all that `assign` hands in."""
+    return LocalSearch(one, Run(seed, methods=EXACT_METHODS), refinement, clusters)
+
+
+def with_greedy_cover(one):
+    """Offer a component its greedy cover, improved by insertion; returns the component."""
+    search_of(one, refinement="local").offer_greedy()
     return one
+
+
+def random_covers(one, strictness, count):
+    """Return random covers of a component, not improved, of as many seeds."""
+    return [search_of(one, seed).random_cover(strictness) for seed in range(count)]
 
 
 def rows_of(packing, j):

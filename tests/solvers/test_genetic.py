@@ -13,9 +13,12 @@ from tests.solvers.pieces import (
     is_complete,
     open_problem,
     problems,
+    random_covers,
     reference_walk,
     rows_of,
+    search_of,
     temperature,
+    with_greedy_cover,
 )
 
 PROBLEMS = problems()
@@ -122,14 +125,14 @@ class Reference:
 def test_generation_by_generation(name):
     one = component(PROBLEMS[name])
     parameters = GeneticParameters(population=8, offspring=5, tournament=3, refinement="none")
-    breeding, rng = Breeding(one, parameters), np.random.default_rng(11)
+    breeding, search = Breeding(one, parameters), search_of(one, 11)
     expected = Reference(one, parameters, np.random.default_rng(11))
     renewals = 0
     for _ in range(35):
         renewals += expected.stalled > 0 and expected.stalled % RENEWAL == 0
         expected.generation()
         before = one.weight
-        breeding.iterate(one, rng)
+        breeding.iterate(search)
         one.iterations += 1
         one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
         assert [columns_of(member) for member in breeding.members] == expected.members
@@ -140,11 +143,10 @@ def test_generation_by_generation(name):
 
 
 def test_breeding_starts_from_the_best_known():
-    one = component(PROBLEMS["mixed"])
-    one.offer_greedy()
+    one = with_greedy_cover(component(PROBLEMS["mixed"]))
     known = one.best.copy()
     breeding = Breeding(one, GeneticParameters(refinement="none"))
-    breeding.iterate(one, np.random.default_rng(0))
+    breeding.iterate(search_of(one))
     np.testing.assert_array_equal(breeding.members[0], known)
     assert breeding.members.shape == (20, one.packing.num_rows)
 
@@ -161,8 +163,8 @@ def test_a_population_learns_what_others_found():
     """A better cover from elsewhere becomes a member."""
     one = component(open_problem())
     breeding = Breeding(one, GeneticParameters(population=4, offspring=1, refinement="none"))
-    breeding.iterate(one, np.random.default_rng(0))
-    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(200)), key=one.weight_of)
+    breeding.iterate(search_of(one))
+    found = min(random_covers(one, 4.0, 200), key=one.weight_of)
     assert one.offer(found, one.weight_of(found))
-    breeding.iterate(one, np.random.default_rng(1))
+    breeding.iterate(search_of(one, 1))
     assert found.tolist() in breeding.members.tolist()

@@ -6,12 +6,13 @@ import pytest
 import assoc
 from assoc._system import memory
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components.component import split_components
+from assoc.packing.component import split_components
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.exact.regions import close_by_regions
 from assoc.solvers.exact.search import search_to_the_end
 from experiments.common.instances.synthetic import wide_gates
+from tests.solvers.pieces import with_greedy_cover
 
 
 def test_a_scene_that_is_one_component_is_proved():
@@ -47,8 +48,7 @@ def test_regions_bound_and_cover(unit):
         assert packing.granularity == unit
         multipliers = dual_bound(packing, levels=2 + seed % 5)
         parts = split_components(packing, multipliers, packing.origin.astype(np.int64))
-        component = max(parts, key=lambda one: one.packing.num_rows)
-        component.offer_greedy()
+        component = with_greedy_cover(max(parts, key=lambda one: one.packing.num_rows))
         optimum = search_to_the_end(component.packing, 10**6, 0, Run(0)).lower_bound
         close_by_regions(component, lambda part, nodes=seed % 4: search_to_the_end(part, nodes, 0, Run(0)))
         assert component.is_complete(component.best)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.solvers.tabu.moves import TabuSearch, _moves, _Rules
 from assoc.solvers.tabu.parameters import TabuParameters
 from tests.solvers.pieces import (
@@ -15,7 +16,9 @@ from tests.solvers.pieces import (
     problems,
     reference_walk,
     rows_of,
+    search_of,
     temperature,
+    with_greedy_cover,
 )
 
 PROBLEMS = problems()
@@ -25,7 +28,7 @@ class Reference:
     """A cover as a list of columns, moved by the best insertion that is not tabu."""
 
     def __init__(self, one, columns, until, clock=1):
-        self.packing, self.weights = one.packing, one.arrays.weights
+        self.packing, self.weights = one.packing, search_arrays(one.packing).weights
         self.rows = [rows_of(self.packing, j) for j in range(self.packing.num_columns)]
         self.columns, self.until, self.clock = list(columns), until, clock
 
@@ -92,8 +95,7 @@ class Reference:
 @pytest.mark.parametrize("tenure", [0, 3, 30])
 def test_move_by_move(name, tenure):
     """From greedy covers, with and without a column that is forced in, until all is tabu."""
-    one = component(PROBLEMS[name])
-    one.offer_greedy()
+    one = with_greedy_cover(component(PROBLEMS[name]))
     for seed in range(4):
         forced = -1
         if seed % 2:
@@ -103,7 +105,7 @@ def test_move_by_move(name, tenure):
         expected = Reference(one, columns_of(one.best), until.copy())
         owner, best = one.best.copy(), one.best.copy()
         rules = _Rules(1, 60, tenure, forced)
-        clock = _moves(one.arrays, owner, best, until, rules, np.random.default_rng(seed), np.inf)
+        clock = _moves(search_arrays(one.packing), owner, best, until, rules, np.random.default_rng(seed), np.inf)
         found = expected.run(60, tenure, forced, np.random.default_rng(seed))
         assert columns_of(owner) == sorted(expected.columns)
         np.testing.assert_array_equal(owner, cover_of(one.packing, expected.columns))
@@ -180,12 +182,12 @@ class ReferenceSearch:
 def test_iteration_by_iteration(name):
     one = component(PROBLEMS[name])
     parameters = TabuParameters(tenure=4, moves=8, restart=2, refinement="none")
-    search, rng = TabuSearch(one, parameters), np.random.default_rng(5)
+    search, local = TabuSearch(one, parameters), search_of(one, 5)
     expected = ReferenceSearch(one, parameters, np.random.default_rng(5))
     for _ in range(16):
         expected.iterate()
         before = one.weight
-        search.iterate(one, rng)
+        search.iterate(local)
         one.iterations += 1
         one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
         assert columns_of(search.owner) == sorted(expected.columns)
@@ -205,7 +207,9 @@ def moved(one, start, until, tenure, moves=1):
     """Columns after some moves, and the best."""
     owner = cover_of(one.packing, start)
     best = owner.copy()
-    _moves(one.arrays, owner, best, until, _Rules(1, moves, tenure, -1), np.random.default_rng(0), np.inf)
+    _moves(
+        search_arrays(one.packing), owner, best, until, _Rules(1, moves, tenure, -1), np.random.default_rng(0), np.inf
+    )
     return columns_of(owner), columns_of(best)
 
 

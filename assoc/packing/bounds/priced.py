@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from assoc._types import Floats
-from assoc.packing.bounds.dual_ascent import certified_bound, hard_pass, reduced_costs
+from assoc.packing.bounds.dual_ascent import certified_bound, reduced_costs
 from assoc.packing.packing import Packing
-from assoc.packing.run import Run
-from assoc.packing.simplex.linear_program import LinearProgram
 
 TOLERANCE = 1e-9
 """Share of the bound up to which a gap counts as closed."""
 
 
-class Prices(NamedTuple):
+class ReducedCosts(NamedTuple):
     """A priced packing as kernels take it: reduced costs of the columns (N,), multipliers of the rows (R,)."""
 
     reduced: Floats
@@ -40,26 +38,17 @@ class Priced:
         return Priced(packing, duals, reduced_costs(packing, duals), certified_bound(packing, duals))
 
     @property
-    def prices(self) -> Prices:
-        """The prices as kernels take them."""
-        return Prices(self.reduced, self.duals)
+    def costs(self) -> ReducedCosts:
+        """Reduced costs and multipliers as kernels take them."""
+        return ReducedCosts(self.reduced, self.duals)
 
     @property
     def tolerance(self) -> float:
         """Gains below this do not count: they are rounding, or impossible with whole-numbered weights."""
         return max(TOLERANCE * max(1.0, abs(self.bound)), 0.999 * self.packing.granularity)
 
-    def take_over(self, duals: Floats) -> None:
+    def adopt_if_better(self, duals: Floats) -> None:
         """Adopt feasible multipliers if their bound is better."""
         bound = certified_bound(self.packing, duals)
         if bound > self.bound:
             self.bound, self.duals, self.reduced = bound, duals, reduced_costs(self.packing, duals)
-
-    def sharpen(self, run: Run) -> None:
-        """Adopt the multipliers of the linear program, if there is memory to solve it."""
-        packing = self.packing
-        if not run.memory_allows(LinearProgram.memory(packing)):
-            return
-        duals = LinearProgram(packing).solve(duals=self.duals, deadline=run.deadline()).duals
-        hard_pass(packing, duals)
-        self.take_over(duals)

@@ -5,17 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.errors import InfeasibleError, LimitExceededError
+from assoc.errors import LimitExceededError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
-from assoc.packing.run import Run
-
-# nodes for each component: some minutes on the hardest seen; only `exact` searches to the end
-_NODES = 20_000
+from assoc.packing.run import FIRST_NODES, Run
 
 
-def first_solution(packing: Packing, run: Run, nodes: int = _NODES) -> NDArray[np.int32] | None:
+def first_solution(packing: Packing, run: Run, nodes: int = FIRST_NODES) -> NDArray[np.int32] | None:
     """Return the columns of a complete solution; None if there is none, or time or nodes are used up."""
     if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
         return None
@@ -33,15 +30,3 @@ def first_solution(packing: Packing, run: Run, nodes: int = _NODES) -> NDArray[n
             return None
         chosen.append(part.origin[search.columns])
     return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)
-
-
-def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
-    """Return the error for a problem without dummies in which no solution was found (in the time of a run)."""
-    uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
-    if uncovered:
-        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
-    if run is not None and run.stopped_by == "iterations":
-        return InfeasibleError(f"no complete solution was found in {_NODES:,} nodes; solver exact searches to the end")
-    if run is not None and run.should_stop():
-        return InfeasibleError("no complete solution was found in the time limit")
-    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

@@ -24,7 +24,7 @@ from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
-from assoc.packing.bounds.priced import Priced, Prices
+from assoc.packing.bounds.priced import Priced, ReducedCosts
 from assoc.packing.kernels.columns import choose, first_row
 from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
@@ -55,7 +55,7 @@ class _Effort(NamedTuple):
 class ClusterSearch:
     """The cluster search of one component, whose present multipliers are kept.
 
-    ``prices`` are reduced costs (>= 0) and the feasible multipliers they come from, ``by_row`` the columns of each row
+    ``costs`` are reduced costs (>= 0) and the feasible multipliers they come from, ``by_row`` the columns of each row
     (``packing.row_ptr``) in order of reduced cost, ``step`` the least difference between two costs: 1 where all weights
     are whole numbers; ``size`` is the number of rows of the next clusters.
     """
@@ -63,11 +63,11 @@ class ClusterSearch:
     def __init__(self, priced: Priced) -> None:
         packing = priced.packing
         duals = np.where(packing.slack, np.minimum(priced.duals, 0.0), priced.duals)
-        self.prices = Prices(np.maximum(reduced_costs(packing, duals), 0.0), duals)
+        self.costs = ReducedCosts(np.maximum(reduced_costs(packing, duals), 0.0), duals)
         largest = float(np.abs(packing.weights).max(initial=0.0))
         whole = largest < 1e9 and bool((packing.weights == np.rint(packing.weights)).all())
         self.step = 1.0 if whole else 1e-9 * max(1.0, largest)
-        self.by_row = _by_row(packing.arrays.cols, packing.arrays.row_ptr, ascending(self.prices.reduced))
+        self.by_row = _by_row(packing.arrays.cols, packing.arrays.row_ptr, ascending(self.costs.reduced))
         # a cluster of all rows would be an exact solver, not a local search
         self._most = min(_MOST, max(6, 2 * packing.num_rows // 3))
         self.size = min(_START, self._most)
@@ -105,7 +105,7 @@ class ClusterSearch:
         deadline (clock.py).
         """
         effort = _Effort(tries, min(self.size, owner.size), self.step, nodes, _SIDEWAYS)
-        change, cut = _search_clusters(packing, self.by_row, self.prices, owner, rng, effort, deadline)
+        change, cut = _search_clusters(packing, self.by_row, self.costs, owner, rng, effort, deadline)
         return float(change), float(cut) / max(tries, 1)
 
 
@@ -146,7 +146,7 @@ def _take(cols: Ints, owner: Ints, r: int, local: Ints, rows: Ints, num: int) ->
 def _grow(
     packing: PackingArrays,
     by_row: Ints,
-    prices: Prices,
+    costs: ReducedCosts,
     owner: Ints,
     rng: Any,
     size: int,
@@ -155,7 +155,7 @@ def _grow(
 ) -> int:
     """Fill ``rows`` with a cluster and ``local`` with its numbering; starts at a row with a possible gain."""
     cols, row_ptr = packing.cols, packing.row_ptr
-    reduced, duals = prices
+    reduced, duals = costs
     num_rows = owner.size
     start = rng.integers(0, num_rows)
     if rng.random() < 0.8:
@@ -183,11 +183,11 @@ def _grow(
 
 @njit
 def _search_clusters(
-    packing: PackingArrays, by_row: Ints, prices: Prices, owner: Ints, rng: Any, effort: _Effort, deadline: float
+    packing: PackingArrays, by_row: Ints, costs: ReducedCosts, owner: Ints, rng: Any, effort: _Effort, deadline: float
 ) -> Any:
     """Try clusters; return the change of weight, and the number not searched to the end."""
     cols = packing.cols
-    reduced, duals = prices
+    reduced, duals = costs
     tries, size, step, node_limit, sideways = effort
     num_rows, num_sensors = owner.size, cols.shape[1]
     local = np.full(num_rows, -1, np.int32)
@@ -210,7 +210,7 @@ def _search_clusters(
     for _ in range(tries):
         if is_over(deadline):
             break
-        num = _grow(packing, by_row, prices, owner, rng, size, local, rows)
+        num = _grow(packing, by_row, costs, owner, rng, size, local, rows)
         excess = 0.0
         for i in range(num):
             k = owner[rows[i]]
@@ -222,10 +222,10 @@ def _search_clusters(
         budget = excess + tolerance if rng.random() < sideways else excess - step + tolerance
         if excess > step * 0.999 or budget > excess:
             limit = budget
-            count = collect(packing, by_row, prices, rows[:num], local, limit, found)
+            count = collect(packing, by_row, costs, rows[:num], local, limit, found)
             while count < 0:
                 limit *= 0.7
-                count = collect(packing, by_row, prices, rows[:num], local, limit, found)
+                count = collect(packing, by_row, costs, rows[:num], local, limit, found)
             count, base = tighten(found, count, num, budget, max(0.15 * excess, 1e-12), sweep)
             if count > 0:
                 order = order_of(cost[:count])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Floats, Ints
-from assoc.packing.bounds.priced import Prices
+from assoc.packing.bounds.priced import ReducedCosts
 from assoc.packing.packing import PackingArrays
 
 _LEVELS = 4
@@ -49,11 +49,17 @@ class Limits(NamedTuple):
 
 @inner_njit
 def collect(
-    packing: PackingArrays, by_row: Ints, prices: Prices, rows: Ints, local: Ints, limit: float, found: ClusterColumns
+    packing: PackingArrays,
+    by_row: Ints,
+    costs: ReducedCosts,
+    rows: Ints,
+    local: Ints,
+    limit: float,
+    found: ClusterColumns,
 ) -> int:
     """List the columns within the cluster of reduced cost up to ``limit``; -1 if they are too many."""
     cols, slack, row_ptr = packing.cols, packing.slack, packing.row_ptr
-    reduced, duals = prices
+    reduced, duals = costs
     members, cost, origin = found
     num_sensors = cols.shape[1]
     count = 0

@@ -18,7 +18,7 @@ import numpy as np
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
-from assoc.packing.bounds.priced import Prices
+from assoc.packing.bounds.priced import ReducedCosts
 from assoc.packing.kernels.columns import choose, fits, sum_of_weights
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
@@ -40,9 +40,9 @@ class Trail(NamedTuple):
     """Scale of the relevant reduced costs."""
 
     @classmethod
-    def without_pheromone(cls, prices: Prices, strictness: float, temperature: float) -> Trail:
+    def without_pheromone(cls, costs: ReducedCosts, strictness: float, temperature: float) -> Trail:
         """Return a trail in which only reduced costs count."""
-        return cls(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
+        return cls(np.ones(costs.reduced.size), np.ones(costs.duals.size), 1.0, strictness, temperature)
 
 
 @inner_njit
@@ -83,7 +83,7 @@ def _cover_row(packing: PackingArrays, r: int, value: Floats, stay: float, owner
 
 @njit
 def walk(
-    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
+    packing: PackingArrays, costs: ReducedCosts, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
 ) -> Any:
     """Let all ants build a cover, until time is over; return the best one and its weight.
 
@@ -91,7 +91,7 @@ def walk(
     built a complete one.
     """
     cols, weights, slack = packing.cols, packing.weights, packing.slack
-    reduced, duals = prices
+    reduced, duals = costs
     alpha, beta, temperature = trail.alpha, trail.beta, trail.temperature
     num, num_rows = weights.size, slack.size
     value = np.empty(num)

@@ -22,11 +22,11 @@ from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.packing.components.closing import bound_of_choice
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
-from assoc.solvers.aco.cycle import Cycle
+from assoc.packing.short_branching import bound_of_choice
+from assoc.solvers.aco.colony import Cycle
 
 if TYPE_CHECKING:
     from assoc.solvers.aco.parameters import AcoParameters

@@ -18,7 +18,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
-from assoc.solvers.aco.cycle import Cycle, tuples_of
+from assoc.solvers.aco.colony import Cycle, tuples_of
 from assoc.solvers.aco.paper import false_alarms, nodes_of
 from assoc.solvers.assign import assign
 

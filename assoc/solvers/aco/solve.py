@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from assoc.packing.components.component import Component
-from assoc.packing.components.search import search_components
+from assoc.packing.component import Component
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
-from assoc.solvers.aco.cycle import cycle_of
-from assoc.solvers.aco.max_min import Colony
+from assoc.solvers.aco.colony import Colony, cycle_of
 from assoc.solvers.aco.paper import solve_as_in_the_paper
 from assoc.solvers.aco.parameters import AcoParameters
+from assoc.solvers.improve import search_components
 
 
 def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
@@ -28,4 +27,4 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
         if run.watch is not None and component.worker == 0:
             run.watch(cycle_of(packing, component, colony))
 
-    return search_components(lambda component, rng: Colony(component, parameters, report), packing, run, parameters)
+    return search_components(lambda search: Colony(search.component, parameters, report), packing, run, parameters)

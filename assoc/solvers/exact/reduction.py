@@ -30,10 +30,10 @@ from assoc.packing.bounds.dual_ascent import (
     spread,
 )
 from assoc.packing.bounds.priced import TOLERANCE
-from assoc.packing.components.component import Component, split_components
+from assoc.packing.component import Component, split_components
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.copying import copy_to
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
 from assoc.packing.packing import Packing, PackingArrays, assembled, find
 from assoc.packing.run import Run

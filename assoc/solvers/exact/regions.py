@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
-from assoc.packing.components.component import Component
+from assoc.packing.component import Component
 from assoc.packing.kernels.columns import choose_all
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, assemble

@@ -6,30 +6,27 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
-from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
 from assoc.packing.bounds.matched import matched
-from assoc.packing.bounds.priced import TOLERANCE
+from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.branching.compiling import compile_branching_ahead
-from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.components.closing import Branching
-from assoc.packing.components.component import Component, split_component
-from assoc.packing.components.turns import Turns
-from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.component import Component, split_component
+from assoc.packing.cover import Cover, chosen_columns
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.packing import Packing
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Improver, Outcome, Run, infeasible
+from assoc.packing.short_branching import Branching
+from assoc.packing.simplex.linear_program import LinearProgram
+from assoc.packing.turns import Turns
 from assoc.solvers.exact.reduction import Reduction
 from assoc.solvers.exact.regions import close_by_regions
-from assoc.solvers.genetic.parameters import GeneticParameters
-from assoc.solvers.genetic.population import Breeding
-from assoc.solvers.tabu.moves import TabuSearch
-from assoc.solvers.tabu.parameters import TabuParameters
 
-# rows from which tabu search and breeding run from the start: below, branching closes most gaps without a good
+# rows from which the run's improver works from the start: below, branching closes most gaps without a good
 # incumbent, and they join it only after `_ALONE` turns (about a second), for users who stop a long search
 _LARGE = 150
 _ALONE = 100
-# turns of branching between iterations of metaheuristics
+# turns of branching between iterations of the improver
 _TURNS = 3
 # columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 2000
@@ -71,19 +68,18 @@ class _Searches(Turns):
 
 @dataclass(slots=True)
 class _Task:
-    """A component: improved by metaheuristics if it is large, then branched on."""
+    """A component: improved by the run's improver (`Methods`) if it is large, then branched on."""
 
     component: Component
     all: _Searches
     branching: Branching | None = None
-    heuristics: tuple[TabuSearch, Breeding] | None = None
-    improvements: int = 0
-    # turns of branching: since the last iteration of a metaheuristic, and in all
+    improver: Improver | None = None
+    # turns of branching: since the last iteration of the improver, and in all
     turns: int = 0
     age: int = 0
 
     def turn(self) -> bool:
-        """One iteration of a metaheuristic, or some nodes of branch and bound and sometimes an iteration."""
+        """One iteration of the improver, or some nodes of branch and bound and sometimes an iteration."""
         component = self.component
         if self.all.may_keep_gap(component):
             self.all.with_gap |= not component.closed
@@ -93,7 +89,7 @@ class _Task:
                 self._search_better()
                 return False
             if self.branching is None:
-                self.branching = Branching(component, self.all.run)
+                self.branching = Branching(component, self.all.run, BranchAndBound)
                 component.stalled = 0
             # some ten milliseconds of work between two checks of the time
             if not self._branch(self.branching, max(1, 20_000 // max(component.packing.num_columns, 1))):
@@ -122,7 +118,7 @@ class _Task:
             return component.closed
         if nodes <= 0 or self.all.run.should_stop():
             return component.closed
-        self.branching = Branching(component, self.all.run, to_the_end=False)
+        self.branching = Branching(component, self.all.run, BranchAndBound, to_the_end=False)
         return self._branch(self.branching, nodes) or component.closed
 
     def _branch(self, branching: Branching, nodes: int) -> bool:
@@ -137,11 +133,12 @@ class _Task:
         # small components are branched on at once, and without incumbent there is nothing to improve
         packing = component.packing
         large = self.branching is None and component.best is not None and packing.num_rows >= _LARGE
+        large = large and self.all.run.methods.improver is not None
         large = large and packing.num_columns > _THIN * packing.num_rows
         return large and component.stalled * 60 < patience * component.packing.num_rows
 
     def _join(self) -> None:
-        """Give metaheuristics half the time while they improve the incumbent, then less and less."""
+        """Give the improver half the time while they improve the incumbent, then less and less."""
         component = self.component
         self.turns += 1
         self.age += 1
@@ -151,19 +148,14 @@ class _Task:
             self._search_better()
 
     def _search_better(self) -> None:
-        """Do one iteration of a metaheuristic, and exact sub-steps on the incumbent.
-
-        Tabu search and breeding take turns: they get stuck in different places.
-        """
-        component, run = self.component, self.all.run
-        if component.best is None:
+        """Do one iteration of the improver."""
+        component, make = self.component, self.all.run.methods.improver
+        if component.best is None or make is None:
             return
-        if self.heuristics is None:
-            self.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+        if self.improver is None:
+            self.improver = make(component, self.all.run)
         before = component.weight
-        self.heuristics[self.improvements % 2].iterate(component, run.rng)
-        self.improvements += 1
-        component.refine(run, TabuParameters.clusters)
+        self.improver.iterate()
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
 
 
@@ -187,11 +179,10 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     done: list[_Task] = []
     left: list[_Task] = []
     for task in tasks:
-        task.component.run = run
         if task.branch_shortly():
             done.append(task)
         else:
-            left.extend(_Task(part, searches) for part in _sharpen(task.component, searches))
+            left.extend(_Task(part, searches) for part in _bound_better(task.component, searches))
     tasks = done + left
     searches.record(tasks)
     searches.take(tasks)
@@ -223,12 +214,12 @@ def _match(component: Component) -> bool:
     if not component.closed:
         found = matched(component.packing)
         if found is not None and found.weight < math.inf:
-            component.take_over(found.duals)
+            component.adopt_if_better(found.duals)
             component.offer(found.owner, found.weight)
     return component.closed
 
 
-def _sharpen(component: Component, searches: _Searches) -> list[Component]:
+def _bound_better(component: Component, searches: _Searches) -> list[Component]:
     """Repeat the dual ascent, with enough time at every temperature, on a component that the reduction left open."""
     run = searches.run
     if run.should_stop():
@@ -241,7 +232,7 @@ def _sharpen(component: Component, searches: _Searches) -> list[Component]:
         component.offer(cover.owner, cover.weight)
         if searches.good_enough(component):
             return [component]
-    component.take_over(dual_bound(component.packing, run=run))
+    component.adopt_if_better(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():
         packing = component.packing
         useful = None
@@ -266,5 +257,15 @@ def _with_program(component: Component, searches: _Searches) -> list[Component]:
     if searches.may_keep_gap(component):
         return [component]
     if not component.closed and not searches.run.should_stop():
-        component.sharpen(searches.run)
+        bound_by_linear_program(component, searches.run)
     return (None if component.closed else split_component(component, share=0.9)) or [component]
+
+
+def bound_by_linear_program(priced: Priced, run: Run) -> None:
+    """Adopt the multipliers of the linear program, if there is memory to solve it."""
+    packing = priced.packing
+    if not run.memory_allows(LinearProgram.memory(packing)):
+        return
+    duals = LinearProgram(packing).solve(duals=priced.duals, deadline=run.deadline()).duals
+    hard_pass(packing, duals)
+    priced.adopt_if_better(duals)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from assoc._parameters import is_whole
-from assoc.packing.components.parameters import SearchParameters
+from assoc.solvers.search_parameters import SearchParameters
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.components.component import Component
+from assoc.packing.component import Component
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.columns import choose, first_row, fits
 from assoc.packing.kernels.sorting import ascending, order_of
-from assoc.packing.neighbourhoods.cover import Cover
-from assoc.packing.neighbourhoods.insertion import insert_and_eject
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # generations without improvement after which a population is renewed
 _RENEWAL = 10
-# members of a new population that come from the linear program
-_DIVES = 4
+# members of a new population that come from elsewhere (`LocalSearch.escape`)
+_ESCAPES = 4
 
 
 class Breeding:
@@ -41,60 +41,66 @@ class Breeding:
         self.members = np.empty((0, component.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)
         # the least weight known after the last generation
-        self.known = np.inf
-        self.dives = 0
+        self.least_before = np.inf
+        self.escapes = 0
 
-    def iterate(self, component: Component, rng: np.random.Generator) -> None:
+    def iterate(self, search: LocalSearch) -> None:
         """One generation; the first one fills the population."""
-        if component.best is not None and component.weight < self.known - component.tolerance and self.fitness.size:
+        component = search.component
+        if (
+            component.best is not None
+            and component.weight < self.least_before - component.tolerance
+            and self.fitness.size
+        ):
             # a better solution came from refinement or another worker meanwhile
             self._admit(component, component.best.copy(), component.weight)
-        self._breed(component, rng)
-        self.known = component.weight
+        self._breed(search)
+        self.least_before = component.weight
 
-    def _breed(self, component: Component, rng: np.random.Generator) -> None:
+    def _breed(self, search: LocalSearch) -> None:
+        component, rng = search.component, search.run.rng
         if self.fitness.size == 0:
-            self._populate(component, rng)
+            self._populate(search)
             return
-        if component.dives:
-            self.dives += 1
-            owner = component.dive(self.dives, rng)
-            self._admit(component, owner, component.settle(owner, rng, self.parameters.clusters))
+        if search.escapes:
+            self.escapes += 1
+            owner = search.escape(self.escapes)
+            self._admit(component, owner, search.settle(owner))
         for _ in range(self.parameters.offspring):
             mother, father = self._parent(rng), self._parent(rng)
-            owner = self._child(component, mother, father, rng)
-            weight = component.settle(owner, rng, self.parameters.clusters)
-            self._admit(component, owner, weight)
-            if component.closed or component.late:
+            owner = self._child(search, mother, father)
+            self._admit(component, owner, search.settle(owner))
+            if search.over:
                 return
         # a population of near copies starts anew, alternately around its best member and without it
         if component.stalled and component.stalled % _RENEWAL == 0:
             keep = int(np.argmin(self.fitness))
             kept = slice(keep, keep + (component.stalled // _RENEWAL) % 2)
             self.members, self.fitness = self.members[kept], self.fitness[kept]
-            self._populate(component, rng)
+            self._populate(search)
 
-    def _populate(self, component: Component, rng: np.random.Generator) -> None:
+    def _populate(self, search: LocalSearch) -> None:
+        component = search.component
         members = [*self.members]
         fitness = [*self.fitness]
-        if component.best is not None and self.known == np.inf:
+        if component.best is not None and self.least_before == np.inf:
             # only in the first population: a later one may be meant to do without it
             members.append(component.best.copy())
             fitness.append(component.weight)
         while len(members) < self.parameters.population:
-            number, dives = len(members), component.dives
-            if dives and number < _DIVES:
-                owner = component.dive(number, rng)
-                weight = component.settle(owner, rng, self.parameters.clusters)
+            number, escapes = len(members), search.escapes
+            if escapes and number < _ESCAPES:
+                owner = search.escape(number)
+                weight = search.settle(owner)
             else:
                 # random greedy solutions, from strict to loose
-                owner = component.random_cover(2.0 ** (number % 10), rng)
+                owner = search.random_cover(2.0 ** (number % 10))
                 # beside covers from the linear program they provide diversity, not quality
-                weight = component.weight_of(owner) if dives else component.settle(owner, rng, 0)
+                weight = component.weight_of(owner) if escapes else search.settle(owner, exactly=False)
                 component.offer(owner, weight)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
-            if component.closed or component.late:
+            if search.over:
                 break
         self.members, self.fitness = np.array(members, dtype=np.int32), np.array(fitness)
 
@@ -102,12 +108,12 @@ class Breeding:
         drawn = rng.integers(0, self.fitness.size, size=self.parameters.tournament)
         return int(drawn[np.argmin(self.fitness[drawn])])
 
-    def _child(self, component: Component, first: int, second: int, rng: np.random.Generator) -> NDArray[np.int32]:
+    def _child(self, search: LocalSearch, first: int, second: int) -> NDArray[np.int32]:
+        component, rng = search.component, search.run.rng
         mother, father = self.members[first], self.members[second]
-        owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, rng)
-        if component.inserts:
-            rows = np.arange(owner.size, dtype=np.int32)
-            insert_and_eject(component.arrays, owner, rows, component.deadline)
+        owner = _cross(search.arrays, component.reduced, mother, father, component.temperature, rng)
+        if search.inserts:
+            search.insert(owner)
         else:
             # fill open rows with columns that fit, in an order drawn by reduced cost: else no child could gain a tuple
             order = ascending(component.reduced / component.temperature + rng.gumbel(size=component.reduced.size))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from assoc.packing.components.search import search_components
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
+from assoc.solvers.improve import search_components
 
 
 def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
@@ -18,4 +18,4 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
     multi-sensor multi-target tracking, Mathematical and Computer Modelling 26 (1997), for the approach;
     crossover and local search are this package's own.
     """
-    return search_components(lambda component, rng: Breeding(component, parameters), packing, run, parameters)
+    return search_components(lambda search: Breeding(search.component, parameters), packing, run, parameters)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
-from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Outcome, Run, infeasible
 
 
 def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:

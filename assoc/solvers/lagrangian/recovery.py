@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
+from assoc.packing.cover import chosen_columns
 from assoc.packing.kernels.columns import choose_matched
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
 
 

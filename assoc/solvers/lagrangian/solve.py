@@ -30,13 +30,12 @@ from numpy.typing import NDArray
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass, reduced_costs
 from assoc.packing.bounds.priced import Priced
-from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.packing import Packing
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Outcome, Run, infeasible
 from assoc.solvers.lagrangian.arranged import arrange
 from assoc.solvers.lagrangian.parameters import LagrangianParameters
 from assoc.solvers.lagrangian.recovery import recover

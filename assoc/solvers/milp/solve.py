@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 
 from assoc._system.interrupts import StopSignal, in_time
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Outcome, Run, infeasible
 from assoc.solvers.milp.answer import Answer
 from assoc.solvers.milp.cp_sat import solve_by_cp_sat
 from assoc.solvers.milp.math_opt import solve_by_math_opt

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
-from assoc.packing.components.component import Component
+from assoc.packing.component import Component
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.kernels.copying import copy_to
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
 from assoc.packing.packing import PackingArrays
 
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 _FRESH = 3
 # number of new solutions, of which the best is used
 _COVERS = 12
-# how many of them come from the linear program, where covers are built there
-_DIVES = 3
+# how many of them come from elsewhere (`LocalSearch.escape`), where they can
+_ESCAPES = 3
 
 
 class _Rules(NamedTuple):
@@ -51,48 +52,49 @@ class TabuSearch:
         self.until = np.zeros(component.packing.num_columns, dtype=np.int64)
         self.clock = 1
         self.restarts = 0
-        self.dives = 0
+        self.escapes = 0
         self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
 
-    def iterate(self, component: Component, rng: np.random.Generator) -> None:
+    def iterate(self, search: LocalSearch) -> None:
         """Do some moves, then exact sub-steps on the best solution found."""
-        p = self.parameters
+        p, component, rng = self.parameters, search.component, search.run.rng
         forced = -1
         if self.owner is None:
-            self.owner = self._afresh(component, rng)
+            self.owner = self._afresh(search)
         elif component.best is not None and component.stalled and component.stalled % p.restart == 0:
             self.restarts += 1
             self.until[:] = 0
             if self.restarts % _FRESH == 0:
                 # far from the best solution: regions that no chain of moves from it reaches
-                self.owner = self._afresh(component, rng)
+                self.owner = self._afresh(search)
             else:
                 self.owner = component.best.copy()
                 forced = self._force(component, rng)
-        if component.dives:
-            self.dives += 1
-            component.settle(component.dive(self.dives, rng), rng, p.clusters)
+        if search.escapes:
+            self.escapes += 1
+            search.settle(search.escape(self.escapes))
         best = self.owner.copy()
         rules = _Rules(self.clock, p.moves, p.tenure, forced)
-        self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
-        weight = component.improve(best, rng, 0)
+        self.clock = _moves(search.arrays, self.owner, best, self.until, rules, rng, search.deadline)
+        weight = search.improve(best, exactly=False)
         component.offer(best, weight)
         if component.is_complete(best):
-            weight = component.search_clusters(best, weight, rng, p.clusters)
+            weight = search.search_clusters(best, weight, p.clusters)
             if component.offer(best, weight):
                 self.owner = best
 
-    def _afresh(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
-        """Return the best of some new covers, by dives or random greedy ones, each improved by exact sub-steps."""
+    def _afresh(self, search: LocalSearch) -> NDArray[np.int32]:
+        """Return the best of some new covers, from elsewhere or random greedy ones, each improved exactly."""
+        component = search.component
         best, least = component.best, np.inf
-        dives = component.dives
-        for number in range(_DIVES if dives else _COVERS):
-            self.dives += 1
-            owner = component.dive(self.dives, rng) if dives else component.random_cover(2.0 ** (number % 6), rng)
-            weight = component.settle(owner, rng, self.parameters.clusters)
+        escapes = search.escapes
+        for number in range(_ESCAPES if escapes else _COVERS):
+            self.escapes += 1
+            owner = search.escape(self.escapes) if escapes else search.random_cover(2.0 ** (number % 6))
+            weight = search.settle(owner)
             if weight < least and component.is_complete(owner):
                 best, least = owner, weight
-            if component.closed or component.late:
+            if search.over:
                 break
         return Cover.empty(component.packing).owner if best is None else best.copy()
 

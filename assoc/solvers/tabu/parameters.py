@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from assoc.packing.components.parameters import SearchParameters
+from assoc.solvers.search_parameters import SearchParameters
 
 
 @dataclass(frozen=True)

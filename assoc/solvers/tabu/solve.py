@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from assoc.packing.components.search import search_components
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.improve import search_components
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
@@ -18,4 +18,4 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
     target tracking, Progress in Electromagnetics Research 65 (2006), for the approach; the moves are this
     package's own.
     """
-    return search_components(lambda component, rng: TabuSearch(component, parameters), packing, run, parameters)
+    return search_components(lambda search: TabuSearch(search.component, parameters), packing, run, parameters)

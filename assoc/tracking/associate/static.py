@@ -90,7 +90,7 @@ def _pairs(progress: Progress, fused: Array, missed: Array) -> tuple[Array, Arra
     for s, (z, sensor) in seen_by:
         led = np.flatnonzero(lead == s) if len(fused) else np.zeros(0, dtype=np.int64)
         expected, gate = filter.expected(states, sensor), gate_of(sensor, probability)
-        near = near_pairs(expected, z[fused[led, s] - 1], sensor.periods, gate)
+        near = near_pairs(expected, z[fused[led, s] - 1], sensor.angular[: sensor.dim], gate)
         track, which = np.append(track, near[0]), np.append(which, led[near[1]])
     order = np.lexsort((which, track))
     track, which = track[order], which[order]

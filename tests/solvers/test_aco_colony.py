@@ -1,16 +1,15 @@
 """Mode mmas against a plain max-min ant system, cycle by cycle, same random numbers; pheromone by tuple."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
 import assoc
-from assoc.packing.components.component import Component
+from assoc.packing.local_search import LocalSearch
+from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
 from assoc.packing.prepare import prepare
-from assoc.solvers.aco.cycle import cycle_of
-from assoc.solvers.aco.max_min import Colony
+from assoc.packing.run import Run
+from assoc.solvers.aco.colony import Colony, cycle_of
 from assoc.solvers.aco.parameters import AcoParameters
 from tests.solvers.pieces import (
     columns_of,
@@ -18,9 +17,12 @@ from tests.solvers.pieces import (
     is_complete,
     open_problem,
     problems,
+    random_covers,
     reference_walk,
+    search_of,
     temperature,
     weight,
+    with_greedy_cover,
 )
 
 PROBLEMS = problems()
@@ -37,7 +39,9 @@ def test_walks(name, alpha, beta):
         tau, slack_tau = rng.uniform(0.1, 1.0, one.packing.num_columns), rng.uniform(0.1, 1.0, one.packing.num_rows)
         scale = temperature(one, np.inf) * (0.3, 1.0, 10.0)[seed]
         trail = Trail(tau, slack_tau, alpha, beta, scale)
-        owner, least = walk(one.arrays, one.prices, trail, 12, False, np.random.default_rng(seed), np.inf)
+        owner, least = walk(
+            search_arrays(one.packing), one.costs, trail, 12, False, np.random.default_rng(seed), np.inf
+        )
         covers = reference_walk(one, tau, slack_tau, alpha, beta, scale, 12, np.random.default_rng(seed))
         best = min(covers, key=lambda columns: weight(one.packing, columns))
         assert columns_of(owner) == best
@@ -80,12 +84,12 @@ def test_cycle_by_cycle(name, rho):
     parameters = AcoParameters(ants=6, alpha=1.5, beta=0.7, rho=rho, refinement="none")
     told = []
     colony = Colony(one, parameters, lambda who, state: told.append((who, state)))
-    rng = np.random.default_rng(7)
+    search = search_of(one, 7)
     renewed = 0
     expected = reference_colony(one, parameters, 40, np.random.default_rng(7))
     for tau, slack_tau, best in expected:
         before = one.weight
-        colony.iterate(one, rng)
+        colony.iterate(search)
         np.testing.assert_allclose(colony.pheromone, tau, rtol=1e-12)
         np.testing.assert_allclose(colony.slack_pheromone, slack_tau, rtol=1e-12)
         assert (None if one.best is None else columns_of(one.best)) == best
@@ -98,8 +102,7 @@ def test_cycle_by_cycle(name, rho):
 
 
 def test_a_colony_starts_from_the_best_known():
-    one = component(PROBLEMS["mixed"])
-    one.offer_greedy()
+    one = with_greedy_cover(component(PROBLEMS["mixed"]))
     colony = Colony(one, AcoParameters(rho=0.6), lambda *_: None)
     chosen = np.isin(np.arange(one.packing.num_columns), columns_of(one.best))
     np.testing.assert_allclose(colony.pheromone[chosen], 1.0)
@@ -174,13 +177,12 @@ def test_pheromone_by_tuple(mode):
 
 def test_a_colony_learns_what_others_found():
     """A better cover from elsewhere is what every third cycle lays pheromone for."""
-    one = component(open_problem())
-    one.offer_greedy()
+    one = with_greedy_cover(component(open_problem()))
     colony = Colony(one, AcoParameters(ants=1, beta=0.0, rho=0.5, refinement="none"), lambda *_: None)
-    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
+    found = min(random_covers(one, 4.0, 60), key=one.weight_of)
     assert one.offer(found, one.weight_of(found))
     one.iterations = 2
-    colony.iterate(one, np.random.default_rng(0))
+    colony.iterate(search_of(one))
     chosen = np.isin(np.arange(one.packing.num_columns), columns_of(found))
     assert (colony.pheromone[chosen] >= 0.5 + 0.5 * colony.lowest - 1e-12).all()
     assert colony.least == one.weight
@@ -189,8 +191,7 @@ def test_a_colony_learns_what_others_found():
 def test_visibility_of_a_cycle():
     """What choosing a column, or leaving a row alone, adds to the bound."""
     problem = open_problem()
-    one = component(problem)
-    one.offer_greedy()
+    one = with_greedy_cover(component(problem))
     state = cycle_of(prepare(problem).packing, one, Colony(one, AcoParameters(), lambda *_: None))
     scale = temperature(one, one.weight)
     np.testing.assert_allclose(state.visibility[: state.columns.size], np.exp(-one.reduced / scale), rtol=1e-12)
@@ -203,29 +204,27 @@ def diving():
     """Dives that return one cover, the best of many, and what they were given; there are so many until time is over."""
     trails, left = [], [0]
 
-    class Diving(Component):
-        dives = property(lambda self: left[0] > 0)
+    class Diving(LocalSearch):
+        escapes = property(lambda self: left[0] > 0)
 
-        def dive(self, number, rng, trail, beta):
+        def escape(self, number, trail, beta):
             trails.append(trail.copy())
             left[0] -= 1
             return best.copy()
 
-    plain = component(open_problem(), "full")
-    one = Diving(**{field.name: getattr(plain, field.name) for field in fields(plain)})
-    one.refinement = "none"
-    best = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
-    return one, best, trails, left
+    one = component(open_problem())
+    best = min(random_covers(one, 4.0, 60), key=one.weight_of)
+    return Diving(one, Run(0), "none"), best, trails, left
 
 
 def test_divers_draw_by_the_pheromone_and_the_best_of_them_lays_it(diving):
-    one, best, trails, left = diving
-    left[0] = 1
+    search, best, trails, left = diving
+    one, left[0] = search.component, 1
     parameters = AcoParameters(ants=1, divers=1, alpha=1.7, beta=0.0, rho=0.5, refinement="none")
     colony = Colony(one, parameters, lambda *_: None)
     before = np.random.default_rng(2).uniform(0.2, 1.0, one.packing.num_columns)
     colony.pheromone[:] = before
-    colony.iterate(one, np.random.default_rng(0))
+    colony.iterate(search)
     (trail,) = trails
     np.testing.assert_allclose(trail, before**1.7, rtol=1e-12)
     chosen = np.isin(np.arange(one.packing.num_columns), columns_of(best))
@@ -233,8 +232,8 @@ def test_divers_draw_by_the_pheromone_and_the_best_of_them_lays_it(diving):
 
 
 def test_divers_end_when_time_is_over(diving):
-    one, _, trails, left = diving
+    search, _, trails, left = diving
     left[0] = 3
-    colony = Colony(one, AcoParameters(ants=1, divers=100_000, refinement="none"), lambda *_: None)
-    colony.iterate(one, np.random.default_rng(0))
+    colony = Colony(search.component, AcoParameters(ants=1, divers=100_000, refinement="none"), lambda *_: None)
+    colony.iterate(search)
     assert len(trails) == 3

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Ints
-from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.kernels.columns import choose_all
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
 from assoc.packing.packing import Packing
@@ -69,7 +68,7 @@ class Cover:
         insert_and_eject(search_arrays(self.packing), self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
-        """Cover all rows without slack, by ejections and then by a search; return False if that fails.
+        """Cover all rows without slack, by ejections and then by the run's last resort; return False if that fails.
 
         Raises
         ------
@@ -85,7 +84,8 @@ class Cover:
         if run.fallback is not None and run.should_stop():
             # there is another solution to return
             return False
-        columns = first_solution(self.packing, run)
+        last_resort = run.methods.first_solution
+        columns = None if last_resort is None else last_resort(self.packing, run)
         if columns is None:
             return False
         self.owner[:] = Cover.of(self.packing, columns).owner

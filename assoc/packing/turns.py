@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
-from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.components.component import Component
+from assoc.packing.component import Component
+from assoc.packing.cover import Cover
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cover import Cover
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Outcome, Run, infeasible
 
 # share of a component's gap by which its bound must rise for a new point of the trace
 _WORTH = 0.02

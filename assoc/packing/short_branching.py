@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components.component import Component, give_covers, split_components
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.component import Component, give_covers, split_components
+from assoc.packing.cover import Cover
 from assoc.packing.packing import Packing
-from assoc.packing.run import Run
+from assoc.packing.run import Run, TreeSearch
 
 # nodes for a component that a metaheuristic leaves open
 _NODES = 2000
@@ -22,11 +22,16 @@ _AT_ONCE = 20_000
 
 
 class Branching:
-    """Branch and bound (``search``) on one component, some nodes at a time; ``to_the_end`` as in `BranchAndBound`."""
+    """Branch and bound (``search``) on one component, some nodes at a time.
 
-    def __init__(self, component: Component, run: Run, *, to_the_end: bool = True) -> None:
+    ``search_kind`` is called as `BranchAndBound` is; ``to_the_end`` as there.
+    """
+
+    def __init__(
+        self, component: Component, run: Run, search_kind: Callable[..., TreeSearch], *, to_the_end: bool = True
+    ) -> None:
         self._component = component
-        self.search = BranchAndBound(
+        self.search = search_kind(
             component.packing,
             component.duals,
             component.weight,
@@ -55,9 +60,10 @@ class Branching:
 
 def close(component: Component, run: Run) -> None:
     """Raise the bound of an open component by a short branch and bound; its cover stays."""
-    if component.closed or run.should_stop():
+    kind = run.methods.tree_search
+    if kind is None or component.closed or run.should_stop():
         return
-    branching = Branching(component, run)
+    branching = Branching(component, run, kind)
     at_once = nodes_at_once(component.packing.num_columns)
     while not branching.search.done and branching.search.nodes < _NODES and not run.should_stop():
         branching.advance(at_once, gives=False)

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing import short_branching
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components import closing
-from assoc.packing.components.component import split_component, split_components
-from assoc.packing.components.parameters import SearchParameters
-from assoc.packing.components.search import search_components
-from assoc.packing.components.team import Team
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.component import split_component, split_components
+from assoc.packing.cover import Cover
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.simulation import simulate
+from assoc.solvers.improve import Team, search_components
+from assoc.solvers.methods import EXACT_METHODS
+from assoc.solvers.search_parameters import SearchParameters
 from tests.oracles import gated_problem, milp_optimum
 from tests.sizes import sample
-from tests.solvers.pieces import component, problems
+from tests.solvers.pieces import component, problems, random_covers, search_of, with_greedy_cover
 
 PROBLEM = gated_problem(np.random.default_rng(12), (8, 8, 7), 0.5, "mixed")
 
@@ -30,7 +30,7 @@ class Idle:
     def __init__(self):
         self.count = 0
 
-    def iterate(self, component, rng):
+    def iterate(self, search):
         self.count += 1
 
 
@@ -42,7 +42,7 @@ def ghosts():
     whole = prepared.packing
     components = split_components(whole, dual_bound(whole), np.arange(whole.num_columns))
     for one in components:
-        one.offer_greedy()
+        with_greedy_cover(one)
     rest = sum(one.weight for one in components if one.closed)
     (one,) = (one for one in components if not one.closed)
     return one, milp_optimum(problem) - prepared.offset - rest
@@ -52,7 +52,7 @@ def run_idle(**limits):
     """Iterations of a searcher that offers nothing, what ended them, and the weight found."""
     idle = Idle()
     packing = prepare(PROBLEM).packing
-    run = Run(0)
+    run = Run(0, methods=EXACT_METHODS)
     outcome = search_components(lambda *_: idle, packing, run, SearchParameters(**limits))
     return idle.count, run.stopped_by, float(packing.weights[outcome.columns].sum())
 
@@ -75,10 +75,9 @@ def test_the_best_cover_is_refined_by_refinement_full_alone():
 def test_branch_and_bound_beside_a_metaheuristic_finds_and_proves(workers, ghosts):
     """With a searcher that does nothing the solution comes from branch and bound, and is proved optimal."""
     one, optimum = ghosts
-    one.refinement = "full"
     assert one.weight > optimum + 0.1 and not one.closed
     with ThreadPoolExecutor(workers) as pool:
-        team = Team(lambda *_: Idle(), one, Run(0), 0, workers, pool if workers > 1 else None)
+        team = Team(lambda *_: Idle(), search_of(one, 0, "full", 0), workers, pool if workers > 1 else None)
         for _ in range(100):
             team.iterate()
     assert one.closed and one.weight == pytest.approx(optimum, abs=1e-9)
@@ -87,18 +86,17 @@ def test_branch_and_bound_beside_a_metaheuristic_finds_and_proves(workers, ghost
 
 def test_branch_and_bound_beside_is_refinement_full(ghosts):
     one, optimum = ghosts
-    one.refinement = "local"
-    team = Team(lambda *_: Idle(), one, Run(0), 0, 1, None)
+    team = Team(lambda *_: Idle(), search_of(one, 0, "local", 0), 1, None)
     for _ in range(100):
         team.iterate()
     assert one.weight > optimum + 0.1 and one.proven == -np.inf
 
 
 def test_what_is_worse_or_incomplete_is_not_kept():
-    one = component(problems()["axial"], "full")
+    one = component(problems()["axial"])
     empty = np.full(one.packing.num_rows, -1, dtype=np.int32)
     assert not one.offer(empty, -1e9) and one.best is None
-    one.offer_greedy()
+    with_greedy_cover(one)
     best, weight = one.best.copy(), one.weight
     assert not one.offer(best, weight + 1.0)
     assert one.weight == weight
@@ -106,8 +104,8 @@ def test_what_is_worse_or_incomplete_is_not_kept():
 
 def test_a_cover_that_is_kept_weighs_what_its_columns_do():
     """Even if moves have accumulated rounding errors in it."""
-    one = component(PROBLEM, "none")
-    owner = one.random_cover(1.0, np.random.default_rng(0))
+    one = component(PROBLEM)
+    (owner,) = random_covers(one, 1.0, 1)
     assert one.offer(owner, one.weight_of(owner) + 1e-7) and one.weight == one.weight_of(owner)
 
 
@@ -116,13 +114,13 @@ def test_how_much_new_covers_are_improved(name):
     """none: not at all; local: halves are re-matched; full: exact sub-steps, too."""
     weights = {}
     for refinement in ("none", "local", "full"):
-        one = component(problems()[name], refinement)
-        rng = np.random.default_rng(0)
+        one = component(problems()[name])
+        search = search_of(one, 0, refinement)
         found = []
         for _ in range(8):
-            owner = one.random_cover(1e-3, rng)
+            owner = search.random_cover(1e-3)
             before = one.weight_of(owner)
-            after = one.improve(owner, rng, 5)
+            after = search.improve(owner)
             assert after == pytest.approx(one.weight_of(owner), abs=1e-9) and after <= before + 1e-9
             assert refinement != "none" or after == before
             found.append((before, after))
@@ -139,29 +137,29 @@ class Lucky:
         self.cover, self.worker = cover, worker
         self.seen, self.draws = [], []
 
-    def iterate(self, component, rng):
+    def iterate(self, search):
+        component = search.component
         self.seen.append((component.worker, component.weight, component.iterations, component.stalled))
-        self.draws.append(rng.random())
+        self.draws.append(search.run.rng.random())
         if component.worker == self.worker and len(self.seen) == 3:
             component.offer(self.cover, component.weight_of(self.cover))
 
 
 @pytest.mark.parametrize("lucky", [0, 2])
 def test_workers_exchange_their_best(lucky):
-    one = component(PROBLEM, "none")
-    one.offer_greedy()
+    one = with_greedy_cover(component(PROBLEM))
     before = one.weight
-    found = min((one.random_cover(1.0, np.random.default_rng(seed)) for seed in range(40)), key=one.weight_of)
+    found = min(random_covers(one, 1.0, 40), key=one.weight_of)
     after = one.weight_of(found)
     assert after < before - 1e-6
     members = []
 
-    def make(part, rng):
+    def make(search):
         members.append(Lucky(found, lucky))
         return members[-1]
 
     with ThreadPoolExecutor(3) as pool:
-        team = Team(make, one, Run(4), 10, 3, pool)
+        team = Team(make, search_of(one, 4, "none", 10), 3, pool)
         for _ in range(5):
             team.iterate()
             one.iterations += 1
@@ -176,16 +174,15 @@ def test_workers_exchange_their_best(lucky):
 
 def test_workers_refine_covers_of_their_own():
     """Covers are refined in place and in parallel: a shared array would be spoiled."""
-    one = component(PROBLEM, "full")
-    one.offer_greedy()
+    one = with_greedy_cover(component(PROBLEM))
     seen = []
 
     class Keeping(Idle):
-        def iterate(self, part, rng):
-            seen.append(part.best)
+        def iterate(self, search):
+            seen.append(search.component.best)
 
     with ThreadPoolExecutor(3) as pool:
-        Team(lambda *_: Keeping(), one, Run(4), 10, 3, pool).iterate()
+        Team(lambda *_: Keeping(), search_of(one, 4, "full", 10), 3, pool).iterate()
     covers = [*seen, one.best]
     for i, first in enumerate(covers):
         assert not any(np.shares_memory(first, other) for other in covers[i + 1 :])
@@ -217,7 +214,6 @@ def test_small_components_are_bounded_before_they_are_searched(solver):
 def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts):
     """Even if its cover is better by less than the tolerance: no other would ever be found or proved."""
     one, _ = ghosts
-    one.refinement = "full"
     weight = one.weight
 
     class Ended:
@@ -234,8 +230,7 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts):
             pass
 
     one.weight = weight + 0.5 * one.tolerance
-    branching = closing.Branching(one, Run(0))
-    branching.search = Ended()
+    branching = short_branching.Branching(one, Run(0), lambda *_, **__: Ended())
     assert branching.advance(10) == 0
     assert one.closed and one.weight == weight
 
@@ -263,7 +258,7 @@ def _optimal_columns(one):
 @pytest.mark.parametrize("columns, most", [(30, 50), (5_000, 4), (10**6, 1)])
 def test_few_nodes_at_a_time_where_each_takes_long(columns, most):
     """Ctrl-C does not interrupt kernels."""
-    assert closing.nodes_at_once(columns) == most
+    assert short_branching.nodes_at_once(columns) == most
 
 
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
@@ -286,10 +281,9 @@ def test_a_seed_is_not_used_up(solver):
     assert found[0] == found[1]
 
 
-@pytest.mark.parametrize("refinement", ["none", "full"])
-def test_weights_that_are_all_alike_have_a_size(refinement):
+def test_weights_that_are_all_alike_have_a_size():
     """At a temperature near 0, pheromone and chance would have no influence."""
     grid = np.stack(np.meshgrid(*[np.arange(1, 5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     keep = np.random.default_rng(2).random(len(grid)) < 0.3
-    one = component(assoc.AssignmentProblem(grid[keep], np.full(keep.sum(), -1e5), [4, 4, 4]), refinement)
+    one = component(assoc.AssignmentProblem(grid[keep], np.full(keep.sum(), -1e5), [4, 4, 4]))
     assert one.temperature == pytest.approx(0.02 * 1e5)

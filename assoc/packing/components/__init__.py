@@ -1,1 +1,0 @@
-"""The independent components of a packing, searched separately."""

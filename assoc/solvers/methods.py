@@ -1,0 +1,41 @@
+"""What `assign` hands to searches besides themselves: proofs, dives, exact sub-steps, and the last resort."""
+
+from __future__ import annotations
+
+from assoc.packing.branching.feasibility import first_solution
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.component import Component
+from assoc.packing.local_search import LocalSearch
+from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.diving import Diver
+from assoc.packing.run import Methods, Run
+from assoc.solvers.exact.search import bound_by_linear_program
+from assoc.solvers.genetic.parameters import GeneticParameters
+from assoc.solvers.genetic.population import Breeding
+from assoc.solvers.tabu.moves import TabuSearch
+from assoc.solvers.tabu.parameters import TabuParameters
+
+
+class IncumbentSearch:
+    """Improves the incumbent of `exact`: tabu search and breeding in turns, as they get stuck in different places."""
+
+    def __init__(self, component: Component, run: Run) -> None:
+        self._search = LocalSearch(component, run, clusters=TabuParameters.clusters)
+        self._searchers = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+        self._iterations = 0
+
+    def iterate(self) -> None:
+        """Do one iteration of the next one, and exact sub-steps on the incumbent."""
+        self._searchers[self._iterations % 2].iterate(self._search)
+        self._iterations += 1
+        self._search.refine()
+
+
+EXACT_METHODS = Methods(
+    first_solution=first_solution,
+    tree_search=BranchAndBound,
+    bound_by_linear_program=bound_by_linear_program,
+    diver=Diver,
+    clusters=ClusterSearch,
+    improver=IncumbentSearch,
+)
