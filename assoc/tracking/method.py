@@ -1,8 +1,8 @@
 """How a kind of tracker associates a scan with its tracks; all other stages of a step are in `assoc.tracking.step`.
 
 A method is a frozen dataclass of the settings of this kind of tracker. Its functions take a step under way, return
-records and have no side effects. A tracker that decides each scan at once defines `at_once`, and `in_order` for
-measurements with times of their own; the defaults of the other functions suit it.
+records and have no side effects. A tracker that decides each scan at once defines `associate`; the defaults of the
+other functions suit it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.own_times import TimedScan
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
@@ -38,13 +37,26 @@ class Method(ABC):
         """The scan with its measurements in the order in which the method numbers them."""
         return scan
 
-    @abstractmethod
-    def at_once(self, progress: Progress) -> Association:
-        """Associate a scan of one instant with the tracks, which have been predicted to it."""
+    own_times: ClassVar[bool] = True
+    """Whether it takes measurements with times of their own (`Progress.timed`), sectors and identities."""
 
-    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
-        """Associate a scan whose measurements have times of their own with the tracks as of the last scan."""
-        raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        for old in ("at_once", "in_order"):
+            if old in vars(cls):
+                raise InvalidInputError(
+                    f"{cls.__name__}.{old}: a method of association defines associate(progress) instead; "
+                    "progress.timed is None in a scan of one instant"
+                )
+
+    @abstractmethod
+    def associate(self, progress: Progress) -> Association:
+        """Associate a scan with the tracks, update these, and begin new ones.
+
+        Tracks have been predicted to a scan of one instant. If measurements have times of their own, they are those of
+        the last scan, and `progress.timed` predicts. `assoc.tracking.growth` (sensor by sensor) and
+        `assoc.tracking.associate.all_sensors` (all sensors together) do both.
+        """
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
         """Confirm tracks, report decisions, delete tracks."""

@@ -190,9 +190,9 @@ def _evidence(state: TrackerState, scan: Scan) -> PairEvidence | None:
 def associate(progress: Progress) -> Progress:
     """Associate measurements with tracks, update the tracks, and begin new ones."""
     method = progress.settings.method
-    if progress.timed is None:
-        return progress._replace(found=method.at_once(progress))
-    return progress._replace(found=method.in_order(progress, progress.timed))
+    if progress.timed is not None and not method.own_times:
+        raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
+    return progress._replace(found=method.associate(progress))
 
 
 def live(progress: Progress) -> Progress:

@@ -6,18 +6,15 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.own_times import TimedScan
-from assoc.filters.batches import concatenate
 from assoc.scene import Scene
 from assoc.tracking import Tracker
-from assoc.tracking.associate.all_sensors import associated, associated_in_order
+from assoc.tracking.associate.all_sensors import whole_scan
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import misses
 
 
 @dataclass(frozen=True)
@@ -32,29 +29,11 @@ class Oracle(Method):
         """No track has a target."""
         return {}
 
-    def at_once(self, progress: Progress) -> Association:
+    def associate(self, progress: Progress) -> Association:
         """Correct each track by its target's measurements."""
         rows, fresh = self._true_rows(progress)
-        settings, states = progress.settings, progress.state.tracks.states
-        terms = settings.terms
-        missed = misses(progress, states)
-        gain = missed.sum(axis=1)
-        for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
-            seen = np.flatnonzero(rows[:, s])
-            if not len(seen):
-                continue
-            done = settings.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
-            gain[seen] += done.log_likelihood + terms.detection[s] - missed[seen, s]
-            rest = np.setdiff1d(np.arange(len(rows)), seen)
-            back = np.argsort(np.concatenate([seen, rest]), kind="stable")
-            states = concatenate([done.state, states[rest]])[back]
-        return self._noted(progress, associated(progress, states, gain, rows, fresh, missed))
-
-    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
-        """The same where measurements have times of their own."""
-        rows, fresh = self._true_rows(progress)
-        missed = timed.misses(progress.settings.terms)
-        return self._noted(progress, associated_in_order(progress, timed, missed, rows, fresh))
+        scan = whole_scan(progress)
+        return self._noted(progress, scan.associated(scan.follow(np.arange(len(rows)), rows), rows, fresh))
 
     def _true_rows(self, progress: Progress) -> tuple[Array, Array]:
         """Measurements of each track, and of the targets without one."""

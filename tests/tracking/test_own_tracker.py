@@ -27,9 +27,11 @@ class Offset(NamedTuple):
 class FirstComeMethod(Method):
     """Each measurement to the track of its number, if it is near enough; nothing starts tracks."""
 
+    own_times = False
+
     reach: float = 100.0
 
-    def at_once(self, progress):
+    def associate(self, progress):
         tracks, (z,), (sensor,) = progress.state.tracks, progress.scan.measurements, progress.settings.sensors
         count = min(len(tracks), len(z))
         away = np.linalg.norm(z[:count] - tracks.states.mean[:count, :3], axis=1)
@@ -84,3 +86,9 @@ def test_a_method_of_a_users_own_is_a_tracker(tmp_path):
     late = LatePlots(make())
     late.step(1.0, [np.array([[100.0, 0.0, 0.0]])])
     assert [track.track_id for track in late.tracks] == [1]
+
+
+@pytest.mark.parametrize("old", ["at_once", "in_order"])
+def test_a_method_written_for_two_functions_is_told_of_the_one(old):
+    with pytest.raises(InvalidInputError, match=rf"Mine\.{old}: .* defines associate\(progress\) instead"):
+        type("Mine", (FirstComeMethod,), {old: lambda self, progress: None})

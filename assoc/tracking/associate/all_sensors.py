@@ -1,94 +1,261 @@
-"""Shared by trackers that associate all sensors of a scan together: update tracks, and start new ones, by tuples."""
+"""A scan whose sensors are associated together: candidate tuples, tracks corrected by tuples, new tracks of tuples.
+
+Measurements have times of their own (`_InOrder`); one instant for all is the fast case (`_AtOnce`), and trackers need
+not know which it is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.positions import tuple_costs
-from assoc.costs.tracks.own_times import TimedScan, score_costs
+from assoc.costs.tracks.gating import near_pairs
+from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples, score_costs
+from assoc.costs.tracks.tuples import gate_of, grow_track_tuples, require_states
 from assoc.filters.base import predict_each
+from assoc.filters.batches import placed
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import owners
 from assoc.tracking.records.track_batch import ID, STARTED, TrackBatch
-from assoc.tracking.stages.coverage import covered
+from assoc.tracking.stages.coverage import covered, misses
 
 
-def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array, missed: Array) -> Association:
-    """Apply the chosen tuples of a scan of one instant.
+class Corrected(NamedTuple):
+    """M tracks, each corrected by a tuple of measurements, at the end of the scan."""
 
-    Parameters
-    ----------
-    progress : Progress
-        Its T tracks are predicted to the scan.
-    states
-        The tracks' updated states, in their order.
-    gain : array (T,)
-        Gains of their scores.
-    rows : int array (T, S)
-        Their measurements, 1-based, 0 missed.
-    born : int array (K, S)
-        Tuples that belong to no track.
-    missed : array (T, S)
-        Scores of a miss of the tracks; see `assoc.tracking.stages.coverage.misses`.
+    states: Any
+    gain: Array
+    """Gain of the score, (M,)."""
+    when: Array
+    """Time of the last measurement, seconds; NaN where there is none; (M,)."""
+    inside: Array
+    """Whether the tuple passed its gate, bool (M,)."""
+
+    def of(self, rows: Array) -> Corrected:
+        """Select tracks."""
+        return Corrected(self.states[rows], *(part[rows] for part in self[1:]))
+
+
+class WholeScan(ABC):
+    """T tracks and a scan.
+
+    `missed` (T, S) is the score of a miss of each track by each sensor.
     """
-    tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
-    old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh(progress, tuples))
-    return _joined(progress, tracks, rows, missed, (old, anew), begin(progress, born))
+
+    missed: Array
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._tracks = progress, progress.state.tracks
+
+    @abstractmethod
+    def candidates(self) -> tuple[Array, Array, Array]:
+        """Tuples that may be of one target, ordered by track.
+
+        Returns
+        -------
+        int array (M,)
+            Row of the track, -1 for a new target. Every track has a tuple in which all sensors missed it.
+        int32 array (M, S)
+            1-based measurement of each sensor, 0 where it missed.
+        array (M,)
+            Gain of the track's score, or score of the new target.
+        """
+
+    @abstractmethod
+    def near(self, tuples: Array) -> tuple[Array, Array]:
+        """Tracks, and which of the tuples (K, S) may be theirs by the first sensor in it."""
+
+    @abstractmethod
+    def follow(self, track: Array, rows: Array) -> Corrected:
+        """Tracks of these rows (M,), each corrected by a tuple, rows (M, S)."""
+
+    @abstractmethod
+    def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
+        """Tracks of those tuples (K, S) that determine a position, without ids, by position; and which tuples."""
+
+    def begin(self, born: Array) -> tuple[TrackBatch, Array]:
+        """New tracks of those tuples (K, S) that determine a position, with ids by position; and their tuples."""
+        tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(self._progress.settings.sensors))
+        if not len(tuples) or self._progress.settings.starter is not None:
+            return self._tracks[:0], tuples[:0]
+        new, which = self.begun(tuples)
+        new.counts[:, ID] = self._progress.work.new_ids(len(new))
+        return new, tuples[which]
+
+    def associated(self, after: Corrected, rows: Array, born: Array) -> Association:
+        """Apply the chosen tuples: `rows` (T, S) of the tracks, corrected by them, and `born` (K, S) of none."""
+        tracks = self._tracks.scored(after.states, after.gain, after.when)
+        old, anew = _begun_anew(self, self._progress, tracks, rows)
+        new, of_new = self.begin(born)
+        stay = np.setdiff1d(np.arange(len(tracks)), old) if len(old) else slice(None)
+        fresh = np.ones(len(anew) + len(new), dtype=np.bool_)
+        hit = np.concatenate([rows[stay].any(axis=1), fresh])
+        at_all = np.concatenate([covered(self._progress, self.missed[stay]), fresh])
+        batch = TrackBatch.concatenate([tracks[stay], anew, new]).counted(hit, at_all)
+        taken = np.concatenate([rows[stay], rows[old], of_new])
+        return Association(batch, owners(taken, batch.track_id, self._progress.scan.sizes))
 
 
-def associated_in_order(progress: Progress, timed: TimedScan, missed: Array, rows: Array, born: Array) -> Association:
-    """Like `associated`, for measurements with times of their own; `missed` is `TimedScan.misses`."""
-    track, terms = np.arange(len(rows)), progress.settings.terms
-    followed = timed.follow(track, rows)
-    gain = -score_costs(timed, followed, rows, terms, missed[track])
-    when = np.where(rows.any(axis=1), followed.when, np.nan)
-    tracks = progress.state.tracks.scored(timed.at_end(followed, track), gain, when)
-    old, anew = _begun_anew(progress, tracks, rows, lambda tuples: _fresh_in_order(progress, timed, tuples, missed))
-    return _joined(progress, tracks, rows, missed[track], (old, anew), begin_in_order(progress, timed, born, missed))
+class _AtOnce(WholeScan):
+    """All sensors covered everything at one instant, to which the tracks are predicted."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__(progress)
+        self.missed = misses(progress, self._tracks.states)
+
+    def candidates(self) -> tuple[Array, Array, Array]:
+        """Tuples of tracks by their kernel, and those of the scan's problem that are better than false alarms."""
+        settings, scan = self._progress.settings, self._progress.scan
+        known = grow_track_tuples(
+            settings.filter, self._tracks.states, list(scan.measurements), settings.sensors, settings.terms,
+            self.missed, gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
+        )  # fmt: skip
+        rows, scores = new_targets(self._progress)
+        track = np.append(known.track, np.full(len(rows), -1))
+        gain = np.append(-known.costs - scan.crowding(known.rows), scores)
+        return track, np.concatenate([known.rows, rows]), gain
+
+    def near(self, tuples: Array) -> tuple[Array, Array]:
+        """By the gates of the predicted tracks."""
+        settings, tracks, found = self._progress.settings, [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        lead = np.argmax(tuples > 0, axis=1) if len(tuples) else np.zeros(0, dtype=np.int64)
+        for s, (z, sensor) in enumerate(zip(self._progress.scan.measurements, settings.sensors, strict=True)):
+            led = np.flatnonzero(lead == s)
+            expected = settings.filter.expected(self._tracks.states, sensor)
+            gate = gate_of(sensor, settings.gate_probability)
+            near = near_pairs(expected, z[tuples[led, s] - 1], sensor.angular[: sensor.dim], gate)
+            tracks.append(near[0])
+            found.append(led[near[1]])
+        return np.concatenate(tracks), np.concatenate(found)
+
+    def follow(self, track: Array, rows: Array) -> Corrected:
+        """Sensor after sensor; inside by the distances of all measurements together."""
+        settings, scan = self._progress.settings, self._progress.scan
+        require_states(self._tracks.states, len(track))
+        whole = len(track) == len(self._tracks) and bool((track == np.arange(len(track))).all())
+        states = self._tracks.states if whole else self._tracks.states[track]
+        missed = self.missed if whole else self.missed[track]
+        alone = missed.sum(axis=1)
+        gain = alone - scan.crowding(rows)
+        nis, freedom = np.zeros(len(track)), np.zeros(len(track), dtype=np.int64)
+        for s, (z, sensor) in enumerate(zip(scan.measurements, settings.sensors, strict=True)):
+            seen, rest = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
+            if not len(seen):
+                continue
+            done = settings.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
+            gain[seen] += done.log_likelihood + settings.terms.detection[s] - missed[seen, s]
+            nis[seen] += done.nis
+            freedom[seen] += sensor.dim
+            states = placed(len(track), [(rest, states[rest]), (seen, done.state)])
+        largest = int(sum(sensor.dim for sensor in settings.sensors))
+        inside = nis <= chi_square_quantiles(settings.gate_probability, largest)[freedom]
+        inside &= (gain > alone) | (freedom == 0)
+        return Corrected(states, gain, np.where(freedom > 0, scan.time, np.nan), inside)
+
+    def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
+        """At the fused positions."""
+        settings, scan = self._progress.settings, self._progress.scan
+        positions, covariances, fit = settings.births.fused(scan, tuples)
+        order = np.flatnonzero(fit)
+        order = order[np.lexsort(positions[order].T)]
+        rows, positions, covariances = tuples[order], positions[order], covariances[order]
+        states = settings.initiation.start(settings.filter, positions, covariances)
+        costs = tuple_costs(settings.scene, scan, rows, speed=settings.initiation.speed)
+        costs -= settings.births.overlooked(rows, positions, covariances)
+        score = settings.births.scores(rows, costs, positions, covariances) - scan.crowding(rows)
+        return TrackBatch.new(states, np.zeros(len(order), dtype=np.int64), score, scan.time), order
 
 
-def _joined(
-    progress: Progress, tracks: TrackBatch, rows: Array, missed: Array, anew: tuple[Array, TrackBatch],
-    born: tuple[TrackBatch, Array],
-) -> Association:  # fmt: skip
-    """Join tracks, those that begin anew and which they replace, and new ones; `missed`: scores of a miss, (T, S)."""
-    old, begun = anew
-    stay = np.setdiff1d(np.arange(len(tracks)), old) if len(old) else slice(None)
-    fresh = np.ones(len(begun) + len(born[0]), dtype=np.bool_)
-    hit = np.concatenate([rows[stay].any(axis=1), fresh])
-    at_all = np.concatenate([covered(progress, missed[stay]), fresh])
-    batch = TrackBatch.concatenate([tracks[stay], begun, born[0]]).counted(hit, at_all)
-    taken = np.concatenate([rows[stay], rows[old], born[1]])
-    return Association(batch, owners(taken, batch.track_id, progress.scan.sizes))
+class _InOrder(WholeScan):
+    """Measurements have times of their own: tracks and new targets are filtered in their order."""
+
+    def __init__(self, progress: Progress, timed: TimedScan) -> None:
+        super().__init__(progress)
+        self._timed, self._misses = timed, timed.misses(progress.settings.terms)
+        self.missed = self._misses[: len(self._tracks)]
+
+    def candidates(self) -> tuple[Array, Array, Array]:
+        """Tuples of tracks and of new targets; of these only those that are better than false alarms."""
+        settings = self._progress.settings
+        found = grow_timed_tuples(self._timed, settings.terms, self._misses, settings.max_tuples)
+        good = np.flatnonzero((found.track >= 0) | (found.costs < 0))
+        return found.track[good], found.rows[good], -found.costs[good]
+
+    def near(self, tuples: Array) -> tuple[Array, Array]:
+        """By the gates of the tracks at any time of the scan."""
+        tracks, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        lead = np.argmax(tuples > 0, axis=1) if len(tuples) else np.zeros(0, dtype=np.int64)
+        for s, z in enumerate(self._progress.scan.measurements):
+            led = np.flatnonzero(lead == s)
+            leads = np.full(len(z), -1)
+            leads[tuples[led, s] - 1] = led
+            track, measurement = self._timed.near(s)
+            there = leads[measurement] >= 0
+            tracks.append(track[there])
+            found.append(leads[measurement][there])
+        return np.concatenate(tracks), np.concatenate(found)
+
+    def follow(self, track: Array, rows: Array) -> Corrected:
+        """From measurement to measurement, each within its gate."""
+        timed, terms = self._timed, self._progress.settings.terms
+        followed = timed.follow(track, rows)
+        gain = -score_costs(timed, followed, rows, terms, self.missed[track])
+        when = np.where(rows.any(axis=1), followed.when, np.nan)
+        return Corrected(timed.at_end(followed, track), gain, when, followed.inside)
+
+    def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
+        """From the first measurement that determines a position."""
+        settings, timed = self._progress.settings, self._timed
+        fit = [np.append(mask, False)[tuples[:, s] - 1] for s, mask in enumerate(timed.places.fit)]
+        good = np.flatnonzero(np.any(fit, axis=0))
+        if not len(good):
+            return self._tracks[:0], good
+        rows, fresh = tuples[good], np.full(len(good), -1)
+        followed = timed.follow(fresh, rows)
+        states = timed.at_end(followed, fresh)
+        anchors = timed.anchors(rows, followed.lead)
+        score = -score_costs(timed, followed, rows, settings.terms, self._misses[anchors])
+        order = np.lexsort(states.mean[:, list(settings.filter.motion.position)].T)
+        batch = TrackBatch.new(states[order], np.zeros(len(order), dtype=np.int64), score[order], followed.when[order])
+        batch.numbers[:, STARTED] = followed.first[order]
+        return batch, good[order]
 
 
-def _begun_anew(
-    progress: Progress, tracks: TrackBatch, rows: Array, fresh: Callable[[Array], tuple[TrackBatch, Array]]
-) -> tuple[Array, TrackBatch]:
+def whole_scan(progress: Progress) -> WholeScan:
+    """The scan of a step and its tracks."""
+    return _AtOnce(progress) if progress.timed is None else _InOrder(progress, progress.timed)
+
+
+def new_targets(progress: Progress) -> tuple[Array, Array]:
+    """Tuples without a track in a scan of one instant that are better than false alarms, and their scores."""
+    births = progress.settings.births
+    problem = births.problem(progress.scan)
+    if not problem.num_tuples:
+        return problem.tuples, problem.costs
+    # where new targets are more frequent than false alarms, single measurements may be new targets, too
+    scores = births.scores(problem.tuples, problem.costs, *births.fused(progress.scan, problem.tuples)[:2])
+    good = scores > 0
+    return problem.tuples[good], scores[good]
+
+
+def _begun_anew(scan: WholeScan, progress: Progress, tracks: TrackBatch, rows: Array) -> tuple[Array, TrackBatch]:
     """Tentative tracks (K,) that begin anew, since new ones of their measurements promise more, and these new ones.
 
     So a track that began with a false alarm does not hold back the target whose measurements it takes (as in Page's
     test, whose sum begins anew). It gets a new id: what was before is not of the target. A new track does not know its
     velocity yet: at its next measurement it wins less, by the share of the areas in which the two expect it.
 
-    Parameters
-    ----------
-    progress : Progress
-    tracks : TrackBatch
-        T tracks after the scan.
-    rows : int array (T, S)
-        Their measurements.
-    fresh : callable
-        Makes tracks of tuples (K, S); returns them and which tuples they are.
+    `tracks` are those (T,) after the scan, `rows` (T, S) their measurements.
     """
     weak = np.flatnonzero(~tracks.confirmed & (tracks.score < 0.0) & rows.any(axis=1))
     if not len(weak):
         return weak, tracks[:0]
-    new, which = fresh(np.asarray(rows[weak], dtype=np.int32))
+    new, which = scan.begun(np.asarray(rows[weak], dtype=np.int32))
     old = weak[which]
     better = np.flatnonzero(new.score > tracks.score[old])
     old, new = old[better], new[better]
@@ -110,55 +277,3 @@ def _lead(progress: Progress, states: Any, new: Any) -> Array:
         spread = predict_each(filter, kind, when).covariance[:, axes][:, :, axes]
         areas.append(0.5 * np.linalg.slogdet(spread + noise)[1])
     return np.asarray(np.maximum(areas[0] - areas[1], 0.0))
-
-
-def begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
-    """New tracks of tuples that determine a position, with ids in the order of positions."""
-    settings = progress.settings
-    tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
-    if not len(tuples) or settings.starter is not None:
-        return progress.state.tracks[:0], tuples[:0]
-    batch, order = _fresh(progress, tuples)
-    batch.counts[:, ID] = progress.work.new_ids(len(order))
-    return batch, tuples[order]
-
-
-def _fresh(progress: Progress, tuples: Array) -> tuple[TrackBatch, Array]:
-    """Tracks of tuples that determine a position, without ids, in the order of positions, and which tuples."""
-    settings, scan = progress.settings, progress.scan
-    positions, covariances, fit = settings.births.fused(scan, tuples)
-    order = np.flatnonzero(fit)
-    order = order[np.lexsort(positions[order].T)]
-    rows, positions, covariances = tuples[order], positions[order], covariances[order]
-    states = settings.initiation.start(settings.filter, positions, covariances)
-    costs = tuple_costs(settings.scene, scan, rows, speed=settings.initiation.speed)
-    costs -= settings.births.overlooked(rows, positions, covariances)
-    score = settings.births.scores(rows, costs, positions, covariances) - scan.crowding(rows)
-    return TrackBatch.new(states, np.zeros(len(order), dtype=np.int64), score, scan.time), order
-
-
-def begin_in_order(progress: Progress, timed: TimedScan, born: Array, missed: Array) -> tuple[TrackBatch, Array]:
-    """`begin` where measurements have times of their own."""
-    tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(progress.settings.sensors))
-    batch, order = _fresh_in_order(progress, timed, tuples, missed)
-    batch.counts[:, ID] = progress.work.new_ids(len(order))
-    return batch, tuples[order]
-
-
-def _fresh_in_order(progress: Progress, timed: TimedScan, tuples: Array, missed: Array) -> tuple[TrackBatch, Array]:
-    """`_fresh` where measurements have times of their own."""
-    settings = progress.settings
-    fit = [np.append(mask, False)[tuples[:, s] - 1] for s, mask in enumerate(timed.places.fit)]
-    good = np.flatnonzero(np.any(fit, axis=0))
-    if not len(good):
-        return progress.state.tracks[:0], good
-    rows = tuples[good]
-    fresh = np.full(len(rows), -1)
-    followed = timed.follow(fresh, rows)
-    states = timed.at_end(followed, fresh)
-    anchors = timed.anchors(rows, followed.lead)
-    score = -score_costs(timed, followed, rows, settings.terms, missed[anchors])
-    order = np.lexsort(states.mean[:, list(settings.filter.motion.position)].T)
-    batch = TrackBatch.new(states[order], np.zeros(len(order), dtype=np.int64), score[order], followed.when[order])
-    batch.numbers[:, STARTED] = followed.first[order]
-    return batch, good[order]

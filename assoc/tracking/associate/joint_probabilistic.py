@@ -13,9 +13,9 @@ of its existence, which the events update as well.
 States use the joint events without their permutations (JPDA*, `assoc.ranking.pairs.permutations`), or tracks side by
 side would be drawn together.
 
-Where measurements have times of their own, a track is merged at the end of the scan, not after each sensor. Until then
-it consists of parts, each with its own measurements, filtered in time order (`assoc.tracking.associate.track_parts`),
-and the density in a pair's weight is the average over the parts.
+Where measurements have times of their own, a track is merged at the end of the scan, not after each sensor: they
+interleave in time. Until then it consists of parts, each with at most one measurement of each sensor and filtered
+through them in time order, and the density in a pair's weight is the average over the parts.
 
 References
 ----------
@@ -35,21 +35,17 @@ import numpy as np
 
 from assoc._parameters import is_whole
 from assoc._types import Array
-from assoc.costs.tracks.own_times import TimedScan
-from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.ranking.pairs.permutations import without_permutations
 from assoc.tracking.associate.mht import TrackTrees
-from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
+from assoc.tracking.growth import AtOnce, Grown, InOrder, Offers, Scores, growth_of
 from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Step
-from assoc.tracking.records.track_batch import STARTED, TrackBatch
+from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 from assoc.tracking.state import TrackerState
 from assoc.tracking.tracker import Tracker
 
@@ -61,6 +57,8 @@ _LEAST_SHARE = 1e-10
 """For pairs with a smaller share a track's state counts as predicted, not as corrected: most pairs of a wide gate. With
 n pairs in the gate, a squared distance g, this moves the mean of a track that exists with probability p by at most
 n sqrt(g) / p times this, in its deviations as predicted."""
+_LEAST_PART = 1e-5
+"""Parts with a smaller share of their track are dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,72 +139,33 @@ class JointProbabilistic(Method):
             np.add.at(shares[:, s], order[at], pairs.probability[known])
         return np.minimum(shares, 1.0)
 
-    def at_once(self, progress: Progress) -> Association:
+    def associate(self, progress: Progress) -> Association:
         """Process sensor after sensor; measurements that probably belong to no track start new ones."""
-        settings, time, tracks = progress.settings, progress.scan.time, progress.state.tracks
-        terms = settings.terms
+        tracks, sizes = progress.state.tracks, progress.scan.sizes
+        growth, scores, parts = growth_of(progress, whole=True), Scores(progress), _Parts.of(len(tracks))
+        # log odds of existence, and what they are ahead of the scores
+        odds, ahead = tracks.existence, tracks.existence - tracks.score
         seen = np.zeros(len(tracks), dtype=np.bool_)
-        assigned, found = [], []
-        for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
-            gate = gate_of(sensor, settings.gate_probability)
-            pairs = track_pairs(settings.filter, tracks.states, z, sensor, gate)
-            missed = misses_of(progress, tracks.states, s)
-            gain = terms.detection[s] + pairs.log_likelihood - progress.scan.crowd(s, pairs.measurement)
-            scored = ScoredPairs(pairs.track, pairs.measurement, gain)
-            known, update = self._probabilities(tracks.track_id, tracks.existence, missed, scored, len(z))
-            tracks, hit = _take_in(tracks, pairs, known.share, update, time)
-            ids, taken = _owners(known, len(z))
-            free = np.flatnonzero(taken < 0.5)
-            states, fit, positions, score = settings.births.singles(s, progress.scan, free)
-            free = free[fit]
-            order = np.lexsort(positions.T)
-            score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
-            ids[free[order]] = new = progress.work.new_ids(len(free))
-            tracks = TrackBatch.concatenate([tracks, TrackBatch.new(states[order], new, score[order], time)])
-            seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
-            found.append(known)
-            assigned.append(ids)
-        at_all = detected_or_in_view(progress, tracks.states, seen)
-        return Association(tracks.counted(seen, at_all), assigned, tuple(found))
-
-    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
-        """The same where measurements have times of their own."""
-        terms, tracks = progress.settings.terms, progress.state.tracks
-        misses = timed.misses(terms)
-        # the sensors processed so far: only they can have missed a track
-        past, old, sensors = np.zeros_like(misses), len(tracks), range(misses.shape[1])
-        parts = TrackParts.of_tracks(old, len(sensors))
-        track_id, odds = tracks.track_id, tracks.existence
-        seen, anchor = np.zeros(old, dtype=np.bool_), np.arange(old)
-        assigned, found, done = {}, {}, list[int]()
-        for s in timed.order:
-            past[:, s] = misses[:, s]
-            grown = parts.grown(timed, s, done, terms, past)
-            missed = misses[anchor, s]
-            count = len(timed.times[s])
-            known, update = self._probabilities(track_id, odds, missed, grown.pairs, count)
-            of_pair = known.share / update.after[grown.pairs.track]
-            parts = parts.after(grown, of_pair, update.missed / update.after, missed)
+        assigned, found = [np.zeros(size, dtype=np.int64) for size in sizes], {}
+        for s in growth.order:
+            offers, count = growth.pairs(s), int(sizes[s])
+            pairs, pair = parts.averaged(offers, count)
+            missed = offers.missed[parts.first]
+            known, update = self._probabilities(scores.track_id, odds, missed, pairs, count)
             ids, taken = _owners(known, count)
-            free = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
-            free = free[np.lexsort((*timed.places.positions[s][free].T, timed.times[s][free]))]
-            first = timed.offsets[s] + free
-            begun = timed.places.births[s][free] + past[first].sum(axis=1) - terms.miss[s]
-            ids[free] = progress.work.new_ids(len(free))
-            parts = parts.begun(len(odds), first, s, free, begun)
-            anchor, track_id = np.append(anchor, first), np.append(track_id, ids[free])
-            odds = np.append(update.odds, np.clip(begun + np.log1p(-taken[free]), -_SURE, _SURE))
-            seen = np.append(seen | (update.detected > 0.5), np.ones(len(free), dtype=np.bool_))
+            offers = growth.with_births(s, offers, np.flatnonzero(taken < 0.5))
+            numbers = offers.births.rows[:, s] - 1
+            begun = np.clip(offers.births.score + np.log1p(-taken[numbers]), -_SURE, _SURE)
+            order = scores.after(update.odds - ahead, offers.births, begun)
+            ids[numbers] = offers.births.ids
+            parts = _weighed(growth, s, offers, order, parts, _Shares(pairs, pair, known.share, update))
+            odds, ahead = np.append(update.odds, begun[order]), np.append(ahead, np.zeros(len(order)))
+            seen = np.append(seen | (update.detected > 0.5), np.ones(len(order), dtype=np.bool_))
             found[s], assigned[s] = known, ids
-            done.append(s)
-        states, when, started = parts.merged(timed, len(odds))
-        when = np.where(seen, when, np.nan)
-        new = TrackBatch.new(states[old:], track_id[old:], odds[old:], when[old:])
-        new.numbers[:, STARTED] = started[old:]
-        known_before = tracks.scored(states[:old], odds[:old] - tracks.existence, when[:old])
-        at_all = np.concatenate([covered(progress, misses[:old]), np.ones(len(new), dtype=np.bool_)])
-        batch = TrackBatch.concatenate([known_before, new]).counted(seen, at_all)
-        return Association(batch, [assigned[s] for s in sensors], tuple(found[s] for s in sensors))
+        grown = growth.finished(seen[parts.owner])
+        states, first, last = parts.merged(grown, growth.rows, seen)
+        batch = scores.batch(states, first, last).counted(seen, grown.covered[parts.first])
+        return Association(batch, assigned, tuple(found[s] for s in range(len(sizes))))
 
     def _probabilities(
         self, track_id: Array, existence: Array, missed: Array, pairs: ScoredPairs, count: int
@@ -232,25 +191,92 @@ class JointProbabilistic(Method):
         return PairProbabilities(track_id[track], measurement, *known, share), update
 
 
-def _take_in(
-    tracks: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
-) -> tuple[TrackBatch, Array]:
-    """Tracks after a sensor's scan, and which of them were detected with probability above 0.5."""
-    if not len(tracks):
-        return tracks, np.zeros(0, dtype=np.bool_)
-    # given that the target exists
-    weight = share / update.after[pairs.track]
-    counts = share >= _LEAST_SHARE
-    used, faint = np.flatnonzero(counts), np.flatnonzero(~counts)
-    changed = np.bincount(pairs.track[used], minlength=len(tracks)) > 0
-    old, same = np.flatnonzero(changed), np.flatnonzero(~changed)
-    stays = update.missed / update.after + np.bincount(pairs.track[faint], weight[faint], len(tracks))
-    row = np.concatenate([np.searchsorted(old, pairs.track[used]), np.arange(len(old))])
-    weights = np.concatenate([weight[used], stays[old]])
-    states = merged(concatenate([pairs.correct(used), tracks.states[old]]), row, weights, len(old))
-    states = placed(len(tracks), [(old, states), (same, tracks.states[same])])
-    hit = update.detected > 0.5
-    return tracks.scored(states, update.odds - tracks.existence, np.where(hit, time, np.nan)), hit
+class ScoredPairs(NamedTuple):
+    """K pairs of a track and a measurement of one sensor."""
+
+    track: Array
+    """Row of the track, (K,)."""
+    measurement: Array
+    """From 0, (K,)."""
+    gain: Array
+    """Gain of the track's score by the measurement, (K,)."""
+
+
+class _Shares(NamedTuple):
+    """Pairs of tracks and measurements, which of them each offer belongs to, their shares, and the tracks' update."""
+
+    pairs: ScoredPairs
+    pair: Array
+    share: Array
+    update: _Update
+
+
+class _Parts(NamedTuple):
+    """P parts of T tracks: the branches of a growth, each with its own measurements."""
+
+    owner: Array
+    """Track of each part, (P,)."""
+    first: Array
+    """A part of each track, (T,)."""
+    share: Array
+    """Probability that exactly these measurements are the track's if the target exists; those of one track sum to 1."""
+
+    @staticmethod
+    def of(count: int) -> _Parts:
+        """Tracks of one part each."""
+        return _Parts(np.arange(count), np.arange(count), np.ones(count))
+
+    @property
+    def single(self) -> bool:
+        """Whether the parts are the tracks."""
+        return np.array_equal(self.owner, np.arange(len(self.first)))
+
+    def averaged(self, offers: Offers, count: int) -> tuple[ScoredPairs, Array]:
+        """Pairs of a track and one of `count` measurements, with gains averaged over parts; the pair of each offer."""
+        if self.single:
+            return ScoredPairs(offers.branch, offers.measurement, offers.gain), np.arange(len(offers.branch))
+        keys = self.owner[offers.branch] * max(count, 1) + offers.measurement
+        keys, pair = np.unique(keys, return_inverse=True)
+        mean = np.full(len(keys), -np.inf)
+        np.logaddexp.at(mean, pair, np.log(self.share[offers.branch]) + offers.gain)
+        return ScoredPairs(*np.divmod(keys, max(count, 1)), mean), pair
+
+    def merged(self, grown: Grown, rows: Array, seen: Array) -> tuple[Any, Array, Array]:
+        """States of the tracks, and times of the first and last measurement of each one's likeliest part with any."""
+        count = len(self.first)
+        first, last = np.full((2, count), np.nan)
+        if self.single:
+            return grown.states, grown.first, np.where(seen, grown.last, np.nan)
+        order = np.argsort(self.share, kind="stable")
+        order = order[rows[order].any(axis=1)]
+        first[self.owner[order]], last[self.owner[order]] = grown.first[order], grown.last[order]
+        return merged(grown.states, self.owner, self.share, count), first, np.where(seen, last, np.nan)
+
+
+def _weighed(growth: AtOnce | InOrder, s: int, offers: Offers, order: Array, parts: _Parts, of: _Shares) -> _Parts:
+    """Weigh the parts of tracks with and without a measurement of sensor s, and add those of births, in this order."""
+    stays, weight = of.update.missed / of.update.after, of.share / of.update.after[of.pairs.track]
+    tracks, new = len(stays), len(order)
+    if isinstance(growth, AtOnce):
+        # all of one instant: parts are merged at once
+        counts = of.share >= _LEAST_SHARE
+        used, faint = np.flatnonzero(counts), np.flatnonzero(~counts)
+        stays = stays + np.bincount(offers.branch[faint], weight[faint], tracks)
+        growth.merge(offers, used, weight[used], stays, order)
+        return _Parts.of(tracks + new)
+    within = parts.share[offers.branch] * np.exp(offers.gain - of.pairs.gain[of.pair])
+    share = np.concatenate([parts.share * stays[parts.owner], within * weight[of.pair]])
+    whose = np.concatenate([np.arange(len(parts.owner)), offers.branch])
+    most = np.zeros(tracks)
+    np.maximum.at(most, parts.owner[whose], share)
+    kept = np.flatnonzero(share >= np.minimum(_LEAST_PART, most[parts.owner[whose]]))
+    owner, born = parts.owner[whose[kept]], len(whose) + order
+    share = share[kept] / np.bincount(owner, share[kept], tracks)[owner]
+    growth.take(s, offers, np.append(kept, born))
+    owner = np.append(owner, np.arange(tracks, tracks + new))
+    first = np.zeros(tracks + new, dtype=np.int64)
+    first[owner[::-1]] = np.arange(len(owner))[::-1]
+    return _Parts(owner, first, np.append(share, np.ones(new)))
 
 
 def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:

@@ -24,12 +24,11 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.own_times import TimedScan
 from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.tracking.file import Saved
+from assoc.tracking.growth import Offers, growth_of
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
-from assoc.tracking.mht.growth import AtOnce, Offers, growth_of
 from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
@@ -80,30 +79,22 @@ class TrackTrees(DeferringMethod):
         rows = np.flatnonzero(state.method_state.chosen)
         return state.tracks[rows[np.argsort(state.tracks.track_id[rows], kind="stable")]]
 
-    def at_once(self, progress: Progress) -> Association:
+    def associate(self, progress: Progress) -> Association:
         """Grow branches by the measurements in their gates and by misses, start trees, choose the best hypothesis."""
-        return self._grown(progress, None)
-
-    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
-        """`at_once` where measurements have times of their own."""
-        return self._grown(progress, timed)
-
-    def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
-        growth, count = growth_of(progress, timed), len(progress.settings.sensors)
+        growth, count = growth_of(progress), len(progress.settings.sensors)
         tables, chosen = _tables(progress.state, count), progress.state.method_state.chosen
         for s in growth.order:
             offers = growth.offers(s)
             kept, tables, chosen = self._extended(progress, tables, offers, s)
             growth.take(s, offers, kept)
-        if isinstance(growth, AtOnce):
+        if progress.settings.angles_alone:
             crossed = growth.crossings(tables.history[chosen & (tables.counts[:, SURE] > 0), :count], by_place=True)
             if crossed is not None:
                 kept, tables, chosen = self._extended(progress, tables, crossed, 0)
                 growth.take(0, crossed, kept)
         grown = growth.finished()
-        if timed is not None:
-            new = np.flatnonzero(growth.origin < 0)
-            tables.numbers[new, STARTED] = grown.first[new]
+        new = np.flatnonzero(growth.origin < 0)
+        tables.numbers[new, STARTED] = grown.first[new]
         count_scan(tables.counts, tables.history, count, grown.covered)
         tracks = TrackBatch(grown.states, tables.numbers, tables.counts)
         if progress.settings.solver != "exact" or progress.settings.solver_parameters:

@@ -26,12 +26,11 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.own_times import TimedScan
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
+from assoc.tracking.growth import Grown, Growth, Offers, growth_of
 from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
 from assoc.tracking.mht.generation import generated, with_births
-from assoc.tracking.mht.growth import AtOnce, Grown, Growth, Offers, growth_of
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step
@@ -88,18 +87,11 @@ class ClusteredHypotheses(DeferringMethod):
         """The scan with measurements sorted by value: ties between hypotheses are broken by their numbers."""
         return _by_value(scan, _orders(scan))
 
-    def at_once(self, progress: Progress) -> Association:
+    def associate(self, progress: Progress) -> Association:
         """Generate the hypotheses about the scan, sensor by sensor."""
-        return self._grown(progress, None)
-
-    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
-        """`at_once` where measurements have times of their own."""
-        return self._grown(progress, timed)
-
-    def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
         tracks, hypotheses = progress.state.tracks, progress.state.method_state
         orders = _orders(progress.scan)
-        growth = growth_of(progress._replace(scan=_by_value(progress.scan, orders)), timed)
+        growth = growth_of(progress._replace(scan=_by_value(progress.scan, orders)))
         clusters = list(hypotheses.clusters)
         ids, gained = tracks.track_id, np.zeros(len(tracks))
         limits = self.max_hypotheses, self.hypothesis_drop
@@ -116,7 +108,7 @@ class ClusteredHypotheses(DeferringMethod):
             offers = growth.offers(s)
             born, count = offers.births.rows[:, s] - 1, len(progress.scan.measurements[s])
             taken(s, offers, generated(clusters, offers, born, count, *limits))
-        if isinstance(growth, AtOnce):
+        if progress.settings.angles_alone:
             rows = Hypotheses(hypotheses.window, tuple(clusters)).best
             sure = np.append(tracks.confirmed, False)[growth.origin[rows]]
             crossed = growth.crossings(growth.rows[rows[sure]], by_place=False)

@@ -10,9 +10,9 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
+from assoc.tracking.growth import Births, Offers
 from assoc.tracking.mht.children import Meanings, next_hypotheses
 from assoc.tracking.mht.clusters import Cluster, cluster, doubted, grouped, linked, merged, odds_of
-from assoc.tracking.mht.growth import Births, Offers
 
 
 def generated(

@@ -1,8 +1,8 @@
-"""How the branches of a tracker grow by a scan, sensor by sensor.
+"""How tracks, or the branches of their trees, grow by a scan, sensor by sensor.
 
 At each sensor the candidates are, in this order: the old branches with a miss, the pairs of a branch and a measurement,
-and new targets. The tracker chooses the rows to keep. Only this module distinguishes scans of one instant from
-measurements with times of their own.
+and new targets. The tracker chooses the rows to keep. Measurements have times of their own (`InOrder`); one instant for
+all is the fast case (`AtOnce`), and trackers need not know which it is.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_pairs
 from assoc.filters.base import Filter
-from assoc.filters.batches import placed
+from assoc.filters.batches import concatenate, placed
+from assoc.filters.merging import merged
 from assoc.tracking.progress import Progress
-from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.records.track_batch import BEST, STARTED, TrackBatch
 from assoc.tracking.stages.coverage import covered, detected_or_in_view, misses_of
 
 _MOST_CROSSINGS = 100
@@ -84,9 +85,24 @@ class Growth(ABC):
         self.origin = np.arange(len(self._before))
         self.rows = np.zeros((len(self._before), len(progress.settings.sensors)), dtype=np.int32)
 
-    @abstractmethod
     def offers(self, s: int) -> Offers:
-        """Candidates by the measurements of sensor s."""
+        """All candidates by the measurements of sensor s."""
+        return self.with_births(s, self.pairs(s), np.arange(len(self._progress.scan.measurements[s])))
+
+    @abstractmethod
+    def pairs(self, s: int) -> Offers:
+        """Candidates by the measurements of sensor s that start no target."""
+
+    @abstractmethod
+    def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
+        """These candidates, and new targets of those of the measurements (from 0) that determine a position."""
+
+    def crossings(self, taken: Array, by_place: bool) -> Offers | None:
+        """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
+
+        They are sorted by position, or the most likely first.
+        """
+        return None
 
     def take(self, s: int, offers: Offers, kept: Array) -> None:
         """Keep these rows of the candidates."""
@@ -103,8 +119,12 @@ class Growth(ABC):
         """Select the states of the rows that are kept."""
 
     @abstractmethod
-    def finished(self) -> Grown:
-        """The branches at the end of the scan."""
+    def finished(self, seen: Array | None = None) -> Grown:
+        """The branches at the end of the scan; `seen`, bool (B,), counts as detected, else what has a measurement."""
+
+    def _no_births(self) -> Births:
+        nothing = np.zeros(0, dtype=np.int64)
+        return Births(nothing, np.zeros((0, self.rows.shape[1]), dtype=np.int32), np.zeros(0), np.zeros(0))
 
     def _births(self, numbers: Array, s: int, turn: Array, when: Array, score: Array) -> Births:
         """Single measurements (numbers from 0) of sensor s; `turn` is the order in which they are given ids."""
@@ -118,12 +138,14 @@ class Growth(ABC):
 class AtOnce(Growth):
     """All sensors covered everything at one instant: predicted branches are updated sensor by sensor.
 
-    Where no sensor measures velocities only positions are: the whole states of those that are left in the end follow.
+    Where no sensor measures velocities only positions are, unless states are to be `whole`: those of the branches that
+    are left in the end follow.
     """
 
-    def __init__(self, progress: Progress) -> None:
+    def __init__(self, progress: Progress, whole: bool) -> None:
         super().__init__(progress)
         settings, states = progress.settings, self._before.states
+        self._whole = whole
         self.order = range(self.rows.shape[1])
         self._filter, self._states = self._seen(states)
         self._partly = self._filter is not settings.filter
@@ -135,24 +157,28 @@ class AtOnce(Growth):
     def _seen(self, states: Any) -> tuple[Filter[Any], Any]:
         """What says how well measurements fit, and what it reads of states."""
         settings = self._progress.settings
-        if any(getattr(sensor, "measures_velocity", True) for sensor in settings.sensors):
+        if self._whole or any(getattr(sensor, "measures_velocity", True) for sensor in settings.sensors):
             return settings.filter, states
         return settings.filter.positions_alone(states)
 
-    def offers(self, s: int) -> Offers:
-        """Candidates by the measurements of sensor s."""
-        settings, time = self._progress.settings, self._progress.scan.time
-        z, sensor, terms = self._progress.scan.measurements[s], settings.sensors[s], settings.terms
+    def pairs(self, s: int) -> Offers:
+        """Pairs of the predicted branches and the measurements of sensor s."""
+        settings, scan = self._progress.settings, self._progress.scan
+        sensor, terms = settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
-        pairs = track_pairs(self._filter, self._states, z, sensor, gate)
-        begun, fit, positions, score = settings.births.singles(s, self._progress.scan, np.arange(len(z)))
+        pairs = track_pairs(self._filter, self._states, scan.measurements[s], sensor, gate)
         self._corrected = pairs.correct
-        self._begun.append(begun)
-        numbers = np.flatnonzero(fit)
-        births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
         missed = misses_of(self._progress, self._states, s, self._partly)
-        gain = pairs.log_likelihood + terms.detection[s] - self._progress.scan.crowd(s, pairs.measurement)
-        return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
+        gain = pairs.log_likelihood + terms.detection[s] - scan.crowd(s, pairs.measurement)
+        when = np.full(len(gain), scan.time)
+        return Offers(missed, pairs.track, pairs.measurement, gain, when, self._no_births())
+
+    def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
+        """New targets, each with the state of its measurement."""
+        begun, fit, positions, score = self._progress.settings.births.singles(s, self._progress.scan, numbers)
+        self._begun.append(begun)
+        when = np.full(len(begun), self._progress.scan.time)
+        return offers._replace(births=self._births(numbers[fit], s, np.lexsort(positions.T), when, score))
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         hit, begun = self._since[offers.branch], self._begun[-1]
@@ -165,6 +191,22 @@ class AtOnce(Growth):
         sources = self._states.__getitem__, self._corrected, positions.__getitem__
         lengths = len(self._states), len(offers.branch), len(begun)
         self._states = _in_blocks(kept, lengths, lambda part, _, rows: sources[part](rows))
+
+    def merge(self, offers: Offers, used: Array, weight: Array, stays: Array, order: Array) -> None:
+        """Merge branches (whole states) with their pairs in rows `used` (K,) by weights (K,); then add births in order.
+
+        `stays` (B,) are the weights of the branches as they are. Nothing that precedes the sensor can follow.
+        """
+        count, begun = len(self._states), self._begun[-1][order]
+        changed = np.bincount(offers.branch[used], minlength=count) > 0
+        old, same = np.flatnonzero(changed), np.flatnonzero(~changed)
+        row = np.concatenate([np.searchsorted(old, offers.branch[used]), np.arange(len(old))])
+        both = concatenate([self._corrected(used), self._states[old]])
+        mixed = merged(both, row, np.concatenate([weight, stays[old]]), len(old))
+        new = np.arange(count, count + len(begun))
+        self._states = placed(count + len(new), [(old, mixed), (same, self._states[same]), (new, begun)])
+        self.rows = np.concatenate([self.rows, offers.births.rows[order]])
+        self.origin = np.append(self.origin, np.full(len(new), -1))
 
     def _whole_states(self) -> Any:
         """The states of all branches, corrected by all that belongs to them."""
@@ -180,10 +222,7 @@ class AtOnce(Growth):
         return _in_blocks(self._sources, [len(states) for states in self._begun], grown)
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
-        """New targets from crossings of measurements that are not in `taken` (T, S), of sensors that start none alone.
-
-        They are sorted by position, or the most likely first.
-        """
+        """New targets at which measurements cross."""
         settings, scan = self._progress.settings, self._progress.scan
         if not settings.angles_alone:
             return None
@@ -204,9 +243,9 @@ class AtOnce(Growth):
         nothing = np.zeros(0, dtype=np.int64)
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
-    def finished(self) -> Grown:
-        """The branches at the end of the scan."""
-        hit = np.asarray(self.rows.any(axis=1))
+    def finished(self, seen: Array | None = None) -> Grown:
+        """The branches at the end of the scan, which is the instant."""
+        hit = np.asarray(self.rows.any(axis=1)) if seen is None else seen
         seen = np.where(hit, self._progress.scan.time, np.nan)
         states = self._whole_states()
         at_all = detected_or_in_view(self._progress, states, hit)
@@ -225,20 +264,24 @@ class InOrder(Growth):
         self._anchor, self._done = self.origin, list[int]()
         self._gained, self._total = np.zeros(len(self.origin)), np.zeros(0)
 
-    def offers(self, s: int) -> Offers:
-        """Candidates by the measurements of sensor s, filtered in time order with those of earlier sensors."""
+    def pairs(self, s: int) -> Offers:
+        """Pairs by the measurements of sensor s, filtered in time order with those of earlier sensors."""
         timed, terms, past = self._timed, self._progress.settings.terms, self._past
         past[:, s] = self._misses[:, s]
         grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows)
         self._total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
-        self._own = np.flatnonzero(timed.places.fit[s])
-        anchor, when = timed.offsets[s] + self._own, timed.times[s][self._own]
-        score = timed.places.births[s][self._own] + past[anchor].sum(axis=1) - terms.miss[s]
-        turn = np.lexsort((*timed.places.positions[s][self._own].T, when))
-        births = self._births(self._own, s, turn, when, score)
         missed = self._misses[self._anchor, s]
         gain = self._total - self._gained[grown.parent]
-        return Offers(missed, grown.parent, grown.measurement, gain, grown.followed.when, births)
+        return Offers(missed, grown.parent, grown.measurement, gain, grown.followed.when, self._no_births())
+
+    def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
+        """New targets, which only the sensors processed so far can have missed."""
+        timed = self._timed
+        self._own = own = numbers[timed.places.fit[s][numbers]]
+        when, past = timed.times[s][own], self._past[timed.offsets[s] + own].sum(axis=1)
+        score = timed.places.births[s][own] + past - self._progress.settings.terms.miss[s]
+        turn = np.lexsort((*timed.places.positions[s][own].T, when))
+        return offers._replace(births=self._births(own, s, turn, when, score))
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         anchor = self._anchor
@@ -246,8 +289,8 @@ class InOrder(Growth):
         self._gained = np.concatenate([self._gained + offers.missed, self._total, offers.births.score])[kept]
         self._done.append(s)
 
-    def finished(self) -> Grown:
-        """The branches at the end of the scan."""
+    def finished(self, seen: Array | None = None) -> Grown:
+        """The branches at the end of the scan, filtered once more through all that belongs to them."""
         followed = self._timed.follow(self.origin, self.rows)
         last = np.where(self.rows.any(axis=1), followed.when, np.nan)
         at_all = covered(self._progress, self._misses[self._anchor])
@@ -272,6 +315,37 @@ def _in_blocks(kept: Array, lengths: Sequence[int], states: Callable[[int, Array
     return placed(len(kept), made)
 
 
-def growth_of(progress: Progress, timed: TimedScan | None) -> AtOnce | InOrder:
-    """The branches before the scan's first sensor."""
-    return AtOnce(progress) if timed is None else InOrder(progress, timed)
+def growth_of(progress: Progress, whole: bool = False) -> AtOnce | InOrder:
+    """The branches before the scan's first sensor; with states that are `whole` after each sensor, or in the end."""
+    return AtOnce(progress, whole) if progress.timed is None else InOrder(progress, progress.timed)
+
+
+class Scores:
+    """Scores of tracks within a scan: those before it, then new ones.
+
+    Their best is counted after each sensor in a scan of one instant, else at the end: measurements interleave in time.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self._before, self._at_once = progress.state.tracks, progress.timed is None
+        self.track_id, self.now, self.best = self._before.track_id, self._before.score, self._before.best
+
+    def after(self, now: Array, births: Births, begun: Array) -> Array:
+        """Count a sensor: the scores `now` (T,) of the old tracks, and `begun` (N,) of births; their order by id."""
+        order = np.argsort(births.ids)
+        self.track_id = np.append(self.track_id, births.ids[order])
+        self.now = np.append(now, begun[order])
+        if self._at_once:
+            self.best = np.append(np.maximum(self.best, now), begun[order])
+        return order
+
+    def batch(self, states: Any, first: Array, last: Array) -> TrackBatch:
+        """The tracks with these states at the end, and the times of their first and last measurements in the scan."""
+        old = len(self._before)
+        known = self._before.scored(states[:old], self.now[:old] - self._before.score, last[:old])
+        new = TrackBatch.new(states[old:], self.track_id[old:], self.now[old:], last[old:])
+        new.numbers[:, STARTED] = first[old:]
+        batch = TrackBatch.concatenate([known, new])
+        if self._at_once:
+            batch.numbers[:, BEST] = self.best
+        return batch
