@@ -20,13 +20,14 @@ from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.altitude import GARBLED_CODES, NEARBY, garbled_altitudes
 from assoc.recordings.columns import COLUMNS, UNITS, choose
 from assoc.recordings.recording import Recording, joined
+from assoc.recordings.running_times import RunningTimes
 from assoc.recordings.table_rows import AIRCRAFT, ALTITUDE, BEARING, MODE3, RANGE, TIME, TableRows
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MAX_DISORDER = 30.0
-"""Plots up to this late (s) are sorted in; later ones are an error."""
+"""Plots up to this late (s) are sorted in; where several in a row are later, that is an error."""
 
 MOST_PLOTS = 20_000_000
 # metres: no radar of plots sees farther; and plots from which on bearings within 2 pi degrees are no chance
@@ -59,7 +60,8 @@ def read_plots(
         12 bits as a number, or oct, their octal digits. By default the end of the column's name (range_km), else
         nautical miles, degrees, flight levels and dec, for a column squawk oct.
     max_disorder : float, default 30
-        Plots up to this many seconds late are sorted in; one that is later is an error with its line.
+        Plots up to this many seconds late are sorted in. A plot whose time is further from those before and after it
+        is left out; where times jump back for good, that is an error with its line.
     garbled_codes : array_like of int, optional
         Flight levels that are taken for garbled answers (default `GARBLED_CODES`).
 
@@ -121,8 +123,13 @@ class PlotReader:
         table = TableRows(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator, self._at_once)
         order = _Order(self.file, self._max_disorder)
         plots = _Plots(self.file.name, units, "aircraft" in columns_of, self._codes, self._at_once)
+        times = None
         for rows in table.of_frames(content) if parquet else table.of_lines(content):
-            yield from plots.of(order.take(rows), last=False)
+            if times is None:
+                times = RunningTimes(max(self._max_disorder, MAX_DISORDER), bool(table.clock))
+            yield from plots.of(order.take(times.take(rows)), last=False)
+        if times is not None:
+            yield from plots.of(order.take(times.rest(len(COLUMNS) + 1)), last=False)
         if not order.count:
             why = f": {table.blank} rows have no time, range or bearing" if table.blank else ""
             raise InvalidInputError(f"{self.file}: holds no plots{why}")
@@ -134,7 +141,8 @@ class PlotReader:
             "rows of zeros left out": table.fillers,
             "rows without time, range or bearing left out": table.blank,
             "invalid codes": table.unread,
-            "midnights passed": table.midnights,
+            "midnights passed": 0 if times is None else times.midnights,
+            "plots left out whose time no other supports": 0 if times is None else times.left_out,
         }
 
 
@@ -164,7 +172,8 @@ def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataF
             with parquet.ParquetFile(file) as opened:
                 yield opened.schema_arrow.names
                 for batch in opened.iter_batches(at_once):
-                    yield batch.to_pandas()
+                    # by the file's own columns: pandas may have kept one as an index
+                    yield batch.to_pandas(ignore_metadata=True)
         except (ValueError, OSError) as error:
             if isinstance(error, InvalidInputError):
                 raise
@@ -185,6 +194,8 @@ class _Order:
 
     def take(self, rows: Array) -> Array:
         """Take rows in, and return those before which none can come any more."""
+        if not len(rows):
+            return rows
         times = rows[:, TIME]
         late = np.maximum(np.maximum.accumulate(times), self._latest) - times
         if (late > self._max_disorder).any():

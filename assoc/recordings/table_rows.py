@@ -1,4 +1,4 @@
-"""Rows of radar plots in a CSV or Parquet file: cells as numbers, clocks that run on over midnight, errors by line."""
+"""Rows of radar plots in a CSV or Parquet file: cells as numbers, errors by line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.recordings.columns import COLUMNS, DAY, REQUIRED, code, number, seconds, whole
+from assoc.recordings.columns import COLUMNS, REQUIRED, code, number, seconds, whole
 from assoc.recordings.recording import UNDECODED
 
 if TYPE_CHECKING:
@@ -39,10 +39,8 @@ class TableRows:
         self.base, self.separator = base, separator
         self.decimal = "." if separator == "," else ","
         self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
-        self.fillers = self.midnights = self.blank = self.unread = 0
+        self.fillers = self.blank = self.unread = 0
         self.clock: bool | None = None
-        self.day = self.before = 0.0
-        self._begun = False
 
     def of_lines(self, lines: Iterator[str]) -> Iterator[Array]:
         """The rows of the lines that follow the header."""
@@ -115,7 +113,7 @@ class TableRows:
             if (mode3 > 7777).any() or (digits > 7).any():
                 return None
             rows[:, MODE3] = digits @ 8 ** np.arange(4)
-        self.clock, self._begun = False, self._begun or len(rows) > 0
+        self.clock = False
         return rows
 
     def _slowly(self, lines: Iterable[str], done: int) -> Iterator[Array]:
@@ -159,7 +157,6 @@ class TableRows:
         if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
             self.fillers += 1
             return None
-        row["time"] = self._running(row["time"])
         defaults = {"altitude": math.nan, "aircraft": -1.0, "mode3": float(UNDECODED)}
         return tuple(row.get(meaning, defaults.get(meaning, math.nan)) for meaning in COLUMNS)
 
@@ -181,19 +178,6 @@ class TableRows:
         if meaning == "altitude" and not text:
             return math.nan
         return number(text)
-
-    def _running(self, time: float) -> float:
-        """Let clock times run on over midnight: a fall by more than half a day is a new day."""
-        if self.clock and self._begun and time + self.day < self.before - DAY / 2:
-            self.day += DAY
-            self.midnights += 1
-        running = time + self.day
-        # a late plot of the day before
-        if self.clock and self.midnights and running > self.before + DAY / 2:
-            running -= DAY
-        self.before = max(self.before, running) if self._begun else running
-        self._begun = True
-        return running
 
     def _expected(self, meaning: str) -> str:
         if meaning == "time":

@@ -105,13 +105,52 @@ def test_a_missing_altitude_is_not_one_below_zero(tmp_path):
 
 
 def test_a_jump_back_is_an_error_with_its_line(tmp_path):
-    path = written(tmp_path, HEAD + "100,10,5,1,100\n7200,10,5,1,100\n7201,10,5,1,100\n3600,10,5,1,100\n")
-    with pytest.raises(InvalidInputError, match="line 5: the time jumps back by 3601 s, expected at most 30"):
+    later = "".join(f"{time},10,5,1,100\n" for time in (7200, 7201, 7202, 3600, 3601, 3602))
+    path = written(tmp_path, HEAD + "100,10,5,1,100\n" + later)
+    with pytest.raises(InvalidInputError, match="line 6: the time jumps back by 3602 s, expected at most 30"):
         read_plots(path)
     recording = read_plots(path, max_disorder=4000.0)
     # gaps of hours are no error
-    assert recording.times.tolist() == [100, 3600, 7200, 7201]
-    assert recording.lines.tolist() == [2, 5, 3, 4]
+    assert recording.times.tolist() == [100, 3600, 3601, 3602, 7200, 7201, 7202]
+    assert recording.lines.tolist() == [2, 6, 7, 8, 3, 4, 5]
+
+
+@pytest.mark.parametrize("clock", [False, True])
+@pytest.mark.parametrize("wrong", [[1], [5], [12], [5, 6], [19], [3, 9]])
+def test_a_wrong_time_neither_moves_nor_delays_the_plots_after_it(tmp_path, clock, wrong):
+    """Near midnight, too, where a fall by half a day would begin a day."""
+    times = 86_340.0 + 4.0 * np.arange(20)
+    told = times % 86_400.0
+    told[wrong] = np.mod(told[wrong] - 50_000.0, 86_400.0)
+    if not clock:
+        told = np.where(np.isin(np.arange(20), wrong), 50_000.0, times)
+
+    def cell(second):
+        return f"{second // 3600:02.0f}:{second // 60 % 60:02.0f}:{second % 60:06.3f}" if clock else f"{second:g}"
+
+    rows = "".join(f"{cell(second)},{10 + k},5,1,100\n" for k, second in enumerate(told))
+    recording = read_plots(written(tmp_path, HEAD + rows))
+    kept = np.delete(times, wrong)
+    assert recording.notes["plots left out whose time no other supports"] == len(wrong)
+    assert (recording.times - recording.times[0]).tolist() == (kept - kept[0]).tolist()
+    assert recording.notes["midnights passed"] == int(clock)
+
+
+def test_gaps_and_seldom_plots_are_no_wrong_times(tmp_path):
+    for times in (np.arange(12) * 500.0, np.append(np.arange(10), 5000.0 + np.arange(10)), np.array([0.0, 900.0])):
+        rows = "".join(f"{second:g},{10 + k},5,1,100\n" for k, second in enumerate(times))
+        recording = read_plots(written(tmp_path, HEAD + rows))
+        assert recording.times.tolist() == times.tolist()
+
+
+def test_an_index_of_pandas_is_a_column_by_its_name(tmp_path):
+    pytest.importorskip("pyarrow")
+    import pandas as pd
+
+    table = pd.DataFrame({"time": [0.0, 1.0, 2.0], "range": [50.0, 51.0, 52.0], "bearing": [10.0, 11.0, 12.0]})
+    table.set_index("time").to_parquet(tmp_path / "plots.parquet")
+    recording = read_plots(tmp_path / "plots.parquet")
+    assert recording.times.tolist() == [0, 1, 2] and recording.ranges[0] == pytest.approx(50 * 1852)
 
 
 @pytest.mark.parametrize(

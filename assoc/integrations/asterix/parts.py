@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.reading import Decoded, Source, recording_of
 from assoc.recordings.altitude import NEARBY
@@ -48,11 +49,10 @@ class AsterixPlots:
                 if self._radar not in (None, _name(source)) or len(read.plots) > 1 and self._radar is None:
                     rows.rows = []
                 elif len(rows.rows) >= self._at_once:
-                    yield from waiting.of(rows.rows, last=False)
-                    rows.rows = []
+                    yield from waiting.of(rows.taken(read.notes, last=False), last=False)
         read.check(self._path)
         chosen = chosen_radar(self._path, read.plots, self._radar, self._label)
-        yield from waiting.of(read.plots[chosen].rows, last=True)
+        yield from waiting.of(read.plots[chosen].taken(read.notes, last=True), last=True)
 
 
 def chosen_radar(path: str | os.PathLike[str], plots: Iterable[Source], radar: str | None, label: str) -> Source:
@@ -82,9 +82,9 @@ class _Waiting:
         self._done = 0
         """Rows that are given, and kept for those after them."""
 
-    def of(self, new: list[tuple[float, ...]], *, last: bool) -> Iterator[Recording]:
+    def of(self, new: Array, *, last: bool) -> Iterator[Recording]:
         """Take rows in, and yield the plots that are complete."""
-        rows = np.array(new, dtype=np.float64).reshape(-1, 7)
+        rows = new.reshape(-1, 7)
         given = float(self._rows[self._done - 1, 0]) if self._done else -math.inf
         # the usual time of the latest: single wrong ones must not make all others late
         now = float(np.median(rows[-_LATEST:, 0])) if len(rows) else given

@@ -14,9 +14,10 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
-from assoc.recordings.altitude import garbled_altitudes
+from assoc.recordings.altitude import NEARBY, garbled_altitudes
 from assoc.recordings.columns import DAY, FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
+from assoc.recordings.running_times import RunningTimes
 from assoc.scene.geodesy import checked_origin, east_north_up
 
 SECOND = 1.0 / 128.0
@@ -115,14 +116,18 @@ class AsterixContent:
     multilateration: Mapping[Source, Recording] = field(default_factory=dict)
 
 
+WRONG_TIMES = "plots left out whose time no other supports"
+
+
 class SourceRows:
-    """Rows of one source; times continue beyond 24 h after midnight."""
+    """Rows of one source, the time of day first; times continue beyond 24 h after midnight."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []
         self.day = self.latest = 0.0
         self.begun = False
         """Whether it has had any time."""
+        self._times = RunningTimes(NEARBY, clock=True)
 
     def time(self, raw: int) -> float:
         """Seconds of the recording, by the raw time of day."""
@@ -137,9 +142,22 @@ class SourceRows:
         self.begun = True
         return running
 
-    def table(self) -> Array:
-        """The rows, sorted by the first column, the time."""
-        table = np.array(self.rows, dtype=np.float64)
+    def taken(self, notes: dict[str, int], *, last: bool) -> Array:
+        """The rows so far whose times are sure, which run on; all that are right if these are the last."""
+        columns = len(self.rows[0]) if self.rows else 0
+        before = self._times.left_out
+        found = self._times.take(np.array(self.rows, dtype=np.float64).reshape(len(self.rows), columns))
+        self.rows = []
+        if last:
+            rest = self._times.rest(found.shape[1])
+            found = np.concatenate([found, rest]) if len(rest) else found
+        if self._times.left_out > before:
+            notes[WRONG_TIMES] = notes.get(WRONG_TIMES, 0) + self._times.left_out - before
+        return found
+
+    def table(self, notes: dict[str, int]) -> Array:
+        """All rows, sorted by the first column, the time."""
+        table = self.taken(notes, last=True)
         return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
@@ -179,7 +197,7 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
         first = next((rows.rows[0] for rows in (*reports.values(), *located.values()) if rows.rows), None)
         seen_from = None if first is None else (first[1], first[2], 0.0)
     return AsterixContent(
-        {source: recording_of(rows.table(), name, notes) for source, rows in plots.items() if rows.rows},
+        {source: recording_of(rows.table(notes), name, notes) for source, rows in plots.items() if rows.rows},
         {source: _seen(rows, seen_from, name, notes) for source, rows in reports.items() if rows.rows and seen_from},
         {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in read.radars.items()},
         seen_from,
@@ -243,7 +261,9 @@ class Decoded:
         raw, *rest = found
         if category == 1:
             raw = full_time(int(raw), rows, self._clocks.get(source))
-        rows.rows.append((rows.time(int(raw)), *rest))
+        rows.time(int(raw))
+        # not as it runs on here, where each message counts at once: a wrong one is seen by those after it
+        rows.rows.append((int(raw) * SECOND, *rest))
         return True
 
 
@@ -323,8 +343,8 @@ def recording_of(rows: Array, name: str, notes: Mapping[str, int]) -> Recording:
     )  # fmt: skip
 
 
-def _seen(rows: SourceRows, origin: tuple[float, float, float], name: str, notes: Mapping[str, int]) -> Recording:
-    times, lat, lon, identities, altitudes, addresses = rows.table().T
+def _seen(rows: SourceRows, origin: tuple[float, float, float], name: str, notes: dict[str, int]) -> Recording:
+    times, lat, lon, identities, altitudes, addresses = rows.table(notes).T
     place = east_north_up(lat, lon, np.nan_to_num(altitudes), origin)
     return Recording(
         times=times, ranges=np.linalg.norm(place, axis=1), azimuths=np.arctan2(place[:, 1], place[:, 0]),
