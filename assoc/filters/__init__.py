@@ -13,6 +13,7 @@ from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
 from assoc.filters.measurement import FunctionMeasurement, LinearMeasurement, Measurement
 from assoc.filters.modified_ekf import ModifiedEKF
 from assoc.filters.motion.correlated import Jerk, Singer
+from assoc.filters.motion.free_flight import FreeFlight
 from assoc.filters.motion.models import (
     ConstantAcceleration,
     ConstantVelocity,
@@ -58,6 +59,7 @@ __all__ = [
     "Motion",
     "Padded",
     "Singer",
+    "FreeFlight",
     "UnitRates",
     "UnmannedAircraft",
     "UnscentedKalmanFilter",

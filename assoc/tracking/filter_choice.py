@@ -29,17 +29,19 @@ _TURN_NOISE = 0.03
 """Standard deviation of a turn rate's increment in a step, rad/s."""
 
 
-def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3, *, unscented: bool = False) -> Filter[Any]:
+def two_speeds(
+    noise: float = MANOEUVRE_NOISE, dimensions: int = 3, *, unscented: bool = False, falls: bool = False
+) -> Filter[Any]:
     """Interacting multiple models: nearly constant velocity, and manoeuvres with process noise, m/s^1.5.
 
     The quiet model has a tenth of the process noise. Each model changes to the other within four seconds with
     probability 0.1, and lasts for 36 seconds on average. Unscented filters instead of extended ones are for
     `open_heights`: linearised at a height that is kilometres off, slant ranges seem to determine it better than they
-    do.
+    do. Targets that `falls` fly free under gravity instead of at nearly constant velocity, in three dimensions.
     """
     kind: Any = filters.UnscentedKalmanFilter if unscented else filters.ExtendedKalmanFilter
     modes: list[Any] = [
-        kind(filters.ConstantVelocity(share * noise, dimensions=dimensions, kind="continuous"))
+        kind(filters.FreeFlight(share * noise) if falls and dimensions == 3 else _velocity(share * noise, dimensions))
         for share in (_QUIET, 1.0)
     ]
     transition = np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]])
@@ -100,8 +102,8 @@ def height_note(sensors: Sequence[Sensor], axes: int) -> str | None:
     return "heights are not measured: z comes from slant ranges and the region's heights, sigma_z says how well"
 
 
-def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:
-    return filters.ConstantVelocity(noise, dimensions=2 if flat else 3, kind="continuous")
+def _velocity(noise: float, dimensions: int) -> filters.ConstantVelocity:
+    return filters.ConstantVelocity(noise, dimensions=dimensions, kind="continuous")
 
 
 def _turn(noise: float, flat: bool, name: str) -> filters.CoordinatedTurn:
@@ -112,16 +114,16 @@ def _turn(noise: float, flat: bool, name: str) -> filters.CoordinatedTurn:
 
 def _imm(noise: float, flat: bool, seed: int) -> Filter[Any]:
     turn = _turn(noise, flat, "imm")
-    straight = filters.Padded(_velocity(0.25 * noise, flat), _TURN_NOISE)
+    straight = filters.Padded(_velocity(0.25 * noise, 3), _TURN_NOISE)
     modes: list[Any] = [filters.ExtendedKalmanFilter(straight), filters.ExtendedKalmanFilter(turn)]
     return filters.InteractingMultipleModel(modes, np.array([[0.95, 0.05], [0.1, 0.9]]))
 
 
 _MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
-    "ekf": lambda noise, flat, seed: filters.ExtendedKalmanFilter(_velocity(noise, flat)),
-    "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, flat)),
-    "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, flat)),
-    "ukf": lambda noise, flat, seed: filters.UnscentedKalmanFilter(_velocity(noise, flat)),
+    "ekf": lambda noise, flat, seed: filters.ExtendedKalmanFilter(_velocity(noise, 2 if flat else 3)),
+    "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, 2 if flat else 3)),
+    "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, 2 if flat else 3)),
+    "ukf": lambda noise, flat, seed: filters.UnscentedKalmanFilter(_velocity(noise, 2 if flat else 3)),
     "enkf": lambda noise, flat, seed: filters.EnsembleKalmanFilter(_velocity(noise, flat), 100, seed),
     "imm": _imm,
     "fuzzy": lambda noise, flat, seed: filters.FuzzyAdaptiveEKF.from_data(
@@ -140,13 +142,15 @@ def make_filter(
     seed: int = 0,
     pace: float = 1.0,
     region: Array | None = None,
+    falls: bool = False,
 ) -> Filter[Any]:
     """Make one of the `FILTERS` with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
 
     The sensors decide, with the region (3, 2), whether states are `planar`. `process_noise` is the root of the
     acceleration's spectral density, m/s^1.5; for imm-cv that of its manoeuvring model, for imm and fuzzy the
     acceleration, m/s^2. Default: `manoeuvre_noise` of the pace (seconds from scan to scan) for imm-cv, 30 for all
-    others. The seed is that of the ensemble filter's noise. A filter that does not suit the sensors is refused.
+    others. Targets that `falls` fly under gravity, of imm-cv. The seed is that of the ensemble filter's noise. A filter
+    that does not suit the sensors is refused.
     """
     if name not in FILTERS:
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
@@ -154,7 +158,7 @@ def make_filter(
         process_noise = manoeuvre_noise(pace) if name == "imm-cv" else PROCESS_NOISE
     flat = planar(sensors, region)
     if name == "imm-cv":
-        made = two_speeds(process_noise, 2 if flat else 3, unscented=not flat and open_heights(sensors))
+        made = two_speeds(process_noise, 2 if flat else 3, unscented=not flat and open_heights(sensors), falls=falls)
     else:
         made = _MAKERS[name](process_noise, flat, seed)
     for sensor in sensors:

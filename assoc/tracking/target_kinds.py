@@ -22,6 +22,8 @@ class TargetKind(NamedTuple):
     """In a manoeuvre, m/s^2."""
     duration: float
     """Seconds for which a manoeuvre lasts."""
+    falls: bool = False
+    """Whether they fly free, under gravity: see `assoc.filters.FreeFlight`."""
 
     def noise(self, pace: float) -> float:
         """Process noise for scans `pace` seconds apart, m/s^1.5: a manoeuvre's change of velocity from scan to scan."""
@@ -34,8 +36,12 @@ TARGETS = {
     "ship": TargetKind(5.0, 0.2, 5.0),
     "drone": TargetKind(12.0, 5.0, 2.0),
     "pedestrian": TargetKind(1.5, 1.0, 1.0),
+    "missile": TargetKind(1000.0, 100.0, 1.0, True),
+    "ballistic": TargetKind(1500.0, 20.0, 2.0, True),
+    "satellite": TargetKind(4500.0, 1.0, 1.0, True),
 }
-"""Kinds by name: turns of 25 degrees of bank, of 5 g, of a rudder, of 0.5 g, and steps aside."""
+"""Kinds by name: turns of 25 degrees of bank, of 5 g, of a rudder, of 0.5 g, steps aside, 10 g of a motor or fins, 2 g
+of drag, and hardly anything."""
 
 
 def target_kind(name: str, scene: Scene | None, make: Callable[..., Any]) -> TargetKind:

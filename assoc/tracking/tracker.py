@@ -160,7 +160,9 @@ class Tracker:
         if not arguments and options.get("filter") is None:
             pace = pace_of(scene.times)
             noise = manoeuvre_noise(pace) if kind is None else kind.noise(pace)
-            options["filter"] = two_speeds(noise, unscented=open_heights(scene.sensors))
+            options["filter"] = two_speeds(
+                noise, unscented=open_heights(scene.sensors), falls=kind is not None and kind.falls
+            )
         return cls(scene.sensors, *arguments, region=scene.region, **options)
 
     if not TYPE_CHECKING:

@@ -5,7 +5,9 @@ import pytest
 
 from assoc import InvalidInputError, Scene, simulation
 from assoc._cli.track import options
-from assoc.sensors import Radar2D
+from assoc.filters import FreeFlight
+from assoc.sensors import Radar2D, Radar3D
+from assoc.simulation.observation import observe
 from assoc.tracking import Initiation, MultiSensorTracker, NearestNeighbourTracker
 from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise
@@ -64,3 +66,40 @@ def test_unknown_kinds():
         MultiSensorTracker.for_scene(harbour(scans=2), targets="boat")
     with pytest.raises(InvalidInputError, match="auto needs a scene"):
         target_kind("auto", None, NearestNeighbourTracker.for_scene)
+
+
+def arcs(speed, up, height, scans=40):
+    """Two radars see two targets in free flight until they are down, at a scan in five seconds."""
+    motion, times = FreeFlight(0.0), 5.0 * np.arange(scans)
+    x = np.array([[-2e5, 0.0, height, speed, 0.0, up], [-1e5, 9e4, height, speed, -0.1 * speed, 0.9 * up]])
+    paths = np.stack([motion.propagate(x, t)[:, :3] for t in times])
+    view = [[0, 3e6], [-np.pi, np.pi], [0.01, np.pi / 2]]
+    radars = [
+        Radar3D(position=place, noise=[100.0, 1e-3, 1e-3], false_alarm_rate=2.0, field_of_view=view)
+        for place in ([-2e5, -1e5, 0.0], [2e5, 6e4, 0.0])
+    ]
+    ids = [np.flatnonzero(path[:, 2] > 0) for path in paths]
+    places = [path[rows] for path, rows in zip(paths, ids, strict=True)]
+    region = [[-3e6, 3e6], [-3e6, 3e6], [0, 1e6]]
+    return observe(radars, times, ids, places, np.random.default_rng(0), region=region)
+
+
+def test_missiles_are_held_until_they_are_down_and_satellites_as_long_as_they_are_seen():
+    falling = arcs(1200.0, 700.0, 5e3)
+    tracker = MultiSensorTracker.for_scene(falling, targets="ballistic")
+    for k in range(falling.num_scans):
+        tracker.step(falling.times[k], falling.measurements[k])
+        there, tracks = falling.truth.positions[k], [track for track in tracker.tracks if track.reported]
+        if k >= 3:
+            assert len(tracks) == len(there)
+    assert not len(falling.truth.positions[-1])
+    orbits = arcs(7500.0, 0.0, 6e5)
+    found = confirmed(orbits, targets="satellite")
+    off = np.linalg.norm(
+        np.sort([track.position for track in found], axis=0) - np.sort(orbits.truth.positions[-1], axis=0)
+    )
+    assert len(found) == 2 and off < 4e3
+    speeds = [np.linalg.norm(track.velocity) for track in found]
+    np.testing.assert_allclose(speeds, 7520.0, atol=150.0)
+    # such targets are beyond the usual prior: it loses them from scan to scan
+    assert len(confirmed(orbits)) != 2 or max(track.track_id for track in confirmed(orbits)) > 20

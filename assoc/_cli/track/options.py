@@ -44,7 +44,7 @@ _ALIASES = {
     "nn": "nearest-neighbour", _GNN: "nearest-neighbour",
 }  # fmt: skip
 """What else trackers are called."""
-TARGETS = ("airliner", "fighter", "ship", "drone", "pedestrian")
+TARGETS = ("airliner", "fighter", "ship", "drone", "pedestrian", "missile", "ballistic", "satellite")
 FILTERS = ("imm-cv", "ekf", "kalman", "modified-ekf", "ukf", "enkf", "imm", "fuzzy")
 
 _OF_TRACKERS = (
@@ -314,14 +314,15 @@ def make_tracker(
     from assoc.tracking.target_kinds import target_kind
 
     parsed.check_use(_OF_TRACKERS, tracker=name)
-    noise = parsed["process_noise"]
+    noise, falls = parsed["process_noise"], False
     if parsed["targets"] is not None:
         kind = target_kind(parsed["targets"], scene, KINDS[name].plain.for_scene)
+        falls = kind.falls
         if noise is None:
             noise = kind.acceleration if parsed["filter"] in ("imm", "fuzzy") else kind.noise(pace)
         if parsed["speed"] is None:
             settings = settings | {"initiation": replace(settings["initiation"], speed=kind.speed)}
-    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace, region)
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace, region, falls)
     of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
     adapt = not parsed["no_adapt"]
     return KINDS[name](sensors, made, region=region, adapt=adapt, **settings, **of_tracker)

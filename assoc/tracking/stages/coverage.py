@@ -22,6 +22,8 @@ _FORGETTING = 0.05
 _LEAST_TURN = 1e-3
 # a scan counts for a track if this share of it is in view of a sensor
 _COVERED = 0.5
+# standard deviations below the region's floor
+_SURELY = 3.0
 
 
 def keep_pace(progress: Progress) -> Progress:
@@ -130,6 +132,12 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
         if len(left):
             seen = settings.views.at_means(tracks.states[left])[:, settings.ranging].any(axis=1)
             gone[left] |= ~seen & ~_inside(settings, tracks.states[left], 2)
+    # missed and surely below the region: it has come down
+    axes, floor = settings.filter.motion.position, settings.scene.region[2, 0]
+    if len(axes) == 3 and settings.height is None:
+        missed = np.flatnonzero(tracks.last_detection < time)
+        where, spread = places_of(settings.filter, tracks.states[missed])
+        gone[missed] |= where[:, 2] + _SURELY * np.sqrt(spread[:, 2, 2]) < floor
     # out of view for so long that nobody knows where it is
     hidden = np.flatnonzero(tracks.hidden > 0.0)
     if len(hidden):
