@@ -100,7 +100,7 @@ def build_problem(
     The ant colony paper, equations 1-5; with clutter density r / V in place of 1 / V.
     """
     probability = _checked_probability(gate_probability)
-    scene, chosen = _standing(scene, scan)
+    scene, chosen = _by_pose(scene, scan)
     most = _most_tuples(max_tuples, chosen)
     if all_tuples:
         return _whole_grid(scene, chosen, most, speed, target_density)
@@ -200,7 +200,7 @@ def tuple_costs(
     InvalidInputError
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
-    scene, chosen = _standing(scene, scan)
+    scene, chosen = _by_pose(scene, scan)
     if chosen.at_once:
         return positions.tuple_costs(scene, chosen, tuples, speed=speed, target_density=target_density)
     _refuse_prior(target_density)
@@ -232,13 +232,13 @@ def positions_and_covariances(
     InvalidInputError
         As `tuple_costs`.
     """
-    scene, chosen = _standing(scene, scan)
+    scene, chosen = _by_pose(scene, scan)
     if chosen.at_once:
         return positions.positions_and_covariances(scene, chosen, tuples)
     return timed_positions(scene, chosen, tuples, speed)
 
 
-def _standing(scene: Scene, scan: int | Scan) -> tuple[Scene, Scan]:
+def _by_pose(scene: Scene, scan: int | Scan) -> tuple[Scene, Scan]:
     """Sensors as they stand at the scan's time, and the scan as they measure it."""
     chosen = scan_of(scene, scan)
     return scene.at(chosen.time), chosen.aligned(scene.sensors)

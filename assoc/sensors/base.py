@@ -220,9 +220,9 @@ class Sensor(ABC):
         if self.platform is None:
             return self
         (position,) = self.platform.places(np.array([time]), self.position)
-        return self._standing(position, float(self.platform.poses(np.array([time]))[1][0]))
+        return self._by_pose(position, float(self.platform.poses(np.array([time]))[1][0]))
 
-    def _standing(self, position: Array, heading: float) -> Sensor:
+    def _by_pose(self, position: Array, heading: float) -> Sensor:
         """The sensor at a position (3,) of the frame, turned by a heading, radians."""
         view = np.array(self.field_of_view)
         view[[axis for axis in range(self.dim) if self.components[axis] == "azimuth"]] += heading

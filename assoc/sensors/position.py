@@ -37,7 +37,7 @@ class PositionSensor(Sensor):
         """Derivatives by the position, shape (n, d, 3): ones on the diagonal."""
         return np.broadcast_to(np.eye(3)[: self.dim], (len(self._places(positions)), self.dim, 3)).copy()
 
-    def _standing(self, position: Array, heading: float) -> Sensor:
+    def _by_pose(self, position: Array, heading: float) -> Sensor:
         view, d = self.field_of_view, self.dim
         corners = np.stack(np.meshgrid(*view), axis=-1).reshape(-1, d)
         spots = turned(corners, np.full(len(corners), heading)) + position[:d]

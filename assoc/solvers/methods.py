@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from assoc.packing.branching.feasibility import first_solution
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.search import BranchAndBound, first_solution
 from assoc.packing.component import Component
 from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods.cluster import ClusterSearch

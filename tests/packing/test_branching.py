@@ -5,7 +5,6 @@ import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.depth_first import Limits, search_depth_first
-from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.branching.node import branch, drop, new_work, open_node
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import (
@@ -19,7 +18,7 @@ from assoc.packing.branching.pairs import (
     new_trials,
 )
 from assoc.packing.branching.root import plain_root
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.search import BranchAndBound, first_solution
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible

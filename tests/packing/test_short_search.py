@@ -7,7 +7,7 @@ from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.open_nodes import OpenNodes
-from assoc.packing.branching.short_search import Part, arrays_within, remainder_within, search_shortly
+from assoc.packing.branching.short_search import Subproblem, arrays_within, remainder_within, search_shortly
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
@@ -28,7 +28,7 @@ def begun(packing):
 
 
 def everything(packing):
-    return Part(np.ones(packing.num_columns, dtype=bool), packing.slack, NONE)
+    return Subproblem(np.ones(packing.num_columns, dtype=bool), packing.slack, NONE)
 
 
 def part_of(packing, rng, share, most):
@@ -42,7 +42,7 @@ def part_of(packing, rng, share, most):
             covered[rows] = True
     columns &= ~covered[packing.cols].any(axis=1)
     columns[fixed] = True
-    return Part(columns, packing.slack & ~covered[:-1], np.array(fixed, dtype=np.int64))
+    return Subproblem(columns, packing.slack & ~covered[:-1], np.array(fixed, dtype=np.int64))
 
 
 def test_what_is_found_is_the_best_of_its_part():

@@ -177,10 +177,10 @@ class TimedScan:
         """Sensors, as they stood, and the due tuples whose turn they have."""
         for s in range(len(self.sensors)):
             here = np.flatnonzero(due & (turn == s))
-            for sensor, rows in self.standing(s, stamps[here, s]):
+            for sensor, rows in self.by_pose(s, stamps[here, s]):
                 yield s, sensor, here[rows]
 
-    def standing(self, s: int, times: Array) -> list[tuple[Sensor, Array]]:
+    def by_pose(self, s: int, times: Array) -> list[tuple[Sensor, Array]]:
         """Sensor s as it stood at times (n,), and the rows of each stand: one of all unless it moved."""
         path = self.paths[s]
         if path is None:
@@ -285,7 +285,7 @@ class TimedScan:
     def _near_moving(self, s: int) -> tuple[Array, Array]:
         """`near` for a sensor that moved: by the predictions to each time at which it measured."""
         found = []
-        for sensor, rows in self.standing(s, self.times[s]):
+        for sensor, rows in self.by_pose(s, self.times[s]):
             then = self._moved(self.states, np.maximum(float(self.times[s][rows[0]]) - self.before, 0.0))
             expected, angles = self.filter.expected(then, sensor), angular_components(sensor)
             track, near = near_pairs(expected, self.measurements[s][rows], angles, self.gates[s])
@@ -301,7 +301,7 @@ class TimedScan:
         if not len(able) or not len(self.times[s]):
             return nothing, nothing
         firsts, seconds = [], []
-        for sensor, rows in self.standing(s, self.times[s]):
+        for sensor, rows in self.by_pose(s, self.times[s]):
             stamps, ends = self.times[r][able], (float(self.times[s][rows].min()), float(self.times[s][rows].max()))
             lag = np.maximum(np.abs(stamps - ends[0]), np.abs(stamps - ends[1]))
             wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)

@@ -23,13 +23,15 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import wait_for_kernels
 from assoc._types import Floats
+from assoc.errors import LimitExceededError
+from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.counts import USUAL, Leaf, Splitting, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.node import Work, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.packing import Packing
-from assoc.packing.run import memory_allows, never
+from assoc.packing.run import FIRST_NODES, Run, memory_allows, never
 
 # the first and the last aim, as shares of the gap between the root's bound and the incumbent, and their growth
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
@@ -210,3 +212,23 @@ class BranchAndBound:
         # without an incumbent there is no gap; a gap that is only rounding may have no share larger than 0
         farther = max(root, self._floor) < aim < root + _LAST * gap
         self._aim = aim if 0.0 < gap < np.inf and farther else np.inf
+
+
+def first_solution(packing: Packing, run: Run, nodes: int = FIRST_NODES) -> NDArray[np.int32] | None:
+    """Return the columns of a complete solution; None if there is none, or time or nodes are used up."""
+    if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
+        return None
+    chosen = []
+    for c in range(packing.num_components):
+        part = packing.component(c)
+        search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline, run.memory_allows)
+        while search.columns is None and not search.done and search.nodes < nodes and not run.should_stop():
+            search.run(20)
+        if search.columns is None and not search.done and not run.should_stop():
+            run.stopped_by = "iterations"
+        if search.columns is None:
+            if search.out_of_memory:
+                raise LimitExceededError("no memory to find out whether there is a solution; split the problem")
+            return None
+        chosen.append(part.origin[search.columns])
+    return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)

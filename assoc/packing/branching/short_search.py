@@ -27,7 +27,7 @@ from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import Program
 
 
-class Part(NamedTuple):
+class Subproblem(NamedTuple):
     """The part of the solutions to search, for which the program was just solved."""
 
     columns: NDArray[np.bool_]
@@ -59,7 +59,7 @@ def short_memory(packing: Packing, rows: float) -> float:
 
 
 def search_shortly(
-    packing: Packing, linear: LinearProgram, part: Part, cutoff: float, limits: Limits
+    packing: Packing, linear: LinearProgram, part: Subproblem, cutoff: float, limits: Limits
 ) -> tuple[NDArray[np.int64], bool]:
     """Search the part for which a program, perhaps with cuts, was just solved, for solutions lighter than the cutoff.
 
@@ -79,7 +79,7 @@ def search_shortly(
     return found, left == 0
 
 
-def remainder_within(packing: Packing, linear: LinearProgram, part: Part) -> Remainder | None:
+def remainder_within(packing: Packing, linear: LinearProgram, part: Subproblem) -> Remainder | None:
     """The remainder of the program with a part's columns fixed; None if they do not fit together."""
     slack = linear.slack.copy()
     slack[: packing.num_rows] = part.slack

@@ -30,7 +30,7 @@ from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import MOST_ROWS, root_with_cuts
-from assoc.packing.branching.short_search import Part, search_shortly, short_memory
+from assoc.packing.branching.short_search import Subproblem, search_shortly, short_memory
 from assoc.packing.kernels.columns import choose_all
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import basis_of
@@ -223,6 +223,6 @@ class _Descent:
         relaxed = self.relaxed
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
         slack = self._packing.slack & ~self._covered
-        part = Part(columns, slack, self.fixed)
+        part = Subproblem(columns, slack, self.fixed)
         found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits)
         return (found if found.size else self.fixed), done
