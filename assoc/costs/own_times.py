@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -76,8 +77,8 @@ def _timed_scan(scene: Scene, scan: Scan, gate_probability: float, speed: float 
 
     none = start(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
     return TimedScan(
-        filter, none, scan.time, scan.measurements, scan.own_times(), scene.sensors, _places(scene, scan), start,
-        scan.sectors, gate_probability, scan.time, None, scan.paths,
+        filter, none, scan.time, replace(scan, clutter=None), scene.sensors, _places(scene, scan), start,
+        gate_probability,
     )  # fmt: skip
 
 

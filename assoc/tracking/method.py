@@ -58,15 +58,15 @@ class Method(ABC):
         `assoc.tracking.associate.all_sensors` (all sensors together) do both.
         """
 
-    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+    def life_cycle(self, progress: Progress, association: Association) -> Progress:
         """Confirm tracks, report decisions, delete tracks."""
         settings, scan = progress.settings, progress.scan
-        tracks = found.tracks.confirm(settings.life_cycle)
-        now = decision(scan.index, scan.time, found.assigned, tracks.track_id[tracks.confirmed])
+        tracks = association.tracks.confirm(settings.life_cycle)
+        now = decision(scan.index, scan.time, association.assigned, tracks.track_id[tracks.confirmed])
         gone = to_delete(progress, tracks)
         ended = np.sort(tracks.track_id[gone & tracks.confirmed])
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
-        return progress.with_state(tracks=tracks[~gone], method_state=found.method_state)._replace(step=step)
+        return progress.with_state(tracks=tracks[~gone], method_state=association.method_state)._replace(step=step)
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track in a step, (T, S)."""

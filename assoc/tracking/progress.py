@@ -90,7 +90,7 @@ class Progress(NamedTuple):
     """The tracks that association began with, of a tracker that adapts."""
     dense: Sequence[Array] = ()
     """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
-    found: Association | None = None
+    association: Association | None = None
     step: Step | None = None
 
     def with_state(self, **changes: Any) -> Progress:

@@ -173,9 +173,8 @@ def _timed(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TimedS
 
     before = scan.time if state.time is None else state.time
     return TimedScan(
-        settings.filter, state.tracks.states, before, scan.measurements, scan.own_times(), settings.sensors,
-        settings.births.places(scan), start, scan.sectors, settings.gate_probability, scan.time,
-        _evidence(state, scan), scan.paths, scan.clutter,
+        settings.filter, state.tracks.states, before, scan, settings.sensors, settings.births.places(scan), start,
+        settings.gate_probability, _evidence(state, scan),
     )  # fmt: skip
 
 
@@ -192,12 +191,12 @@ def associate(progress: Progress) -> Progress:
     method = progress.settings.method
     if progress.timed is not None and not method.own_times:
         raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
-    return progress._replace(found=method.associate(progress))
+    return progress._replace(association=method.associate(progress))
 
 
 def live(progress: Progress) -> Progress:
     """Confirm tracks, report decisions, delete tracks."""
-    done: Progress = progress.settings.method.life_cycle(progress, progress.found)
+    done: Progress = progress.settings.method.life_cycle(progress, progress.association)
     return done
 
 

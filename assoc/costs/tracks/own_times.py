@@ -19,12 +19,13 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.gating import angular_components, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
-from assoc.costs.tracks.tuples import gate_of, require_states
+from assoc.costs.tracks.tuples import TrackTuples, gate_of, require_states
 from assoc.costs.views import bands_of, log_missed, places_of, share_in_view
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
-from assoc.sensors import Platform, Sensor
+from assoc.scene.scan import Scan
+from assoc.sensors import Sensor
 
 # a gate moves on a curve, the box on a straight line: it is longer by this factor
 _CURVED = 1.3
@@ -76,25 +77,14 @@ class Grown(NamedTuple):
     followed: Followed
 
 
-class TimedTuples(NamedTuple):
-    """M candidate tuples; every track has one in which all sensors missed it."""
-
-    track: Array
-    """Row of the track, int (M,); -1: a new target."""
-    rows: Array
-    """1-based measurement of each sensor, 0 where it missed, int32 (M, S)."""
-    costs: Array
-    """(M,); of a new target with the density of births at its lead's measurement."""
-
-
 class TimedScan:
     """T tracks and the measurements since, each with its own time.
 
-    `before`, a number or (T,), are the times of the states, none after the measurements', and `end` is that of the
-    scan, seconds. `start` (positions, covariances, lag) begins tracks at a time `lag` (n,) seconds before that of the
-    positions. `evidence` (track, sensor, measurement) adds to pairs of a track and a measurement (K,) a log likelihood
-    ratio, and whether they may belong together. `paths` are those of sensors that moved since the last scan; they are
-    given as they stand at its end. `sectors` and `clutter`: see `assoc.Scene`, `assoc.scene.Scan`.
+    `before`, a number or (T,), are the times of the states, seconds, none after the measurements'. `scan` ends at its
+    time; the sensors are given as they stand then, and its `paths` are those of the ones that moved. `start`
+    (positions, covariances, lag) begins tracks at a time `lag` (n,) seconds before that of the positions. `evidence`
+    (track, sensor, measurement) adds to pairs of a track and a measurement (K,) a log likelihood ratio, and whether
+    they may belong together.
     """
 
     def __init__(
@@ -102,28 +92,22 @@ class TimedScan:
         filter: Filter[Any],
         states: Any,
         before: float | Array,
-        measurements: Sequence[Array],
-        times: Sequence[Array],
+        scan: Scan,
         sensors: Sequence[Sensor],
         places: Places,
         start: Callable[[Array, Array, Array], Any],
-        sectors: Array | None,
         gate_probability: float,
-        end: float,
         evidence: PairEvidence | None = None,
-        paths: Sequence[Platform | None] = (),
-        clutter: Sequence[Array] | None = None,
     ) -> None:
-        self.paths = paths or (None,) * len(sensors)
-        self.evidence, self.clutter = evidence, clutter
         self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
         self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
-        self.measurements, self.times, self.start, self.sectors = measurements, times, start, sectors
-        self.end = end
-        self.late = self._moved(states, np.maximum(end - self.before, 0.0))
+        self.measurements, self.times, self.end = scan.measurements, scan.own_times(), scan.time
+        self.paths = scan.paths or (None,) * len(sensors)
+        self.sectors, self.clutter, self.start, self.evidence = scan.sectors, scan.clutter, start, evidence
+        self.late = self._moved(states, np.maximum(self.end - self.before, 0.0))
         """The tracks as predicted to the end of the scan."""
         self.gates = [gate_of(sensor, gate_probability) for sensor in sensors]
-        sizes = [len(z) for z in measurements]
+        sizes = [len(z) for z in scan.measurements]
         self.offsets = np.cumsum([len(states), *sizes])
         """Where each sensor's measurements begin among anchors: tracks, then measurements that began one."""
         # tracks start with sensors that determine positions: these come first
@@ -338,8 +322,10 @@ def _put(states: Any, rows: Array, new: Any) -> Any:
     return state_from(type(states), arrays)
 
 
-def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TimedTuples:
-    """Candidate tuples of tracks, or of new targets, and one measurement or none of each sensor.
+def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TrackTuples:
+    """Candidate tuples of tracks, or of new targets (track -1), and one measurement or none of each sensor.
+
+    The costs of new targets have the density of births at their lead's measurement.
 
     LimitExceededError for more than `max_tuples`.
     """
@@ -372,7 +358,7 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tup
     good[~good] = costs[~good] < alone[track[~good]]
     order = np.flatnonzero(good)
     order = order[np.lexsort((*rows[order].T[::-1], track[order]))]
-    return TimedTuples(track[order], rows[order], costs[order])
+    return TrackTuples(track[order], rows[order], costs[order])
 
 
 def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTerms, misses: Array) -> Array:

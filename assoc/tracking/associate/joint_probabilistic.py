@@ -158,7 +158,8 @@ class JointProbabilistic(Method):
             begun = np.clip(offers.births.score + np.log1p(-taken[numbers]), -_SURE, _SURE)
             order = scores.after(update.odds - ahead, offers.births, begun)
             ids[numbers] = offers.births.ids
-            parts = _weighed(growth, s, offers, order, parts, _Shares(pairs, pair, known.share, update))
+            share = known.share[pair] * np.exp(offers.gain - pairs.gain[pair])
+            parts = parts.weighed(growth, s, offers, order, share, update)
             odds, ahead = np.append(update.odds, begun[order]), np.append(ahead, np.zeros(len(order)))
             seen = np.append(seen | (update.detected > 0.5), np.ones(len(order), dtype=np.bool_))
             found[s], assigned[s] = known, ids
@@ -202,15 +203,6 @@ class ScoredPairs(NamedTuple):
     """Gain of the track's score by the measurement, (K,)."""
 
 
-class _Shares(NamedTuple):
-    """Pairs of tracks and measurements, which of them each offer belongs to, their shares, and the tracks' update."""
-
-    pairs: ScoredPairs
-    pair: Array
-    share: Array
-    update: _Update
-
-
 class _Parts(NamedTuple):
     """P parts of T tracks: the branches of a growth, each with its own measurements."""
 
@@ -241,6 +233,35 @@ class _Parts(NamedTuple):
         np.logaddexp.at(mean, pair, np.log(self.share[offers.branch]) + offers.gain)
         return ScoredPairs(*np.divmod(keys, max(count, 1)), mean), pair
 
+    def weighed(
+        self, growth: AtOnce | InOrder, s: int, offers: Offers, order: Array, share: Array, update: _Update
+    ) -> _Parts:
+        """Weigh the parts with and without a measurement of sensor s, and add those of births, in this order.
+
+        `share` (K,) are those of the pairs' measurements in their tracks' states.
+        """
+        stays, weight = update.missed / update.after, share / update.after[self.owner[offers.branch]]
+        tracks, new = len(stays), len(order)
+        if isinstance(growth, AtOnce):
+            # all of one instant: parts are merged at once
+            counts = share >= _LEAST_SHARE
+            used, faint = np.flatnonzero(counts), np.flatnonzero(~counts)
+            stays = stays + np.bincount(offers.branch[faint], weight[faint], tracks)
+            growth.merge(offers, used, weight[used], stays, order)
+            return _Parts.of(tracks + new)
+        share = np.concatenate([self.share * stays[self.owner], self.share[offers.branch] * weight])
+        whose = np.concatenate([np.arange(len(self.owner)), offers.branch])
+        most = np.zeros(tracks)
+        np.maximum.at(most, self.owner[whose], share)
+        kept = np.flatnonzero(share >= np.minimum(_LEAST_PART, most[self.owner[whose]]))
+        owner, born = self.owner[whose[kept]], len(whose) + order
+        share = share[kept] / np.bincount(owner, share[kept], tracks)[owner]
+        growth.take(s, offers, np.append(kept, born))
+        owner = np.append(owner, np.arange(tracks, tracks + new))
+        first = np.zeros(tracks + new, dtype=np.int64)
+        first[owner[::-1]] = np.arange(len(owner))[::-1]
+        return _Parts(owner, first, np.append(share, np.ones(new)))
+
     def merged(self, grown: Grown, rows: Array, seen: Array) -> tuple[Any, Array, Array]:
         """States of the tracks, and times of the first and last measurement of each one's likeliest part with any."""
         count = len(self.first)
@@ -251,32 +272,6 @@ class _Parts(NamedTuple):
         order = order[rows[order].any(axis=1)]
         first[self.owner[order]], last[self.owner[order]] = grown.first[order], grown.last[order]
         return merged(grown.states, self.owner, self.share, count), first, np.where(seen, last, np.nan)
-
-
-def _weighed(growth: AtOnce | InOrder, s: int, offers: Offers, order: Array, parts: _Parts, of: _Shares) -> _Parts:
-    """Weigh the parts of tracks with and without a measurement of sensor s, and add those of births, in this order."""
-    stays, weight = of.update.missed / of.update.after, of.share / of.update.after[of.pairs.track]
-    tracks, new = len(stays), len(order)
-    if isinstance(growth, AtOnce):
-        # all of one instant: parts are merged at once
-        counts = of.share >= _LEAST_SHARE
-        used, faint = np.flatnonzero(counts), np.flatnonzero(~counts)
-        stays = stays + np.bincount(offers.branch[faint], weight[faint], tracks)
-        growth.merge(offers, used, weight[used], stays, order)
-        return _Parts.of(tracks + new)
-    within = parts.share[offers.branch] * np.exp(offers.gain - of.pairs.gain[of.pair])
-    share = np.concatenate([parts.share * stays[parts.owner], within * weight[of.pair]])
-    whose = np.concatenate([np.arange(len(parts.owner)), offers.branch])
-    most = np.zeros(tracks)
-    np.maximum.at(most, parts.owner[whose], share)
-    kept = np.flatnonzero(share >= np.minimum(_LEAST_PART, most[parts.owner[whose]]))
-    owner, born = parts.owner[whose[kept]], len(whose) + order
-    share = share[kept] / np.bincount(owner, share[kept], tracks)[owner]
-    growth.take(s, offers, np.append(kept, born))
-    owner = np.append(owner, np.arange(tracks, tracks + new))
-    first = np.zeros(tracks + new, dtype=np.int64)
-    first[owner[::-1]] = np.arange(len(owner))[::-1]
-    return _Parts(owner, first, np.append(share, np.ones(new)))
 
 
 def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:

@@ -121,9 +121,9 @@ class TrackTrees(DeferringMethod):
         progress.work.leave(gap)
         return kept, grown, chosen
 
-    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+    def life_cycle(self, progress: Progress, association: Association) -> Progress:
         """Confirm trees, decide the oldest scan of the window, delete branches that contradict it, and tracks."""
-        tracks, trees, scan = found.tracks, found.method_state, progress.state.scan
+        tracks, trees, scan = association.tracks, association.method_state, progress.state.scan
         new = trees.chosen & ~tracks.confirmed
         new &= progress.settings.life_cycle.confirms(tracks.score, tracks.detections)
         if new.any():

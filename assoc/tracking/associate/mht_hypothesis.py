@@ -126,10 +126,10 @@ class ClusteredHypotheses(DeferringMethod):
         history = np.concatenate([rows, older], axis=1)[:, : older.shape[1]]
         return Association(batch, (), Hypotheses(hypotheses.window.opened(progress.scan, history), tuple(clusters)))
 
-    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+    def life_cycle(self, progress: Progress, association: Association) -> Progress:
         """Confirm tracks, decide the oldest scan of the window, delete tracks, split clusters."""
         before, scan = progress.state.tracks, progress.state.scan
-        tracks, hypotheses = found.tracks, found.method_state
+        tracks, hypotheses = association.tracks, association.method_state
         known = before.track_id[before.confirmed]
         good = hypotheses.best[tracks.confirm(progress.settings.life_cycle).confirmed[hypotheses.best]]
         tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, tracks.track_id[good]))

@@ -95,7 +95,7 @@ class FusedPicture(NamedTuple):
     """Of the assignment problem, with its bound; list 0 are the fused tracks before."""
 
 
-class _Known(NamedTuple):
+class _FusedTracks(NamedTuple):
     """Fused tracks so far."""
 
     ids: Array
@@ -133,7 +133,9 @@ class TrackFusion:
         self.parameters = FusionParameters() if parameters is None else parameters
         nothing = np.zeros(0, dtype=np.int64)
         state = SystemTracks(nothing, *open_states(0), np.zeros(0))
-        self._known = _Known(nothing, np.zeros((0, self.systems), np.int64), state, np.zeros(0), np.zeros(0), nothing)
+        self._known = _FusedTracks(
+            nothing, np.zeros((0, self.systems), np.int64), state, np.zeros(0), np.zeros(0), nothing
+        )
         self._time, self._next_id = -np.inf, 1
 
     @property
@@ -176,7 +178,7 @@ class TrackFusion:
         groups = solution.tuples[solution.tuples[:, 1:].any(axis=1)]
         return self._after(time, tracks, known, groups, solution)
 
-    def _candidates(self, tracks: Sequence[SystemTracks], known: _Known, left: Array) -> tuple[Array, Array]:
+    def _candidates(self, tracks: Sequence[SystemTracks], known: _FusedTracks, left: Array) -> tuple[Array, Array]:
         """Tuples of two or more (M, 1 + S) and their costs."""
         lists = [SystemTracks(*(part[left] for part in known.state)), *tracks]
         price = self._price(tracks)
@@ -212,7 +214,7 @@ class TrackFusion:
         return float(np.log(density) - velocities + self.systems * np.log1p(-chosen.coverage))
 
     def _after(
-        self, time: float, tracks: Sequence[SystemTracks], known: _Known, groups: Array, solution: Solution
+        self, time: float, tracks: Sequence[SystemTracks], known: _FusedTracks, groups: Array, solution: Solution
     ) -> FusedPicture:
         """Fuse each group, give it its id, and remember it."""
         mean, covariance = np.zeros((len(groups), self.systems, 6)), np.zeros((len(groups), self.systems, 6, 6))
@@ -233,10 +235,10 @@ class TrackFusion:
         started, hits = np.full(len(groups), float(time)), np.ones(len(groups), dtype=np.int64)
         started[~fresh], hits[~fresh] = known.started[before[~fresh]], known.hits[before[~fresh]] + 1
         state = SystemTracks(ids, *fused, 1.0 - absent.prod(axis=1))
-        now = _Known(ids, members, state, started, np.full(len(groups), float(time)), hits)
+        now = _FusedTracks(ids, members, state, started, np.full(len(groups), float(time)), hits)
         now = _part(now, np.argsort(ids))
         gone = _part(known, ~np.isin(known.ids, ids))
-        self._known = _Known(*(_joined(a, b) for a, b in zip(now, gone, strict=True)))
+        self._known = _FusedTracks(*(_joined(a, b) for a, b in zip(now, gone, strict=True)))
         self._time, self._next_id = float(time), self._next_id + len(order)
         found = [
             Track(int(i), float(time), x, P, x[:3], x[3:], True, 0.0, int(hit), float(begun), float(time), float(there))
@@ -317,9 +319,11 @@ def intersected(mean: Array, covariance: Array, used: Array) -> tuple[Array, Arr
     return np.einsum("gij,gs,gsjk,gsk->gi", P, weights, inverse, mean, optimize=True), P
 
 
-def _part(known: _Known, rows: Array) -> _Known:
+def _part(known: _FusedTracks, rows: Array) -> _FusedTracks:
     state = SystemTracks(*(part[rows] for part in known.state))
-    return _Known(known.ids[rows], known.members[rows], state, known.started[rows], known.seen[rows], known.hits[rows])
+    return _FusedTracks(
+        known.ids[rows], known.members[rows], state, known.started[rows], known.seen[rows], known.hits[rows]
+    )
 
 
 def _joined(a: Any, b: Any) -> Any:

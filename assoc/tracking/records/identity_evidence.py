@@ -142,14 +142,14 @@ class Identities(NamedTuple):
         return Identities(self.parameters, ids, last)
 
 
-def log_ratio(last: Array, given: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:
+def log_ratio(last: Array, code: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:
     """Log likelihood ratios of plots' codes, and the likeliest code of each track (0 where its plots have none).
 
     Parameters
     ----------
     last : int array (K, M)
         Codes of the last plots of each track, 0 unknown.
-    given : int array (K,)
+    code : int array (K,)
         Code of the plot, 0 unknown.
     count : int
         N, the number of codes.
@@ -164,11 +164,11 @@ def log_ratio(last: Array, given: Array, count: int, garbled: float, shared: flo
     votes = np.where(known, times, 0)
     top = vote * votes.max(axis=1, initial=0)
     scaled = (each * np.exp(vote * votes - top[:, None])).sum(axis=1) + (count - each.sum(axis=1)) * np.exp(-top)
-    same = ((last == given[:, None]) & known).sum(axis=1)
+    same = ((last == code[:, None]) & known).sum(axis=1)
     weight = np.exp(vote * same - top) / scaled
     same_aircraft = (1.0 - garbled) * weight + garbled / count
     other = shared * weight + (1.0 - shared) / count
-    informative = (given != UNKNOWN) & known.any(axis=1)
+    informative = (code != UNKNOWN) & known.any(axis=1)
     best = np.take_along_axis(last, np.argmax(np.where(known, times, -1), axis=1)[:, None], axis=1)[:, 0]
     return np.where(informative, np.log(same_aircraft / other), 0.0), np.where(known.any(axis=1), best, UNKNOWN)
 

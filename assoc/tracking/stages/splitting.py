@@ -21,8 +21,8 @@ _OLDER = 2
 
 def name_parents(progress: Progress) -> Progress:
     """Stage: give newly confirmed tracks that began where another one was, which goes on, the id of that one."""
-    assert progress.found is not None
-    every, known = progress.state.tracks, progress.found.tracks
+    assert progress.association is not None
+    every, known = progress.state.tracks, progress.association.tracks
     sure = known.track_id[known.confirmed]
     if np.isin(every.track_id[every.confirmed], sure).all():
         return progress

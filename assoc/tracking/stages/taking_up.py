@@ -35,8 +35,8 @@ _SURE = math.log(1e3)
 
 def take_up(progress: Progress) -> Progress:
     """Stage: give new tracks the ids of the old ones that they continue; keep the ends of this step."""
-    assert progress.found is not None and progress.step is not None
-    method, step, known = progress.settings.method, progress.step, progress.found.tracks
+    assert progress.association is not None and progress.step is not None
+    method, step, known = progress.settings.method, progress.step, progress.association.tracks
     lost, every = _predicted(progress), progress.state.tracks
     sure, gone = known.track_id[known.confirmed], every.confirmed & (every.missed > 0) & (every.existence < 0.0)
     if len(lost) or gone.any() or not np.isin(every.track_id[every.confirmed], sure).all():
