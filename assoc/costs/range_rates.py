@@ -14,7 +14,8 @@ added is half of
 
     q = d' D^-1 d + ln det D - sum ln r,
 
-which never falls when a tuple grows, as chi-square does not.
+which never falls when a tuple grows, as chi-square does not. A folded range rate takes part while its conditional
+deviation is at most a third of the interval; else it is uniform on the interval.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ class RangeRates(NamedTuple):
     """By which the other residuals shift it, (S, 3)."""
     prior: Array
     """Variances of the velocity, (3,)."""
+    folding: Array
+    """Interval at which a sensor's fold, m/s, (S,); infinite: they do not."""
 
 
 def checked_speed(speed: float | Sequence[float]) -> Array:
@@ -73,7 +76,8 @@ def range_rates(scene: Scene, scan: Scan, speed: float | Sequence[float]) -> Ran
             R = sensor.covariance
             slope[s] = np.linalg.solve(R[:3, :3], R[:3, 3])
             variance[s] = R[3, 3] - slope[s] @ R[:3, 3]
-    return RangeRates(np.concatenate(values), variance, slope, sigma**2)
+    folding = np.array([getattr(sensor, "interval", math.inf) for sensor in scene.sensors])
+    return RangeRates(np.concatenate(values), variance, slope, sigma**2, folding)
 
 
 @njit
@@ -108,6 +112,13 @@ def prices(sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Arr
                 k[i] = P[i, 0] * u[0] + P[i, 1] * u[1] + P[i, 2] * u[2]
                 off -= u[i] * v[i]
             variance += u[0] * k[0] + u[1] * k[1] + u[2] * k[2]
+            interval = rates.folding[s]
+            if interval < math.inf:
+                if 9.0 * variance > interval * interval:
+                    # of no use, and uniform on the interval
+                    result[t] += math.log(interval * interval / (TURN * r))
+                    continue
+                off -= interval * math.floor(off / interval + 0.5)
             result[t] += off * off / variance + math.log(variance / r)
             for i in range(3):
                 v[i] += k[i] * off / variance

@@ -17,7 +17,7 @@ from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.base import Filter
 from assoc.filters.imm import Mixture
-from assoc.sensors import PositionSensor, Sensor
+from assoc.sensors import PositionSensor, Radar3D, Sensor
 from assoc.sensors.codes import CODES
 from assoc.sensors.kernels.dispatch import linearise
 
@@ -75,6 +75,29 @@ def _within(mean: Array, spread: Array, limits: tuple[float, float], angular: bo
     return np.asarray(ndtr(high / spread) - ndtr(low / spread))
 
 
+def beside_notch(sensor: Sensor, states: Any, axes: Array) -> Array:
+    """Probability (B,) that range rates of states are outside of a radar's notch; 1 where none is known.
+
+    A radar that is blind to targets across its line of sight learns nothing from their misses.
+    """
+    columns = np.concatenate([axes, axes + len(axes)])
+    if not (isinstance(sensor, Radar3D) and sensor.notch > 0.0 and len(states)) or columns[-1] >= states.mean.shape[1]:
+        return np.ones(len(states))
+    both, spread = np.zeros((len(states), 6)), np.zeros((len(states), 6, 6))
+    put = np.concatenate([np.arange(len(axes)), 3 + np.arange(len(axes))])
+    both[:, put] = states.mean[:, columns]
+    spread[:, put[:, None], put] = states.covariance[:, columns[:, None], columns]
+    slope = sensor.jacobian(both[:, :3], both[:, 3:])[:, 3]
+    rate = sensor.measure(both[:, :3], both[:, 3:])[:, 3]
+    wide = np.sqrt(np.maximum(np.einsum("bi,bij,bj->b", slope, spread, slope), 1e-12))
+    if math.isfinite(sensor.interval):
+        # blind speeds come back with each interval
+        wide = np.minimum(wide, sensor.interval)
+        rate = rate - sensor.interval * (np.round(rate / sensor.interval) + np.arange(-3.0, 4.0)[:, None])
+    blind = ndtr((sensor.notch - rate) / wide) - ndtr((-sensor.notch - rate) / wide)
+    return np.asarray(1.0 - np.atleast_2d(blind).sum(axis=0))
+
+
 class Views:
     """The views of S sensors, for targets of a filter's states; one kernel for all of them.
 
@@ -94,6 +117,9 @@ class Views:
         for column, sensor in self._users(sensors):
             shares[:, column] = share_in_view(sensor, *_places(states, self._axes))
             shares[:, column] *= self._at(states, sensors, column)
+        for column, sensor in enumerate(self._sensors[sensors]):
+            if getattr(sensor, "notch", 0.0) > 0.0:
+                shares[:, column] *= beside_notch(sensor, states, self._axes)
         return shares
 
     def at_means(self, states: Any) -> Array:

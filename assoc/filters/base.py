@@ -323,7 +323,7 @@ class Filter(ABC, Generic[S]):
         if o.code < 0:
             residuals = [o.model.residual(z, np.broadcast_to(row, z.shape)) for row in h]
             return scores(np.stack(residuals), covariance)
-        status, ll, square = pairs(h, covariance, z, o.code)
+        status, ll, square = pairs(h, covariance, z, o.code, o.folding)
         if status != GOOD:
             complain(status)
         return ll, square

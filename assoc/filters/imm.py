@@ -35,7 +35,7 @@ from assoc.filters.batches import Batch
 from assoc.filters.kernels.gates import distances, matched
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.linearised import GaussianFilter
-from assoc.filters.measurement import Measurement
+from assoc.filters.measurement import Measurement, periods_of
 from assoc.filters.state import Gaussian, finite, gaussian
 from assoc.filters.unscented import UnscentedKalmanFilter
 
@@ -272,7 +272,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         corrected = Mixture(means, covariances, np.exp(joint - total[:, None]))
 
         def as_one() -> tuple[Array, Array, Array]:
-            mean, covariance = matched(state.weights, v, S, _turning(sensor, o.dim))
+            mean, covariance = matched(state.weights, v, S, _periods(sensor))
             return mean, covariance, np.einsum("bi,bi->b", mean, np.linalg.solve(covariance, mean[..., None])[..., 0])
 
         return update_later(corrected, total, as_one)
@@ -280,7 +280,7 @@ class InteractingMultipleModel(Filter[Mixture]):
     def expected(self, state: Mixture, sensor: Measurement) -> Expected:
         """Return the expected measurements and covariances of the mixtures; see `Filter.expected`."""
         h, S = self._of_modes(state, lambda model, part, times: model.expected(part, sensor))
-        return Expected(*matched(state.weights, h, S, _turning(sensor, h.shape[2])))
+        return Expected(*matched(state.weights, h, S, _periods(sensor)))
 
     def fit(self, state: Mixture, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:
         """How well measurements fit, without correcting anything; see `Filter.fit`."""
@@ -291,7 +291,8 @@ class InteractingMultipleModel(Filter[Mixture]):
             if found is None:
                 return None
             fits[:, j] = found.log_likelihood
-        status, nis = distances(*expected, rows, measured, self.observe(sensor).code)
+        o = self.observe(sensor)
+        status, nis = distances(*expected, rows, measured, o.code, o.folding)
         if status != GOOD:
             complain(status)
         return Fit(_joint(fits, state.weights[rows])[1], nis)
@@ -343,9 +344,9 @@ def _joint(log_likelihoods: Array, weights: Array) -> tuple[Array, Array]:
     return joint, reduce(np.logaddexp, joint.T)
 
 
-def _turning(sensor: Measurement, dim: int) -> Array:
-    """Which components are angles, bool (d,)."""
-    return np.array(getattr(sensor, "angular", (False,) * dim)[:dim], dtype=np.bool_)
+def _periods(sensor: Measurement) -> Array:
+    """After how much each component comes back, (d,)."""
+    return np.array(periods_of(sensor))
 
 
 def _mixture(parts: Sequence[Gaussian], weights: Array) -> Mixture:

@@ -13,7 +13,7 @@ from assoc.filters.kernels.gaussian import GIVEN, LINEAR, PLAIN
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import checked_covariance, finite
 from assoc.sensors.base import Sensor
-from assoc.sensors.codes import CODES, POSITION
+from assoc.sensors.codes import CODES, POSITION, RADAR3D
 
 _NO_MATRIX = np.zeros((0, 0))
 _NO_POSITION = np.zeros(3)
@@ -98,6 +98,11 @@ class FunctionMeasurement:
 Measurement = Sensor | LinearMeasurement | FunctionMeasurement
 
 
+def periods_of(sensor: Measurement) -> tuple[float, ...]:
+    """After how much each component of a measurement comes back; 0 where it does not, as in models of users."""
+    return sensor.periods if isinstance(sensor, Sensor) else (0.0,) * sensor.dim
+
+
 class Observation(NamedTuple):
     """A measurement model in the form that the kernels take."""
 
@@ -110,6 +115,12 @@ class Observation(NamedTuple):
     """The user's model; used only where `code` is GIVEN."""
     packed: Array
     """All that kernels need, in one piece, (1, ...); see `assoc.filters.kernels.gaussian.unpack`."""
+
+    @property
+    def folding(self) -> float:
+        """Interval at which range rates fold, 0 where they do not; see `assoc.filters.kernels.gaussian.folding_of`."""
+        c = int(self.packed[0, 2]) if self.code == RADAR3D else 0
+        return float(self.packed[0, 6 + c]) if c and self.packed.shape[1] > 6 + c + self.dim**2 else 0.0
 
     def given(self, values: Array) -> Array:
         """Packed models, one for each target, with what the user's functions gave for it, (B, rows, columns)."""
@@ -197,7 +208,11 @@ def observation(measurement: Measurement, motion: Motion, kind: int = PLAIN) -> 
             columns = np.concatenate([columns, _velocity_columns(motion)])
         if code is not None:
             R = np.ascontiguousarray(measurement.covariance)[None].copy()
-            packed = pack(code, kind, measurement.position, columns, _NO_MATRIX, R)
+            matrix = _NO_MATRIX
+            if measurement.measures_velocity and measurement.periods[-1]:
+                matrix = np.zeros((1, len(columns)))
+                matrix[0, 0] = measurement.periods[-1]
+            packed = pack(code, kind, measurement.position, columns, matrix, R)
             return Observation(code, measurement.dim, R, _NO_MODEL, packed)
         measurement = _SensorAsFunction(measurement, columns, motion.dim)
     if isinstance(measurement, LinearMeasurement):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,11 +17,11 @@ from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_part
 from assoc.sensors import KINDS, Platform, Sensor
 
 FORMAT = "assoc.scene"
-VERSION = 3
+VERSION = 4
 # bytes, a quarter of its memory: its content counts as well
 _OF_A_SCAN = 120
 # fields of later versions, latest first; a scene without them is written as version 1
-_LATER = {"sensor_platform": 3, "measurement_times": 2, "sectors": 2}
+_LATER = {"sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3, "measurement_times": 2, "sectors": 2}
 
 _FIELDS = {
     "name": Field("str", 0, required=False),
@@ -34,6 +35,8 @@ _FIELDS = {
     "sensor_field_of_view": Field("float", 2),
     "sensor_detection_probability": Field("float", 1),
     "sensor_false_alarm_rate": Field("float", 1),
+    "sensor_folding": Field("float", 1, required=False),
+    "sensor_notch": Field("float", 1, required=False),
     "measurement_values": Field("float", 1),
     "measurement_offsets": Field("int", 2),
     "measurement_sources": Field("int", 1, required=False),
@@ -88,6 +91,11 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         "measurement_values": np.concatenate([z.ravel() for block in blocks for z in block]),
         "measurement_offsets": np.concatenate([np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1),
     }
+    for name in ("folding", "notch"):
+        values = [getattr(sensor, name, None) or 0.0 for sensor in sensors]
+        values = [value if math.isfinite(value) else -1.0 for value in values]
+        if any(values):
+            arrays[f"sensor_{name}"] = np.array(values)
     arrays |= _platform_arrays(sensors)
     if parts["sectors"] is not None:
         arrays["sectors"] = parts["sectors"]
@@ -175,6 +183,9 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         raise InvalidInputError("the field 'sensor_kind' is empty, expected at least one sensor")
     for name in ("sensor_name", "sensor_dim", "sensor_detection_probability", "sensor_false_alarm_rate"):
         _check_shape(arrays, name, (count,))
+    for name in ("sensor_folding", "sensor_notch"):
+        if name in arrays:
+            _check_shape(arrays, name, (count,))
     _check_shape(arrays, "sensor_position", (count, 3))
     dims = arrays["sensor_dim"]
     if dims.min() < 1 or dims.max() > 4:
@@ -190,6 +201,10 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
             raise InvalidInputError(
                 f"the field 'sensor_kind' has {kind[:40]!r} for sensor {s}, expected one of {', '.join(KINDS)}"
             )
+        known = [name for name in ("folding", "notch") if f"sensor_{name}" in arrays]
+        rates = {name: float(arrays[f"sensor_{name}"][s]) for name in known if arrays[f"sensor_{name}"][s] != 0.0}
+        if rates.get("folding") == -1.0:
+            rates["folding"] = math.inf
         covariance = arrays["sensor_covariance"][square : square + dim * dim].reshape(dim, dim)
         try:
             sensors.append(
@@ -201,6 +216,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
                     false_alarm_rate=float(arrays["sensor_false_alarm_rate"][s]),
                     field_of_view=arrays["sensor_field_of_view"][row : row + dim],
                     platform=platforms[s],
+                    **rates,
                 )
             )
         except InvalidInputError as error:

@@ -200,6 +200,11 @@ class Sensor(ABC):
         return tuple(found)
 
     @property
+    def periods(self) -> tuple[float, ...]:
+        """After how much each component of a measurement comes back, (d,): angles after a turn; 0 where none does."""
+        return tuple(2 * math.pi if turns else 0.0 for turns in self.angular[: self.dim])
+
+    @property
     def measures_velocity(self) -> bool:
         """Whether measurements depend on the target's velocity: `measure` then needs velocities."""
         return False
@@ -263,12 +268,25 @@ class Sensor(ABC):
         """
 
     def residual(self, measured: Array, predicted: Array) -> Array:
-        """Return measured - predicted, shape (n, d), angles wrapped into (-pi, pi]."""
+        """Return measured - predicted, shape (n, d), angles wrapped into (-pi, pi], folded range rates likewise."""
         difference = self._components(measured, "measured") - self._components(predicted, "predicted")
         for axis in range(self.dim):
             if self.angular[axis]:
                 difference[..., axis] = wrap_angle(difference[..., axis])
-        return difference
+        return self.folded(difference)
+
+    def folded(self, measurements: Array) -> Array:
+        """Measurements (n, d) with components that come back, angles apart, within half a period of 0."""
+        z = measurements
+        for axis, period in enumerate(self.periods):
+            if period and not self.angular[axis]:
+                z = np.array(z)
+                z[..., axis] = np.mod(z[..., axis] + 0.5 * period, period) - 0.5 * period
+        return z
+
+    def sees(self, exact: Array) -> Array:
+        """Whether targets whose noise-free measurements are these (n, d) can be seen, bool (n,)."""
+        return self.in_view(self.folded(exact))
 
     def in_view(self, measurements: Array) -> Array:
         """Whether measurements (n, d) lie in the field of view; azimuth intervals may pass through pi."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,12 +25,50 @@ class Radar3D(Sensor):
     Azimuth is counted from +x towards +y, elevation from the horizontal plane up; the range rate is positive
     when the target recedes. See `Sensor` for the parameters; the components of `noise` and `field_of_view` are
     range, azimuth, elevation and, with a fourth, range rate.
+
+    Parameters
+    ----------
+    folding : float, optional
+        Interval of m/s by which range rates are known alone, the unambiguous velocities from end to end: a target at
+        rate v is measured at v + k * folding, in [-folding / 2, folding / 2). inf: they do not fold. Not said: trackers
+        that adapt take the field of view's width where it is narrower than targets are fast.
+    notch : float
+        A target whose range rate, as measured, is closer to 0 than this, m/s, is never seen.
     """
+
+    folding: float | None = None
+    notch: float = 0.0
 
     kind = "radar3d"
     components = ("range", "azimuth", "elevation", "range rate")
     # elevation ends at the poles: differences of two elevations need no wrapping
     angular = (False, True, False, False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, least in (("folding", 0.0), ("notch", -1e-300)):
+            value = getattr(self, name)
+            if value is None and name == "folding":
+                continue
+            if isinstance(value, (bool, str)) or np.ndim(value) != 0 or not float(value) > least:
+                kind = "above 0" if name == "folding" else "of at least 0"
+                raise InvalidInputError(f"{self._label}: {name} must be a number {kind}, m/s, got {value!r}")
+            if self.dim < 4 and (name == "folding" or value > 0.0):
+                raise InvalidInputError(f"{self._label}: {name} needs a range rate, a fourth component of noise")
+            object.__setattr__(self, name, float(value))
+        if self.notch >= 0.5 * self.interval:
+            raise InvalidInputError(f"{self._label}: notch must be below half of folding, got {self.notch:g}")
+
+    @property
+    def interval(self) -> float:
+        """`folding`, m/s, infinite where range rates do not fold."""
+        return math.inf if self.folding is None else self.folding
+
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """See `Sensor.periods`; that of folded range rates is their interval."""
+        turns = super().periods
+        return (*turns[:3], self.folding) if self.folding and math.isfinite(self.folding) else turns
 
     @classmethod
     def _allowed_dims(cls) -> tuple[int, ...]:
@@ -42,7 +81,8 @@ class Radar3D(Sensor):
 
     @cached_property
     def _without_range_rate(self) -> Radar3D:
-        return replace(self, noise=self.covariance[:3, :3], field_of_view=self.field_of_view[:3])
+        view = self.field_of_view[:3]
+        return replace(self, noise=self.covariance[:3, :3], field_of_view=view, folding=None, notch=0.0)
 
     @property
     def position_part(self) -> Sensor:
@@ -57,6 +97,11 @@ class Radar3D(Sensor):
         if self.measures_velocity:
             found.append((d * self._velocities(velocities)).sum(axis=1) / np.maximum(found[0], NEAREST))
         return np.stack(found, axis=1)
+
+    def sees(self, exact: Array) -> Array:
+        """As `Sensor.sees`, but for targets in the notch."""
+        inside = super().sees(exact)
+        return inside & (np.abs(self.folded(exact)[:, 3]) >= self.notch) if self.notch > 0.0 else inside
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, (n, 3, 3), with range rate by the velocity, too, (n, 4, 6)."""
@@ -85,7 +130,15 @@ class Radar3D(Sensor):
         away = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=1) * np.cos(elevation)[:, None]
         rate = (away * self.platform.of(self.position).velocities(times)).sum(axis=1)
         result[:, 3] += -rate if back else rate
-        return result
+        return self.folded(result)
+
+    def __eq__(self, other: object) -> bool:
+        same = super().__eq__(other)
+        if same is not True or not isinstance(other, Radar3D):
+            return same
+        return self.folding == other.folding and self.notch == other.notch
+
+    __hash__ = Sensor.__hash__
 
     def _velocities(self, velocities: Array | None) -> Array:
         if velocities is None:

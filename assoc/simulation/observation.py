@@ -134,7 +134,7 @@ def _report(
     """Measurements (n, d) of one sensor in one scan, and the source (n,) of each."""
     points = positions.reshape(-1, 3)
     exact = sensor.measure(points, velocities.reshape(-1, 3)) if sensor.measures_velocity else sensor.measure(points)
-    detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.in_view(exact)
+    detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.sees(exact)
     factor = np.linalg.cholesky(sensor.covariance)
     hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T
     low, high = sensor.field_of_view[:, 0], sensor.field_of_view[:, 1]
@@ -145,4 +145,4 @@ def _report(
             values[:, axis] = wrap_angle(values[:, axis])
     source = np.concatenate([ids[detected], np.full(len(clutter), -1)]).astype(np.int64)
     order = rng.permutation(len(values))
-    return values[order], source[order]
+    return sensor.folded(values)[order], source[order]

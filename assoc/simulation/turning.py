@@ -91,6 +91,7 @@ def observe_in_turns(
         for axis in range(sensor.dim):
             if sensor.angular[axis]:
                 values[:, axis] = wrap_angle(values[:, axis])
+        values = sensor.folded(values)
         scan = np.searchsorted(times, when)
         for k in range(len(times)):
             mine = np.flatnonzero(scan == k)
@@ -113,7 +114,7 @@ def _hits(
     when = when[(when > edges[0]) & (when <= edges[-1])]
     positions, velocities = path.at(when)
     exact = sensor.measure(positions, velocities) if sensor.measures_velocity else sensor.measure(positions)
-    seen = (rng.random(len(when)) < sensor.detection_probability) & sensor.in_view(exact)
+    seen = (rng.random(len(when)) < sensor.detection_probability) & sensor.sees(exact)
     noise = rng.standard_normal((int(seen.sum()), sensor.dim)) @ np.linalg.cholesky(sensor.covariance).T
     return when[seen], exact[seen] + noise, np.full(int(seen.sum()), path.target)
 

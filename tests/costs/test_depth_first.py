@@ -1,6 +1,7 @@
 """The kernel that grows tuples of tracks, beside the way for all filters, which corrects states sensor by sensor."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,6 +35,11 @@ RADARS = [
     sensor(Radar3D, [9e3, 0.0, 0.0], [40.0, 0.02, 0.03], RANGE),
     sensor(Radar3D, [-9e3, 3e3, 0.0], [50.0, 0.015, 0.02, 5.0], RANGE),
     sensor(DirectionSensor, [0.0, 9e3, 0.0], [0.02, 0.02], RANGE[1:]),
+]
+FOLDED = [
+    RADARS[0],
+    replace(RADARS[1], folding=90.0),
+    replace(sensor(Radar3D, [0.0, 9e3, 0.0], [40.0, 0.02, 0.03, 2.0], RANGE), folding=250.0),
 ]
 MIXED = [
     sensor(PositionSensor, [0.0] * 3, [150.0, 100.0], SPACE),
@@ -73,7 +79,7 @@ def scan(sensors, states, rng):
     found = []
     for sensor in sensors:
         seen = states.mean[rng.random(len(states)) < 0.9]
-        z = sensor.measure(seen[:, :3] + rng.normal(0, 200.0, (len(seen), 3)), seen[:, 3:])
+        z = sensor.folded(sensor.measure(seen[:, :3] + rng.normal(0, 200.0, (len(seen), 3)), seen[:, 3:]))
         found.append(rng.permutation(z + rng.normal(0, 1.0, z.shape) * np.sqrt(np.diag(sensor.covariance))))
     return found
 
@@ -103,7 +109,7 @@ def test_linear_measurements_of_whole_states(modes):
 
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
-@pytest.mark.parametrize("sensors", [PLACES, RADARS, MIXED], ids=["places", "radars", "mixed"])
+@pytest.mark.parametrize("sensors", [PLACES, RADARS, FOLDED, MIXED], ids=["places", "radars", "folded", "mixed"])
 def test_the_same_tuples_at_the_same_costs_as_sensor_by_sensor(sensors, modes):
     rng = np.random.default_rng(modes)
     states = predicted(filters(ExtendedKalmanFilter, modes), rng)

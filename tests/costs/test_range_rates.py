@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,3 +113,22 @@ def test_a_bad_speed_is_refused(speed):
     scene = simulation.simulate("three-radar", 1, scans=2)
     with pytest.raises(InvalidInputError, match="speed must be a number above 0"):
         build_problem(scene, 0, speed=speed)
+
+
+def test_folded_rates_cost_around_the_interval_and_nothing_while_the_velocity_is_open():
+    scene, _, _ = doppler_scene(0)
+    tuples = np.array([[1, 1, 1], [1, 2, 0], [2, 2, 2]])
+
+    def costs(folding, shift, speed):
+        sensors = [
+            replace(sensor, noise=np.diag(np.diag(sensor.covariance)), folding=folding) for sensor in scene.sensors
+        ]
+        moved = [z + [0.0, 0.0, 0.0, shift] for z in scene.measurements[0]]
+        return tuple_costs(Scene(sensors, [0.0], [moved], region=REGION), 0, tuples, speed=speed)
+
+    np.testing.assert_allclose(costs(900.0, 900.0, SPEED), costs(900.0, 0.0, SPEED), rtol=1e-9)
+    np.testing.assert_allclose(costs(1e4, 0.0, SPEED), costs(None, 0.0, SPEED), rtol=1e-9)
+    # of no use: uniform on the interval, whatever they are
+    open_velocity = costs(300.0, 0.0, 1e3)
+    np.testing.assert_allclose(costs(300.0, 77.0, 1e3), open_velocity, rtol=1e-9)
+    np.testing.assert_allclose(costs(300.0, 0.0, 2e3), open_velocity, rtol=1e-9)

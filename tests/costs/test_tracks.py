@@ -31,7 +31,7 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     assert wanted
     reach = np.sqrt(gate * np.einsum("bii->bi", S)) * (1 + 1e-9)
     boxed = set(zip(*np.nonzero((np.abs(v) <= reach[:, None]).all(axis=2)), strict=True))
-    rows, columns = gating.near_pairs(Expected(h, S), z, angular, gate)
+    rows, columns = gating.near_pairs(Expected(h, S), z, tuple(2 * math.pi * turning), gate)
     assert set(zip(rows, columns, strict=True)) == boxed >= wanted
     assert (np.diff(rows * 1000 + columns) > 0).all()
     # the box is not everything

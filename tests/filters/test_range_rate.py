@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from assoc.filters import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     Gaussian,
+    InteractingMultipleModel,
     KalmanFilter,
     ModifiedEKF,
     UnscentedKalmanFilter,
@@ -124,3 +126,36 @@ def test_what_is_refused():
     ):
         with pytest.raises(InvalidInputError, match=message):
             filter_.observe(RADAR)
+
+
+@pytest.mark.parametrize("kind", [ExtendedKalmanFilter, UnscentedKalmanFilter, "imm"])
+def test_folded_rates_count_around_the_interval_and_not_while_they_are_unknown(kind):
+    if kind == "imm":
+        modes = [ExtendedKalmanFilter(ConstantVelocity(q)) for q in (1.0, 20.0)]
+        filter_ = InteractingMultipleModel(modes, [[0.9, 0.1], [0.1, 0.9]])
+    else:
+        filter_ = kind(MOTION)
+    rng, folding = np.random.default_rng(0), replace(RADAR, folding=60.0)
+    state = random_state(20, rng)
+    z = measured(state, rng)
+    # rates are expected to 10 m/s or so: every fold is known
+    start = filter_.start(state)
+    plain, folded = filter_.update(start, z, RADAR), filter_.update(start, folding.folded(z), folding)
+    assert (np.abs(z[:, 3]) > 30.0).sum() > 5
+    np.testing.assert_allclose(folded.state.mean, plain.state.mean, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(folded.log_likelihood, plain.log_likelihood, rtol=1e-9)
+    # then to hundreds: as without rates, at the density of a number anywhere on the interval
+    wide = state.covariance.copy()
+    wide[:, 3:6, 3:6] += 300.0**2 * np.eye(3)
+    start = filter_.start(Gaussian(state.mean, wide))
+    without = filter_.update(start, z[:, :3], RADAR.position_part)
+    folded = filter_.update(start, folding.folded(z), folding)
+    np.testing.assert_allclose(folded.state.mean, without.state.mean, rtol=1e-9, atol=1e-6)
+    off = folded.log_likelihood - without.log_likelihood + math.log(60.0)
+    assert (off > -1.2).all() and (off < 0.33).all() and abs(off.mean()) < 0.4
+    rows = np.arange(20)
+    fit = filter_.fit(start, filter_.expected(start, folding), rows, folding.folded(z), folding)
+    if fit is not None:
+        np.testing.assert_allclose(fit.log_likelihood, folded.log_likelihood, rtol=1e-9)
+    compared = filter_.log_likelihood(start, folding.folded(z), folding)
+    np.testing.assert_allclose(compared[rows, rows], folded.log_likelihood, rtol=1e-9)

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from assoc.sensors.codes import RADAR3D
 from assoc.sensors.kernels.dispatch import linearise_moving, measure_moving, wrap
+from assoc.simulation.observation import observe
 
 VIEW = [[0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2], [-500, 500]]
 RADAR = Radar3D(position=[100, -200, 30], noise=[50, 1e-3, 2e-3, 0.5], field_of_view=VIEW)
@@ -85,3 +87,38 @@ def test_scenes_are_saved_with_range_rates(tmp_path):
     assert again.sensors[0] == RADAR and again.sensors[1] == RADAR.position_part
     np.testing.assert_array_equal(again.measurements[0][0], scene.measurements[0][0])
     assert "range rate 0.5 m/s" in scene._repr_html_()
+
+
+def test_folded_rates_and_the_notch():
+    folding = replace(RADAR, folding=90.0, notch=10.0)
+    x = states()
+    exact = RADAR.measure(x[:, :3], x[:, 3:])
+    rate = folding.folded(exact)[:, 3]
+    np.testing.assert_allclose(np.exp(2j * np.pi * rate / 90.0), np.exp(2j * np.pi * exact[:, 3] / 90.0), atol=1e-9)
+    assert rate.min() >= -45.0 and rate.max() < 45.0
+    assert folding.folded(np.array([[1.0, 2.0, 3.0, 45.0]]))[0, 3] == -45.0
+    np.testing.assert_allclose(folding.residual(folding.folded(exact), exact), 0.0, atol=1e-9)
+    np.testing.assert_array_equal(folding.sees(exact), np.abs(rate) >= 10.0)
+    assert folding != RADAR and folding.position_part == RADAR.position_part
+    for change, said in (({"folding": 0.0}, "folding must be a number above 0"), ({"notch": -1.0}, "notch must be"),
+                         ({"folding": 10.0, "notch": 5.0}, "below half")):  # fmt: skip
+        with pytest.raises(InvalidInputError, match=said):
+            replace(RADAR, **change)
+    with pytest.raises(InvalidInputError, match="needs a range rate"):
+        replace(RADAR.position_part, folding=90.0)
+
+
+def test_scenes_with_folded_rates_and_notches(tmp_path):
+    sensors = [replace(RADAR, folding=90.0, notch=10.0, false_alarm_rate=1e-9), replace(RADAR, folding=math.inf), RADAR]
+    x = states()
+    scene = observe(sensors, [0.0, 1.0], [np.arange(40)] * 2, [x[:, :3]] * 2, np.random.default_rng(0),
+                    velocities=[x[:, 3:]] * 2)  # fmt: skip
+    rates = np.concatenate([scan[0][:, 3] for scan in scene.measurements])
+    assert len(rates) and np.abs(rates).max() <= 45.0 and np.abs(rates).min() > 10.0 - 5 * 0.5
+    for number, some in enumerate((sensors, [RADAR])):
+        part = Scene(some, scene.times, [scan[-len(some) :] for scan in scene.measurements], scene.region)
+        part.save(f"{tmp_path}/{number}.npz")
+        with np.load(f"{tmp_path}/{number}.npz") as file:
+            assert int(file["version"]) == (4, 1)[number]
+            assert ("sensor_folding" in file) == (number == 0)
+        assert list(Scene.load(f"{tmp_path}/{number}.npz").sensors) == some

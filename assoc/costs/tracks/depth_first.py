@@ -24,8 +24,10 @@ from assoc.filters.kernels.gaussian import (
     H,
     R,
     V,
+    blur,
     correct,
     correct_mean,
+    folding_of,
     innovate,
     linearise_at,
     squared,
@@ -33,7 +35,7 @@ from assoc.filters.kernels.gaussian import (
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.filters.measurement import Observation
 from assoc.sensors.codes import POSITION
-from assoc.sensors.kernels.dispatch import wrap
+from assoc.sensors.kernels.dispatch import fold, wrap
 
 # what comes next for a sensor, if not a number in its queue; what is told instead of a number of tuples
 _MISS, _NEW = -1, -2
@@ -270,6 +272,9 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
             linear = space.linear[s, side, j]
             linearise_at(code, position, columns, matrix, space.means[at, j], space.h[s, j, :d], linear[H])
             P, work, S = space.covariances[at, j], space.work[s, side, j], space.S[s, side, j]
+            folding = folding_of(code, matrix)
+            if folding > 0.0:
+                blur(folding, P, columns, sensors.noise[s], linear[H], linear[R])
             if d == 3 and c == 3:
                 good, space.log_dets[s, side, j] = innovate(3, 3, P, columns, linear, work, S)
             else:
@@ -278,7 +283,7 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
                 return _BAD
     if not known:
         space.seen[s, side, 0], space.seen[s, side, 1] = space.versions[at], 0
-    if not (_mix(3, code, s, at, space) if d == 3 else _mix(d, code, s, at, space)):
+    if not (_mix(3, code, 0.0, s, at, space) if d == 3 else _mix(d, code, folding_of(code, matrix), s, at, space)):
         return _BAD
     return _queue(sensors, near, code, t, s, space)
 
@@ -297,7 +302,7 @@ def _expect(code: int, columns: Array, matrix: Array, mean: Array, h: Array) -> 
 
 
 @literal_njit
-def _mix(d: int, code: int, s: int, at: int, space: _Space) -> bool:
+def _mix(d: int, code: int, folding: float, s: int, at: int, space: _Space) -> bool:
     """Mean and covariance of the expected measurements of all components, and its factor, the diagonal inverted."""
     side, m = _side(s, at), space.weights.shape[2]
     weights, middle, v, S, L = space.weights[at, 0], space.middle, space.v, space.whole[0], space.whole[1]
@@ -309,6 +314,7 @@ def _mix(d: int, code: int, s: int, at: int, space: _Space) -> bool:
         for a in range(d):
             v[j, a] = space.h[s, j, a] - space.h[s, 0, a]
         wrap(code, v[j])
+        fold(folding, v[j])
         for a in range(d):
             middle[a] += weights[j] * v[j, a]
     for j in range(m):
@@ -335,14 +341,14 @@ def _queue(sensors: Sensors, near: Measured, code: int, t: int, s: int, space: _
         reach = math.sqrt(gate * space.whole[0, axis, axis]) * (1.0 + 1e-9)
         end = middle[axis] + reach
         low = _not_below(places, axis, middle[axis] - reach, low, high)
-    count = 0
+    count, folding = 0, folding_of(code, sensors.matrices[s])
     for k in range(low, high):
         if axis >= 0 and places[k, axis] > end:
             break
         if d == 3:
-            fits = _in_gate(3, code, places, k, middle, L, v, gate)
+            fits = _in_gate(3, code, folding, places, k, middle, L, v, gate)
         else:
-            fits = _in_gate(d, code, places, k, middle, L, v, gate)
+            fits = _in_gate(d, code, folding, places, k, middle, L, v, gate)
         if fits:
             # ascending; those of a track are in another order
             at = count
@@ -355,11 +361,14 @@ def _queue(sensors: Sensors, near: Measured, code: int, t: int, s: int, space: _
 
 
 @literal_njit
-def _in_gate(d: int, code: int, places: Array, k: int, middle: Array, L: Array, v: Array, gate: float) -> bool:
+def _in_gate(
+    d: int, code: int, folding: float, places: Array, k: int, middle: Array, L: Array, v: Array, gate: float
+) -> bool:
     """Whether measurement k of d quantities is in the gate."""
     for a in range(d):
         v[a] = places[k, a] - middle[a]
     wrap(code, v)
+    fold(folding, v)
     square = 0.0
     for a in range(d):
         for e in range(a):
@@ -389,11 +398,13 @@ def _likelihood(sensors: Sensors, near: Measured, k: int, s: int, space: _Space)
     at, d = space.at[s], sensors.sizes[s, 1]
     side, m = _side(s, at), space.weights.shape[2]
     code, highest, total = sensors.sizes[s, 0], -math.inf, 0.0
+    folding = folding_of(code, sensors.matrices[s])
     for j in range(m):
         linear, v = space.linear[s, side, j], space.v[j]
         for a in range(d):
             v[a] = near.places[k, a] - space.h[s, j, a]
         wrap(code, v)
+        fold(folding, v)
         for a in range(d):
             linear[V, 0, a] = v[a]
         work = space.work[s, side, j]

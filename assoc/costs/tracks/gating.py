@@ -12,28 +12,27 @@ from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
-from assoc.filters.measurement import Measurement
 
 MOST_PAIRS = 20_000_000
 """Most pairs of tracks and measurements; more occur only with useless predictions."""
 
-_TURN = 2.0 * math.pi
 # so few are sorted by insertion, which needs no array of its own
 _MOST_INSERTED = 32
 
 
-def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
+def near_pairs(expected: Expected, measurements: Array, periods: tuple[float, ...], gate: float) -> tuple[Array, Array]:
     """Pairs of tracks and measurements that may pass a chi-square gate: all that pass, and some more.
 
-    ``expected`` are (B, d) and (B, d, d), measurements (M, d), the gate a squared Mahalanobis distance. Returns tracks
-    and measurements, int (K,), ordered by both. LimitExceededError for more than `MOST_PAIRS`.
+    ``expected`` are (B, d) and (B, d, d), measurements (M, d), the gate a squared Mahalanobis distance, ``periods``
+    those of `assoc.filters.measurement.periods_of`. Returns tracks and measurements, int (K,), ordered by both.
+    LimitExceededError for more than `MOST_PAIRS`.
     """
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     # not compiled once more for arrays that are read only, as those of scenes are, or a part of larger ones
     covariance, z = (np.require(array, requirements=("C", "W")) for array in (expected.covariance, z))
-    tracks, found, _ = _sweep(h, covariance, z, _turning(angular), gate, MOST_PAIRS)
+    tracks, found, _ = _sweep(h, covariance, z, _turning(periods), gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
         # ordered by track: extrapolated to those left
         expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
@@ -45,8 +44,8 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
 
 
 @lru_cache(maxsize=64)
-def _turning(angular: tuple[bool, ...]) -> Array:
-    return np.array(angular, dtype=np.bool_)
+def _turning(periods: tuple[float, ...]) -> Array:
+    return np.array(periods, dtype=np.float64)
 
 
 @njit
@@ -158,7 +157,7 @@ def _axis(reach: Array, z: Array, turning: Array, other: int) -> int:
     """The component, not the other, in which a gate is the smallest share of all measurements; -1: all are angles."""
     axis, widest = -1, 0.0
     for i in range(z.shape[1]):
-        if not turning[i] and i != other:
+        if turning[i] == 0.0 and i != other:
             total = 0.0
             for t in range(len(reach)):
                 total += reach[t, i]
@@ -205,7 +204,7 @@ def near_both(
     track: Array,
     near: Near,
     measurements: Array,
-    angular: tuple[bool, ...],
+    periods: tuple[float, ...],
     gate: float,
     most: int,
 ) -> tuple[Array, Array]:
@@ -214,7 +213,7 @@ def near_both(
     ``expected`` is as for `near_pairs`, of each of B partial tuples, whose tracks are ``track`` (B,); only measurements
     that are ``near`` the track are tried. Returns tuples and measurements, int (K,), ordered by both.
     """
-    arrays = track, near.first, near.found, np.require(measurements, requirements=("C", "W")), _turning(angular)
+    arrays = track, near.first, near.found, np.require(measurements, requirements=("C", "W")), _turning(periods)
     return _near_both((expected.mean, _reach(expected.covariance, gate)), *arrays, most)
 
 
@@ -235,9 +234,9 @@ def _inside(h: Array, t: int, z: Array, m: int, reach: Array, turning: Array) ->
     # by numbers of rows: numba counts references for each view of a row, which takes longer than the comparisons
     for i in range(turning.size):
         off = abs(z[m, i] - h[t, i])
-        if turning[i]:
-            off %= _TURN
-            off = min(off, _TURN - off)
+        if turning[i] > 0.0:
+            off %= turning[i]
+            off = min(off, turning[i] - off)
         if not off <= reach[t, i]:
             return False
     return True
@@ -262,8 +261,3 @@ def _near_both(
                 if count > most:
                     return rows[:count].copy(), found[:count].copy()
     return rows[:count].copy(), found[:count].copy()
-
-
-def angular_components(sensor: Measurement) -> tuple[bool, ...]:
-    """Which components of a measurement are angles; none for models that are not sensors."""
-    return getattr(sensor, "angular", (False,) * sensor.dim)[: sensor.dim]

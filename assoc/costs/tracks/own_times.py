@@ -17,13 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.gating import angular_components, near_pairs
+from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import TrackTuples, gate_of, require_states
 from assoc.costs.views import bands_of, log_missed, places_of, share_in_view
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
+from assoc.filters.measurement import periods_of
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
 
@@ -246,7 +247,7 @@ class TimedScan:
         if self.paths[s] is not None:
             return self._near_moving(s)
         sensor, gate = self.sensors[s], self.gates[s]
-        angles, axes = angular_components(sensor), len(self.filter.motion.position)
+        periods, axes = periods_of(sensor), len(self.filter.motion.position)
         # the gate is widest at the end of the scan; before, it moves with the velocity
         late = self.filter.expected(self.late, sensor)
         velocity = np.zeros((len(self.states), 3))
@@ -258,21 +259,21 @@ class TimedScan:
         ways = []
         for back in (self.end - float(times.max()), self.end - float(times.min())):
             way = _measured(sensor, position - back * velocity, velocity) - here
-            turning = np.array(angles)
+            turning = np.array(sensor.angular[: sensor.dim])
             way[:, turning] -= 2 * np.pi * np.round(way[:, turning] / (2 * np.pi))
             ways.append(way)
         spread = np.sqrt(gate * np.einsum("bii->bi", late.covariance))
         reach = spread + 0.5 * _CURVED * np.abs(ways[1] - ways[0])
         box = Expected(late.mean + 0.5 * (ways[0] + ways[1]), _diagonal(reach**2 / gate))
-        return near_pairs(box, self.measurements[s], angles, gate)
+        return near_pairs(box, self.measurements[s], periods, gate)
 
     def _near_moving(self, s: int) -> tuple[Array, Array]:
         """`near` for a sensor that moved: by the predictions to each time at which it measured."""
         found = []
         for sensor, rows in self.by_pose(s, self.times[s]):
             then = self._moved(self.states, np.maximum(float(self.times[s][rows[0]]) - self.before, 0.0))
-            expected, angles = self.filter.expected(then, sensor), angular_components(sensor)
-            track, near = near_pairs(expected, self.measurements[s][rows], angles, self.gates[s])
+            expected, periods = self.filter.expected(then, sensor), periods_of(sensor)
+            track, near = near_pairs(expected, self.measurements[s][rows], periods, self.gates[s])
             found.append((track, rows[near]))
         tracks, measurements = (np.concatenate(part) for part in zip(*found, strict=True))
         order = np.lexsort((measurements, tracks))
@@ -289,8 +290,8 @@ class TimedScan:
             stamps, ends = self.times[r][able], (float(self.times[s][rows].min()), float(self.times[s][rows].max()))
             lag = np.maximum(np.abs(stamps - ends[0]), np.abs(stamps - ends[1]))
             wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)
-            expected, angles = self.filter.expected(wide, sensor), angular_components(sensor)
-            first, second = near_pairs(expected, self.measurements[s][rows], angles, self.gates[s])
+            expected, periods = self.filter.expected(wide, sensor), periods_of(sensor)
+            first, second = near_pairs(expected, self.measurements[s][rows], periods, self.gates[s])
             firsts.append(able[first])
             seconds.append(rows[second])
         first, second = np.concatenate(firsts), np.concatenate(seconds)

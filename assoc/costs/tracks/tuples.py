@@ -18,13 +18,13 @@ from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks import depth_first
-from assoc.costs.tracks.gating import Near, angular_components, near_both, near_pairs
+from assoc.costs.tracks.gating import Near, near_both, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter, Parts, complain
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.kernels.gaussian import GOOD
-from assoc.filters.measurement import Measurement
+from assoc.filters.measurement import Measurement, periods_of
 
 # asking for the memory left would take longer than correcting so few tracks
 _FEW = 100
@@ -65,7 +65,7 @@ def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: M
         nothing = np.zeros(0, dtype=np.int64)
         return TrackPairs(nothing, nothing, np.zeros(0), lambda rows: states[nothing])
     expected = filter.expected(states, sensor)
-    track, found = near_pairs(expected, measurements, angular_components(sensor), gate)
+    track, found = near_pairs(expected, measurements, periods_of(sensor), gate)
     return _gated(filter, states, expected, measurements, sensor, gate, track, found)
 
 
@@ -137,7 +137,7 @@ def grow_track_tuples(
         filter, states = filter.positions_alone(states)
     growth = _Growth(
         filter, measurements, sensors, terms, _ahead(sensors, terms, misses),
-        [gate_of(sensor, gate_probability) for sensor in sensors], [angular_components(sensor) for sensor in sensors],
+        [gate_of(sensor, gate_probability) for sensor in sensors], [periods_of(sensor) for sensor in sensors],
         margin,
     )  # fmt: skip
     parts = filter.in_parts(states, sensors)
@@ -167,14 +167,14 @@ class _Growth(NamedTuple):
     terms: ScoreTerms
     ahead: Array
     gates: list[float]
-    angles: list[tuple[bool, ...]]
+    periods: list[tuple[float, ...]]
     margin: float
 
 
 def _near(growth: _Growth, states: Any, s: int, z: Array) -> Near:
     """The measurements z of sensor s near each track."""
     expected = growth.filter.expected(states, growth.sensors[s])
-    track, found = near_pairs(expected, z, growth.angles[s], growth.gates[s])
+    track, found = near_pairs(expected, z, growth.periods[s], growth.gates[s])
     return Near(np.searchsorted(track, np.arange(len(states) + 1)), found)
 
 
@@ -192,7 +192,7 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
     for s, (z, sensor) in enumerate(zip(growth.measurements, growth.sensors, strict=True)):
         # along the component that tells most of them apart
         spread = np.ptp(z, axis=0) / np.sqrt(np.diag(sensor.covariance)) if len(z) else np.zeros(sensor.dim)
-        spread[list(growth.angles[s])] = 0.0
+        spread[np.array(growth.periods[s]) > 0.0] = 0.0
         axes.append(int(spread.argmax()) if spread.max() > 0.0 else -1)
         order = np.argsort(z[:, axes[s]], kind="stable")
         pairs = _near(growth, states, s, z[order])
@@ -251,7 +251,7 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
         expected = filter.expected(states, sensor)
         if s:
             # measurements so far narrow the gate
-            parent, found = near_both(expected, track, near[s], z, growth.angles[s], gate, most)
+            parent, found = near_both(expected, track, near[s], z, growth.periods[s], gate, most)
         else:
             parent, found = np.repeat(track, np.diff(near[0].first)), near[0].found
         if len(parent) + len(track) > most:

@@ -17,7 +17,9 @@ from assoc.filters.kernels.gaussian import (
     H,
     R,
     V,
+    blur,
     elevation_of,
+    folding_of,
     innovate,
     linearise_at,
     modify,
@@ -25,15 +27,16 @@ from assoc.filters.kernels.gaussian import (
     unpack,
 )
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels.dispatch import wrap
+from assoc.sensors.kernels.dispatch import fold, wrap
 
 
 @inner_njit
-def _distance(z: Array, h: Array, L: Array, code: int, v: Array) -> float:
+def _distance(z: Array, h: Array, L: Array, code: int, folding: float, v: Array) -> float:
     """Squared Mahalanobis distance of a measurement from the expected one, by a Cholesky factor; v (d,) is scratch."""
     for a in range(len(v)):
         v[a] = z[a] - h[a]
     wrap(code, v)
+    fold(folding, v)
     total = 0.0
     for a in range(len(v)):
         for e in range(a):
@@ -44,10 +47,10 @@ def _distance(z: Array, h: Array, L: Array, code: int, v: Array) -> float:
 
 
 @njit
-def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
+def pairs(h: Array, S: Array, z: Array, code: int, folding: float) -> tuple[int, Array, Array]:
     """Log-likelihood and squared Mahalanobis distance, each (B, M), of each measurement under each target.
 
-    h (B, d) and S (B, d, d) are the expected measurements and their covariances, z (M, d).
+    h (B, d) and S (B, d, d) are the expected measurements and their covariances, z (M, d); `folding`: see `folding_of`.
     """
     B, d = h.shape
     ll, square = np.empty((B, len(z))), np.empty((B, len(z)))
@@ -59,7 +62,7 @@ def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
         for a in range(d):
             base += 2.0 * math.log(L[a, a])
         for m in range(len(z)):
-            square[b, m] = _distance(z[m], h[b], L, code, v)
+            square[b, m] = _distance(z[m], h[b], L, code, folding, v)
             ll[b, m] = -0.5 * (square[b, m] + base)
     return GOOD, ll, square
 
@@ -69,11 +72,13 @@ def expect(mean: Array, P: Array, models: Array, d: int) -> tuple[Array, Array]:
     """Expected measurements (B, d) of a linearised model, packed (1, ...), and their covariances (B, d, d)."""
     B = len(mean)
     code, kind, position, columns, matrix, noise = unpack(models[0], d)
-    c = len(columns)
+    c, folding = len(columns), folding_of(code, matrix)
     hs, S, h = np.empty((B, d)), np.empty((B, d, d)), np.empty(d)
     H, HP, v, R = np.empty((d, max(3, c))), np.empty((d, c)), np.zeros(d), noise.copy()
     for b in range(B):
         linearise_at(code, position, columns, matrix, mean[b], h, H)
+        if folding > 0.0:
+            blur(folding, P[b], columns, noise, H, R)
         for a in range(d):
             hs[b, a] = h[a]
             for q in range(c):
@@ -105,7 +110,7 @@ def fits(mean: Array, P: Array, rows: Array, z: Array, models: Array, found: Arr
     """
     K, d = z.shape
     code, _, position, columns, matrix, noise = unpack(models[0], d)
-    c, wide = len(columns), max(mean.shape[1], d)
+    c, wide, folding = len(columns), max(mean.shape[1], d), folding_of(code, matrix)
     linear, work, S = np.empty((3, d, max(3, c, d))), np.empty((6, wide, wide)), np.empty((d, d))
     h, v = np.empty(d), np.empty(d)
     for a in range(d):
@@ -117,6 +122,8 @@ def fits(mean: Array, P: Array, rows: Array, z: Array, models: Array, found: Arr
         if b != last:
             last = b
             linearise_at(code, position, columns, matrix, mean[b], h, linear[H])
+            if folding > 0.0:
+                blur(folding, P[b], columns, noise, linear[H], linear[R])
             if d == 3 and c == 3:
                 good, log_det = innovate(3, 3, P[b], columns, linear, work, S)
             else:
@@ -126,6 +133,7 @@ def fits(mean: Array, P: Array, rows: Array, z: Array, models: Array, found: Arr
         for a in range(d):
             v[a] = z[k, a] - h[a]
         wrap(code, v)
+        fold(folding, v)
         for a in range(d):
             linear[V, 0, a] = v[a]
         nis = squared(3, linear, work) if d == 3 else squared(d, linear, work)
@@ -135,7 +143,7 @@ def fits(mean: Array, P: Array, rows: Array, z: Array, models: Array, found: Arr
 
 
 @njit
-def distances(h: Array, S: Array, rows: Array, z: Array, code: int) -> tuple[int, Array]:
+def distances(h: Array, S: Array, rows: Array, z: Array, code: int, folding: float) -> tuple[int, Array]:
     """Squared Mahalanobis distances (K,) of z (K, d) from what is expected of targets: h (B, d), S (B, d, d).
 
     Rows of one target should be side by side. The first number is a status as of `fits`.
@@ -149,15 +157,15 @@ def distances(h: Array, S: Array, rows: Array, z: Array, code: int) -> tuple[int
             last = b
             if not factor(S[b], d, L):
                 return BAD_COVARIANCE + STATUSES * b, square
-        square[k] = _distance(z[k], h[b], L, code, v)
+        square[k] = _distance(z[k], h[b], L, code, folding, v)
     return GOOD, square
 
 
 @njit
-def matched(weights: Array, h: Array, S: Array, turning: Array) -> tuple[Array, Array]:
+def matched(weights: Array, h: Array, S: Array, periods: Array) -> tuple[Array, Array]:
     """Means (B, d) and covariances (B, d, d) of mixtures of measurements, h (B, m, d), S (B, m, d, d), weights (B, m).
 
-    Where a component is ``turning`` it is an angle: means are taken of the differences from the first.
+    Where a component has a period, as angles have: means are taken of the differences from the first.
     """
     B, m, d = h.shape
     mean, covariance, away = np.empty((B, d)), np.zeros((B, d, d)), np.empty((m, d))
@@ -166,8 +174,8 @@ def matched(weights: Array, h: Array, S: Array, turning: Array) -> tuple[Array, 
             middle = 0.0
             for j in range(m):
                 off = h[b, j, a] - h[b, 0, a]
-                if turning[a]:
-                    off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+                if periods[a] > 0.0:
+                    off -= periods[a] * round(off / periods[a])
                 away[j, a] = off
                 middle += weights[b, j] * off
             mean[b, a] = h[b, 0, a] + middle

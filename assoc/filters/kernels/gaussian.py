@@ -14,7 +14,8 @@ import numpy as np
 from assoc._system.compiled import inner_njit, lean_inner_njit, literal_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
+from assoc.sensors.codes import RADAR3D
+from assoc.sensors.kernels.dispatch import fold, linearise, linearise_moving, wrap
 
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""
@@ -44,7 +45,8 @@ def unpack(packed: Array, d: int) -> tuple[int, int, Array, Array, Array, Array]
     numba takes 0.1 microsecond for each array that Python passes, and 0.8 for a record. Returns the code (that of a
     sensor, LINEAR or GIVEN) and kind (PLAIN, MODIFIED or SIMPLIFIED); the sensor's position (3,); the columns (c,) of
     the state that are read: for sensors x, y (and z), with a range rate their velocities after them; the matrix (d, c)
-    of a linear model (GIVEN: Jacobian (d, n), or measurements of points (m, d)); and the noise covariance (d, d).
+    of a linear model (GIVEN: Jacobian (d, n), or measurements of points (m, d); where range rates fold a row that
+    begins with their interval); and the noise covariance (d, d).
     """
     c, end = int(packed[2]), len(packed) - d * d
     matrix = packed[6 + c : end]
@@ -288,6 +290,33 @@ def linearise_at(code: int, position: Array, columns: Array, matrix: Array, m: A
         linearise(code, len(h), position, m[columns[0]], m[columns[1]], height, h, J)
 
 
+@lean_inner_njit
+def folding_of(code: int, matrix: Array) -> float:
+    """Interval at which range rates fold, of a model as `unpack` gives it; 0: they do not."""
+    return float(matrix[0, 0]) if code == RADAR3D and len(matrix) > 0 else 0.0
+
+
+@lean_inner_njit
+def blur(folding: float, P: Array, columns: Array, noise: Array, H: Array, R: Array) -> None:
+    """Make a folded range rate say nothing where it is expected less exactly than to a third of the interval.
+
+    It is then a number of its own with the variance of one that is uniform on the interval. H (4, c) is the Jacobian
+    for a covariance P; R (4, 4), the noise, is written in either case.
+    """
+    variance = noise[3, 3]
+    for p in range(len(columns)):
+        for q in range(len(columns)):
+            variance += H[3, p] * P[columns[p], columns[q]] * H[3, q]
+    known = 9.0 * variance <= folding * folding
+    for a in range(4):
+        R[3, a] = noise[3, a] if known else 0.0
+        R[a, 3] = R[3, a]
+    if not known:
+        R[3, 3] = folding * folding / 12.0
+        for p in range(len(columns)):
+            H[3, p] = 0.0
+
+
 @njit
 def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_P: Array, rest: Array) -> int:
     """Correct a batch with one measurement for each, into the last three arrays.
@@ -304,7 +333,7 @@ def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_
     for b in range(B):
         if b == 0 or len(models) > 1:
             code, kind, position, columns, matrix, noise = unpack(models[b], d)
-            c = len(columns)
+            c, folding = len(columns), folding_of(code, matrix)
             linear = np.empty((3, d, max(3, c, d)))
             # number by number: assigning slices takes longer
             for a in range(d):
@@ -321,6 +350,9 @@ def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_
             for a in range(d):
                 v[b, a] = z[b, a] - h[a]
             wrap(code, v[b])
+            if folding > 0.0:
+                fold(folding, v[b])
+                blur(folding, P[b], columns, noise, linear[H], linear[R])
             if kind != PLAIN:
                 bt, bp = 0.0, 0.0
                 for p in range(c):

@@ -22,11 +22,12 @@ from assoc.filters.kernels.gaussian import (
     V,
     correct,
     correct_mean,
+    folding_of,
     parts_of,
     unpack,
 )
 from assoc.filters.kernels.linear_algebra import factor, solve_in_place
-from assoc.sensors.kernels.dispatch import measure, measure_moving, wrap
+from assoc.sensors.kernels.dispatch import fold, measure, measure_moving, wrap
 
 
 @inner_njit
@@ -62,7 +63,7 @@ def observe_points(
 
 
 @inner_njit
-def residual_of_mean(code: int, z: Array, first: Array, mu: Array, v: Array) -> bool:
+def residual_of_mean(code: int, folding: float, z: Array, first: Array, mu: Array, v: Array) -> bool:
     """Write the residual of the mean measurement, first + mu, into v (d,); False if it is not finite."""
     for a in range(len(z)):
         v[a] = z[a] if code == GIVEN else z[a] - first[a]
@@ -70,6 +71,7 @@ def residual_of_mean(code: int, z: Array, first: Array, mu: Array, v: Array) -> 
     for a in range(len(z)):
         v[a] -= mu[a]
     wrap(code, v)
+    fold(folding, v)
     return all_finite(v)
 
 
@@ -156,6 +158,7 @@ def unscented(
     for b in range(B):
         if b == 0 or len(models) > 1:
             code, _, position, columns, matrix, noise = unpack(models[b], d)
+            folding = folding_of(code, matrix)
         if len(z) and not all_finite(z[b]):
             return BAD_MEASUREMENT + STATUSES * b
         if not factor(P[b], n, F):
@@ -188,6 +191,13 @@ def unscented(
             for i in range(n):
                 slopes[a, i] = C[a, i]
             solve_in_place(F, n, slopes[a])
+        if folding > 0.0 and 9.0 * (extra[3, 3] + noise[3, 3]) > folding * folding:
+            # says nothing, as in `assoc.filters.kernels.gaussian.blur`
+            for i in range(n):
+                slopes[3, i], C[3, i] = 0.0, 0.0
+            for a in range(3):
+                extra[3, a] = extra[a, 3] = -noise[3, a]
+            extra[3, 3] = folding * folding / 12.0 - noise[3, 3]
         if not len(z):
             for a in range(d):
                 v[b, a] = first[a] + mu[a]
@@ -201,7 +211,7 @@ def unscented(
                     total -= slopes[a, i] * C[e, i]
                 extra[a, e] = total
                 extra[e, a] = total
-        if not residual_of_mean(code, z[b], first, mu, v[b]):
+        if not residual_of_mean(code, folding, z[b], first, mu, v[b]):
             return BAD_MEAN + STATUSES * b
         linear[V, 0, :d] = v[b]
         good, nis[b], log_det = correct(d, n, P[b], every, linear, work, S[b], new_P[b])
@@ -251,6 +261,7 @@ def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out:
     for b in range(B):
         if b == 0 or len(models) > 1:
             code, _, position, columns, matrix, noise = unpack(models[b], d)
+            folding = folding_of(code, matrix)
         if len(z) and not all_finite(z[b]):
             return BAD_MEASUREMENT + STATUSES * b
         if not factor(noise, d, LR):
@@ -276,13 +287,20 @@ def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out:
             for e in range(a + 1):
                 S[b, a, e] += noise[a, e]
                 S[b, e, a] = S[b, a, e]
+        if folding > 0.0 and 9.0 * S[b, 3, 3] > folding * folding:
+            # says nothing, as in `assoc.filters.kernels.gaussian.blur`
+            for a in range(3):
+                S[b, 3, a] = S[b, a, 3] = 0.0
+            S[b, 3, 3] = folding * folding / 12.0
+            for i in range(n):
+                C[i, 3] = 0.0
         if not len(z):
             for a in range(d):
                 v[b, a] = first[a] + mu[a]
             continue
         if not factor(S[b], d, L):
             return BAD_COVARIANCE + STATUSES * b
-        if not residual_of_mean(code, z[b], first, mu, v[b]):
+        if not residual_of_mean(code, folding, z[b], first, mu, v[b]):
             return BAD_MEAN + STATUSES * b
         square = log_det = 0.0
         for a in range(d):

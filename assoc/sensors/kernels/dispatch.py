@@ -107,6 +107,13 @@ def wrap(code: int, v: Array) -> None:
         v[1] -= TURN * math.ceil(v[1] / TURN - 0.5)
 
 
+@lean_inner_njit
+def fold(folding: float, v: Array) -> None:
+    """Bring the range rate of a residual (4,) within half an interval; 0: it does not fold."""
+    if folding > 0.0:
+        v[3] -= folding * math.floor(v[3] / folding + 0.5)
+
+
 @inner_njit
 def add_information(
     code: int, dim: int, W: Six, position: Three, measured: Three, at: Three, sums: Information

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.gating import angular_components, near_pairs
+from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.tuples import gate_of
 from assoc.costs.views import bands_of, bands_of_measured, places_of
 from assoc.filters.base import Expected, predict_each
 from assoc.filters.imm import Mixture
+from assoc.filters.measurement import periods_of
 from assoc.scene.own_times import FULL_TURN
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
@@ -111,13 +112,13 @@ def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> 
         free = np.flatnonzero(~np.isin(step.assigned[s], late.track_id))
         if not len(missed) or not len(free):
             continue
-        gate, angles = gate_of(sensor, settings.gate_probability), angular_components(sensor)
+        gate, periods = gate_of(sensor, settings.gate_probability), periods_of(sensor)
         expected = settings.filter.expected(late.states[missed], sensor)
         size = np.sqrt(np.linalg.det(expected.covariance)) * (2.0 * np.sqrt(gate)) ** sensor.dim
         most = _FALSE * sensor.volume / (sensor.false_alarm_rate * size)
         wider = np.minimum(_WIDER, most ** (1.0 / sensor.dim))
         wide = Expected(expected.mean, expected.covariance * (wider**2)[:, None, None])
-        track, found = near_pairs(wide, z[free], angles, gate)
+        track, found = near_pairs(wide, z[free], periods, gate)
         off = sensor.residual(z[free[found]], expected.mean[track])
         square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(wide.covariance)[track], off)
         open_track, open_found = np.ones(len(missed), dtype=np.bool_), np.ones(len(free), dtype=np.bool_)
