@@ -40,9 +40,9 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     track, narrow = np.arange(tracks)[::-1].copy(), Expected(h[::-1].copy(), S[::-1] / 4.0)
     near = gating.Near(np.searchsorted(rows, np.arange(tracks + 1)), columns)
     half = {(t, k) for t, k in boxed if (np.abs(v[t, k]) <= reach[t] / 2.0).all()}
-    both = gating.near_both(narrow, track, near, z, angular, gate, 10**6)
+    both = gating.near_both(narrow, track, near, z, tuple(2 * math.pi * turning), gate, 10**6)
     assert list(zip(*both, strict=True)) == sorted((tracks - 1 - t, k) for t, k in half)
-    assert gating.near_both(narrow, track, near, z, angular, gate, 2)[0].size == min(len(half), 3)
+    assert gating.near_both(narrow, track, near, z, tuple(2 * math.pi * turning), gate, 2)[0].size == min(len(half), 3)
 
 
 CUBE = np.array([[0.0, 1e3]] * 3)
