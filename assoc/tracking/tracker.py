@@ -197,7 +197,9 @@ class Tracker:
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
         found = self.state.estimates
-        return None if found is None else health(self.sensors, found, self.odd_identities)
+        return (
+            None if found is None else health(self.sensors, found, self.odd_identities, self.settings.initiation.speed)
+        )
 
     @property
     def odd_identities(self) -> tuple[OddIdentity, ...]:

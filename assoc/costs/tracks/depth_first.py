@@ -341,14 +341,14 @@ def _queue(sensors: Sensors, near: Measured, code: int, t: int, s: int, space: _
         reach = math.sqrt(gate * space.whole[0, axis, axis]) * (1.0 + 1e-9)
         end = middle[axis] + reach
         low = _not_below(places, axis, middle[axis] - reach, low, high)
-    count, folding = 0, folding_of(code, sensors.matrices[s])
+    count, turns = 0, (code, folding_of(code, sensors.matrices[s]))
     for k in range(low, high):
         if axis >= 0 and places[k, axis] > end:
             break
         if d == 3:
-            fits = _in_gate(3, code, folding, places, k, middle, L, v, gate)
+            fits = _in_gate(3, turns, places, k, middle, L, v, gate)
         else:
-            fits = _in_gate(d, code, folding, places, k, middle, L, v, gate)
+            fits = _in_gate(d, turns, places, k, middle, L, v, gate)
         if fits:
             # ascending; those of a track are in another order
             at = count
@@ -362,13 +362,13 @@ def _queue(sensors: Sensors, near: Measured, code: int, t: int, s: int, space: _
 
 @literal_njit
 def _in_gate(
-    d: int, code: int, folding: float, places: Array, k: int, middle: Array, L: Array, v: Array, gate: float
+    d: int, turns: tuple[int, float], places: Array, k: int, middle: Array, L: Array, v: Array, gate: float
 ) -> bool:
-    """Whether measurement k of d quantities is in the gate."""
+    """Whether measurement k of d quantities is in the gate; `turns` are code and folding interval of the sensor."""
     for a in range(d):
         v[a] = places[k, a] - middle[a]
-    wrap(code, v)
-    fold(folding, v)
+    wrap(turns[0], v)
+    fold(turns[1], v)
     square = 0.0
     for a in range(d):
         for e in range(a):

@@ -9,6 +9,7 @@ import numpy as np
 
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
+from assoc.tracking.adapting.folding import assumed_folding
 from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
@@ -60,6 +61,8 @@ class SensorHealth:
     by_range : tuple of (float, Quantity)
         Ends of bands of range (m) with targets in them, and the detection probability there; declared is what was seen
         at all ranges.
+    folding : float or None
+        Interval, m/s, at which range rates are taken to fold though nobody said so.
     verdict : str
     """
 
@@ -68,6 +71,7 @@ class SensorHealth:
     detection_probability: Quantity
     false_alarm_rate: Quantity
     by_range: tuple[tuple[float, Quantity], ...] = ()
+    folding: float | None = None
 
     @property
     def verdict(self) -> str:
@@ -79,6 +83,8 @@ class SensorHealth:
             *([self._ranges] if any(band.differs for _, band in self.by_range) else []),
             *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
         ]
+        if self.folding is not None:
+            found.append(f"range rates taken to fold at {self.folding:g} m/s (folding= says, inf: they do not)")
         return "; ".join(found) or "as declared"
 
     @property
@@ -134,8 +140,13 @@ def _times(factor: float) -> str:
     return f"{factor:.2g} times"
 
 
-def health(sensors: Sequence[Sensor], estimates: Estimates, identities: tuple[OddIdentity, ...] = ()) -> Health:
-    """Compare estimates with what was declared of these sensors; `identities` are those that are odd."""
+def health(
+    sensors: Sequence[Sensor], estimates: Estimates, identities: tuple[OddIdentity, ...], speed: float | Sequence[float]
+) -> Health:
+    """Compare estimates with what was declared of these sensors; `identities` are those that are odd.
+
+    `speed`, m/s, is that of `assoc.tracking.Initiation`.
+    """
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
@@ -147,7 +158,11 @@ def health(sensors: Sequence[Sensor], estimates: Estimates, identities: tuple[Od
             ((b + 1) * reach(sensor) / BANDS, _quantity(values[s, DETECTION], seen[b], unsure[b], DETECTION))
             for b in (np.flatnonzero(estimates.dwells[s] >= 1.0).tolist() if reach(sensor) else ())
         ]
-        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands)))
+        rows.append(
+            SensorHealth(
+                sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands), assumed_folding(sensor, speed)
+            )
+        )
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
     return Health(tuple(rows), manoeuvres, identities)
 

@@ -14,6 +14,7 @@ from assoc.filters import ExtendedKalmanFilter, InteractingMultipleModel, Kalman
 from assoc.filters.base import Filter
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
+from assoc.tracking.adapting.folding import with_folding
 from assoc.tracking.records.estimates import DETECTION, Estimates
 from assoc.tracking.settings import TrackerSettings
 
@@ -24,6 +25,7 @@ _SCALABLE = (ExtendedKalmanFilter, KalmanFilter, ModifiedEKF)
 
 def in_use(settings: TrackerSettings, estimates: Estimates) -> TrackerSettings:
     """The settings by the estimates in use; the same object while nothing has changed."""
+    settings = with_folding(settings)
     declared = Estimates.declared(settings.sensors)
     used, bands = estimates.used, estimates.bands
     alike = np.array_equal(bands, np.broadcast_to(used[:, DETECTION, None], bands.shape))
