@@ -19,6 +19,7 @@ from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples, score_cos
 from assoc.costs.tracks.tuples import gate_of, grow_track_tuples, require_states
 from assoc.filters.base import predict_each
 from assoc.filters.batches import placed
+from assoc.filters.measurement import periods_of
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import owners
 from assoc.tracking.records.track_batch import ID, STARTED, TrackBatch
@@ -128,7 +129,7 @@ class _AtOnce(WholeScan):
             led = np.flatnonzero(lead == s)
             expected = settings.filter.expected(self._tracks.states, sensor)
             gate = gate_of(sensor, settings.gate_probability)
-            near = near_pairs(expected, z[tuples[led, s] - 1], sensor.angular[: sensor.dim], gate)
+            near = near_pairs(expected, z[tuples[led, s] - 1], periods_of(sensor), gate)
             tracks.append(near[0])
             found.append(led[near[1]])
         return np.concatenate(tracks), np.concatenate(found)
