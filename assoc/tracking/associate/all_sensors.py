@@ -72,8 +72,8 @@ class WholeScan(ABC):
         """Tracks, and which of the tuples (K, S) may be theirs by the first sensor in it."""
 
     @abstractmethod
-    def follow(self, track: Array, rows: Array) -> Corrected:
-        """Tracks of these rows (M,), each corrected by a tuple, rows (M, S)."""
+    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
+        """Tracks of these rows (M,), each corrected by a tuple, rows (M, S); `inside` counts only where `gated`."""
 
     @abstractmethod
     def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
@@ -134,7 +134,7 @@ class _AtOnce(WholeScan):
             found.append(led[near[1]])
         return np.concatenate(tracks), np.concatenate(found)
 
-    def follow(self, track: Array, rows: Array) -> Corrected:
+    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
         """Sensor after sensor; inside by the distances of all measurements together."""
         settings, scan = self._progress.settings, self._progress.scan
         require_states(self._tracks.states, len(track))
@@ -150,7 +150,8 @@ class _AtOnce(WholeScan):
                 continue
             done = settings.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
             gain[seen] += done.log_likelihood + settings.terms.detection[s] - missed[seen, s]
-            nis[seen] += done.nis
+            if gated:
+                nis[seen] += done.nis
             freedom[seen] += sensor.dim
             states = placed(len(track), [(rest, states[rest]), (seen, done.state)])
         largest = int(sum(sensor.dim for sensor in settings.sensors))
@@ -201,7 +202,7 @@ class _InOrder(WholeScan):
             found.append(leads[measurement][there])
         return np.concatenate(tracks), np.concatenate(found)
 
-    def follow(self, track: Array, rows: Array) -> Corrected:
+    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
         """From measurement to measurement, each within its gate."""
         timed, terms = self._timed, self._progress.settings.terms
         followed = timed.follow(track, rows)
