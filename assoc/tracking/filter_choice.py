@@ -124,7 +124,7 @@ _MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
     "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, 2 if flat else 3)),
     "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, 2 if flat else 3)),
     "ukf": lambda noise, flat, seed: filters.UnscentedKalmanFilter(_velocity(noise, 2 if flat else 3)),
-    "enkf": lambda noise, flat, seed: filters.EnsembleKalmanFilter(_velocity(noise, flat), 100, seed),
+    "enkf": lambda noise, flat, seed: filters.EnsembleKalmanFilter(_velocity(noise, 2 if flat else 3), 100, seed),
     "imm": _imm,
     "fuzzy": lambda noise, flat, seed: filters.FuzzyAdaptiveEKF.from_data(
         _turn(noise, flat, "fuzzy"), filters.tuned_data()
