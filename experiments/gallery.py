@@ -267,9 +267,8 @@ def screenshot() -> bytes | None:
         page = Path(folder) / "report.html"
         words = ["scene.npz", "--solver", "aco", "--report", "report.html"]
         write_association_report(page, association, scene, ["scene.npz"] * len(association.scans), words=words)
-        show(browser, page, (1100, 950), fragment="#scan-50", scale=2)
-        browser.execute_script("document.querySelector('#targets tr[data-row]').click()")
-        browser.execute_script("window.scrollTo(0, 0)")
+        show(browser, page, (1100, 1150), scale=2)
+        browser.execute_script("Plotly.animate('scene-0', ['50'], {mode: 'immediate', frame: {duration: 0}})")
         time.sleep(0.5)
         return small(browser.get_screenshot_as_png())
 

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 import html
-import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 
 def escape(text: object) -> str:
     """Return text escaped for elements and quoted attributes."""
     return html.escape(str(text), quote=True)
-
-
-def script_json(content: Any) -> str:
-    """Return JSON that is safe inside a script element, whatever its strings hold."""
-    text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
-    # no tag, comment or entity can begin inside; JSON decodes the escapes to the same characters
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def table(headers: Sequence[object], rows: Iterable[Sequence[object]], *, numbers: Sequence[int] = ()) -> str:

@@ -11,8 +11,6 @@ from typing import Any
 
 import pytest
 
-_UNPACKING = """return document.getElementById('packed') && !document.documentElement.dataset.ready
-  && document.getElementById('failure').hidden"""
 DESKTOP, PHONE = (1280, 900), (390, 844)
 
 
@@ -56,8 +54,6 @@ def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment:
     browser.get_log("browser")  # what an earlier page said
     browser.get("about:blank")
     browser.get(page.resolve().as_uri() + fragment)
-    # the script of a report is unpacked when the page is there
-    in_time(lambda: not browser.execute_script(_UNPACKING))
 
 
 def in_time(condition: Callable[[], Any]) -> Any:

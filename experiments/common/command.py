@@ -63,10 +63,7 @@ def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse
     text = "seed of all random numbers (default %(default)s)"
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help=text)
     if figure is not None:
-        default = f"{name.rpartition('.')[2]}.png"
-        parser.add_argument(
-            "--figure", metavar="FILE", default=default, help=f"write the figure here (default {default})"
-        )
+        parser.add_argument("--figure", metavar="FILE", help="draw the figure, a PNG, and write it here")
     add_files(parser, name)
     return parser
 
@@ -181,7 +178,7 @@ def run(
     claims, shown = (found, None) if figure is None else found
     only = getattr(chosen, "only", None)
     report(chosen, claims, name, about, seed=chosen.seed, kept=replaced if only else None)
-    if figure is not None:
+    if figure is not None and chosen.figure is not None:
         save_figure(Path(chosen.figure), figure[0], shown, figure[1])
         print(f"{chosen.figure}: written")
     return 0

@@ -1,53 +1,23 @@
 """The report of an association as a file: what is in it, that it is safe, and that it needs nothing else."""
 
-import json
+import html
 import re
 import sys
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 import assoc
+from assoc.association.plan import Plan
 from assoc.plotting.report import write_association_report
-from assoc.plotting.report.views import thin
+from assoc.plotting.report.figures import evenly, within_budget
 from assoc.scene import Scene
+from assoc.scene.geodesy import geodetic
 from assoc.sensors import Radar3D
 from assoc.simulation import simulate
+from tests.plotting.pages import EVIL, figures_of, parsed, step_of, text_of
 from tests.running import here
-
-EVIL = "<script>alert(1)</script>"
-
-
-def data_of(path):
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', path.read_text(), re.S)
-    return json.loads(found.group(1))
-
-
-class Texts(HTMLParser):
-    """Tags with their attributes, and the text outside of scripts and styles."""
-
-    def __init__(self):
-        super().__init__()
-        self.tags, self.text, self.open = [], [], None
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        self.open = tag if tag in ("script", "style") else None
-
-    def handle_endtag(self, tag):
-        self.open = None
-
-    def handle_data(self, data):
-        if self.open is None:
-            self.text.append(data)
-
-
-def parsed(path):
-    reader = Texts()
-    reader.feed(path.read_text())
-    return reader
 
 
 @pytest.fixture(scope="module")
@@ -75,33 +45,45 @@ def test_nothing_is_loaded_from_outside(page):
     assert "unsafe-eval" not in policy and "http" not in policy
 
 
-def test_costs_and_residuals_are_those_of_the_association(page, scene, association):
-    data = data_of(page)
-    assert len(data["scans"]) == 8
-    for drawn, one in zip(data["scans"], association.scans, strict=True):
+def test_the_figure_of_each_scan_is_that_of_the_association(page, scene, association):
+    figure = figures_of(page)["scene-0"]
+    steps = figure["layout"]["sliders"][0]["steps"]
+    assert len(figure["frames"]) == len(steps) == 8
+    for k, one in enumerate(association.scans):
         singles = np.count_nonzero(one.solution.tuples, axis=1) == 1
-        assert sum(drawn["costs"]) == pytest.approx(one.solution.cost, abs=1e-3)
-        assert drawn["falseAlarms"] == singles.sum() and drawn["tuples"] == one.targets.tolist()
-        scan = scene.scan(one.scan)
+        assert f": {len(one.targets)} targets, {singles.sum()} false alarms" in steps[k]["label"]
+        found = step_of(figure, k, "targets found")
+        assert found["x"] == pytest.approx((1e-3 * one.positions[:, 0]).tolist(), abs=6e-4)
+        assert step_of(figure, k, "truth")["y"] == pytest.approx(
+            (1e-3 * scene.truth.positions[k][:, 1]).tolist(), abs=6e-4
+        )
+        costs = [float(re.search(r"cost (\S+?)<br>", text)[1]) for text in found["hovertext"]]
+        assert sum(costs) == pytest.approx(one.solution.cost, rel=1e-3)
         for s, sensor in enumerate(scene.sensors):
-            rows = iter(drawn["view"]["residuals"][s])
+            drawn = step_of(figure, k, sensor.name)
+            assert len(drawn["x"]) == np.count_nonzero(one.targets[:, s])
             for t, index in enumerate(one.targets[:, s]):
+                told = re.search(rf"{sensor.name} no. {index}: range (\S+) m", found["hovertext"][t])
+                assert (told is not None) == (index > 0)
                 if index:
-                    # range, azimuth, elevation of the fused position, by hand
-                    d = one.positions[t] - sensor.position
-                    ground = np.hypot(d[0], d[1])
-                    seen = [np.hypot(ground, d[2]), np.arctan2(d[1], d[0]), np.arctan2(d[2], ground)]
-                    expected = scan.measurements[s][index - 1] - seen
-                    assert next(rows) == pytest.approx(expected, rel=1e-3)
-            assert next(rows, None) is None
-            # and the place of a measurement measures like the measurement
-            at = np.array(drawn["view"]["measured"][s]["at"])
-            back = sensor.residual(sensor.measure(at), scan.measurements[s])
-            assert np.abs(back / [1.0, 1e-4, 1e-4]).max() < 1.0
+                    # the range of the fused position, by hand
+                    rest = scene.measurements[k][s][index - 1][0] - np.linalg.norm(one.positions[t] - sensor.position)
+                    assert float(told[1]) == pytest.approx(rest, rel=1e-2)
+        # ellipses of 95 %: their half axes hold 2.4477 standard deviations
+        outline = step_of(figure, k, "95 % ellipses")
+        x = [value for value in outline["x"][:49] if value is not None]
+        assert (max(x) - min(x)) / 2 == pytest.approx(2.4477e-3 * np.sqrt(one.covariances[0, 0, 0]), rel=0.05, abs=1e-3)
+
+
+def test_convergence_ends_at_cost_and_bound(page, association):
+    figure = figures_of(page)["convergence-0"]
+    for k, one in enumerate(association.scans):
+        assert step_of(figure, k, "cost of the best known")["y"][-1] == pytest.approx(one.solution.cost, abs=1e-5)
+        assert step_of(figure, k, "lower bound")["y"][-1] == pytest.approx(one.solution.lower_bound, abs=1e-5)
 
 
 def test_command_parameters_and_versions_are_said(page):
-    text = " ".join(parsed(page).text)
+    text = text_of(page)
     command = "python -m assoc.solve s.npz --report out.html"
     for word in (command, "three-radar", assoc.__version__, np.__version__, "seed"):
         assert word in text
@@ -125,9 +107,9 @@ def test_text_from_files_is_only_text(tmp_path):
     write_association_report(harmless, assoc.associate(plain), plain, ["x.npz"], words=["x", "y"])
     reader = parsed(path)
     assert [tag for tag, _ in reader.tags] == [tag for tag, _ in parsed(harmless).tags]
-    text = " ".join(reader.text)
+    text = text_of(path)
     assert EVIL in text and '"><b>x.npz' in text
-    assert data_of(path)["sources"][0]["sensors"][0]["name"] == EVIL
+    assert html.escape(EVIL) in {trace["name"] for trace in figures_of(path)["scene-0"]["data"]}
 
 
 def test_problems_and_several_sources(tmp_path, scene, association):
@@ -137,45 +119,59 @@ def test_problems_and_several_sources(tmp_path, scene, association):
     )
     path = tmp_path / "out.html"
     write_association_report(path, both, [scene, scene, problem], ["a.npz", "a.npz", "b.npz"])
-    data = data_of(path)
-    assert [scan["source"] for scan in data["scans"]] == [0, 0, 1]
-    assert data["scans"][2]["view"] is None and sorted(data["scans"][2]["costs"]) == [-3.0, -2.0]
+    figures, text = figures_of(path), text_of(path)
+    assert [name for name in figures if name.startswith("scene")] == ["scene-0"]
+    assert len(figures["scene-0"]["frames"]) == 2 and "b.npz" in text
+    assert {"-3.0000", "-2.0000"} <= {*parsed(path).text}
     with pytest.raises(assoc.InvalidInputError, match="one for each of the 3 scans"):
         write_association_report(path, both, [scene, problem])
 
 
 def _of_problem(problem):
-    from assoc.association.plan import Plan
-
     plan = Plan((problem,), "exact")
     return plan.gather(plan.run(plan.items()))
 
 
 def test_ranked_associations_say_how_far_the_second_is(tmp_path, scene):
-    from assoc.association.plan import Plan
-
     plan = Plan((scene,), "exact", kbest=3)
     ranked = plan.gather(plan.run(plan.items()[:2]))
     path = tmp_path / "out.html"
     write_association_report(path, ranked, scene)
-    assert "to the second best" in " ".join(parsed(path).text)
-    for drawn, one in zip(data_of(path)["scans"], ranked.scans, strict=True):
-        assert drawn["ranked"] == [other.solution.cost for other in one.ranked]
+    text = text_of(path)
+    for one in ranked.scans:
+        assert f"{one.ranked[1].solution.cost - one.ranked[0].solution.cost:.4f}" in text
 
 
-def test_views_beyond_the_budget_are_thinned_evenly():
-    scans = [{"view": None} for _ in range(10)]
-    kept = thin(({"x": "y" * 92} for _ in range(10)), scans, budget=450)
-    assert kept == 4 and [i for i, scan in enumerate(scans) if scan["view"]] == [0, 3, 6, 9]
-    assert thin(({"x": "y" * 92} for _ in range(10)), scans, budget=10_000) == 10
+def test_steps_beyond_the_budget_are_thinned_evenly():
+    steps = [str(i) * 98 for i in range(10)]
+    assert within_budget(steps, 450) == steps[::3]
+    assert within_budget(steps, 10_000) == steps and len(evenly(5_000)) <= 300
+
+
+def test_the_chance_that_a_tuple_is_drawn_is_the_ants_own(tmp_path):
+    scene = simulate("bearing-only", 0, targets=12, scans=2)
+    parameters = {"mode": "mmas", "iterations": 20, "refinement": "none"}
+    plan = Plan((scene,), "aco", parameters=parameters, pheromone=True)
+    association = plan.gather(plan.run(plan.items()))
+    write_association_report(tmp_path / "out.html", association, scene)
+    figure = figures_of(tmp_path / "out.html")["pheromone-0"]
+    for k, one in enumerate(association.scans):
+        history = one.pheromone
+        rows = [f"({', '.join(map(str, row))})" for row in history.tuples.tolist()]
+        for name, factor in (("pheromone", 1.0), ("visibility", 1.0), ("probability", 100.0)):
+            drawn = step_of(figure, k, name)
+            for label, values in zip(drawn["y"], drawn["z"], strict=True):
+                j = rows.index(label.removesuffix(" chosen"))
+                assert history.chosen[j] == label.endswith(" chosen")
+                assert values == pytest.approx((factor * getattr(history, name)[:, j]).tolist(), rel=6e-3)
 
 
 @pytest.mark.slow
-def test_a_hundred_scans_stay_below_eight_megabytes(tmp_path):
+def test_a_hundred_scans_stay_below_nine_megabytes(tmp_path):
     scene = simulate("crowd", 0, targets=60, scans=100)
     path = tmp_path / "out.html"
     write_association_report(path, assoc.associate(scene, "greedy"), scene)
-    assert path.stat().st_size < 8_000_000
+    assert path.stat().st_size < 9_000_000
 
 
 def test_nothing_is_left_where_it_cannot_be_written(tmp_path, scene, association):
@@ -204,8 +200,9 @@ def test_the_program_writes_it(tmp_path, scene):
     words = ["scene.npz", "--solver", "greedy", "--scans", "2:5", "--report", "out.html"]
     done = here("assoc.solve", *words, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert [scan["scan"] for scan in data_of(tmp_path / "out.html")["scans"]] == [2, 3, 4]
-    assert "python -m assoc.solve " + " ".join(words) in " ".join(parsed(tmp_path / "out.html").text)
+    steps = figures_of(tmp_path / "out.html")["scene-0"]["layout"]["sliders"][0]["steps"]
+    assert [step["label"].partition(",")[0] for step in steps] == ["scan 2", "scan 3", "scan 4"]
+    assert "python -m assoc.solve " + " ".join(words) in text_of(tmp_path / "out.html")
 
 
 def test_compiling_is_told_apart_from_solving(scene, association, tmp_path):
@@ -217,34 +214,18 @@ def test_compiling_is_told_apart_from_solving(scene, association, tmp_path):
     assert "Compiling" not in parsed(tmp_path / "warm.html").text
 
 
-def test_scenes_on_the_earth_show_coordinates(tmp_path):
-    """Hovers tell latitude and longitude where a scene has an origin, of targets and of tracks."""
-    from dataclasses import replace
-
-    from assoc.plotting.report import write_tracking_report
-    from assoc.scene.geodesy import geodetic
-    from assoc.tracking import MultiSensorTracker, track_scene
-
-    scene = replace(simulate("three-radar", 2, scans=4), origin=(0.82, 0.15, 400.0))
-    association = assoc.associate(scene)
-    write_association_report(tmp_path / "a.html", association, scene)
-    view = data_of(tmp_path / "a.html")["scans"][0]["view"]
-    expected = np.degrees(geodetic(association.scans[0].positions, scene.origin)[:, :2])
-    np.testing.assert_allclose(view["degrees"], expected, atol=1e-5)
-    table, _ = track_scene(MultiSensorTracker.for_scene(scene), scene)
-    write_tracking_report(tmp_path / "t.html", table.to_frame(), scene)
-    first = data_of(tmp_path / "t.html")["tracks"][0]
-    row = table.to_frame().query(f"track_id == {first['id']}").iloc[0]
-    assert first["lat"][0] == pytest.approx(row["latitude"], abs=1e-5)
-    assert first["lon"][0] == pytest.approx(row["longitude"], abs=1e-5)
-    # elsewhere there are none
-    write_association_report(tmp_path / "b.html", association, replace(scene, origin=None))
-    assert "degrees" not in data_of(tmp_path / "b.html")["scans"][0]["view"]
+def test_scenes_on_the_earth_show_coordinates(tmp_path, scene, association):
+    write_association_report(tmp_path / "a.html", association, replace(scene, origin=(0.82, 0.15, 400.0)))
+    hovers = step_of(figures_of(tmp_path / "a.html")["scene-0"], 0, "targets found")["hovertext"]
+    degrees = np.degrees(geodetic(association.scans[0].positions, (0.82, 0.15, 400.0))[:, :2])
+    for text, (lat, lon) in zip(hovers, degrees, strict=True):
+        assert f"{lat:.5f}\u00b0, {lon:.5f}\u00b0" in text
 
 
 def test_measurements_with_times_of_their_own_have_no_residuals(tmp_path):
     """The target was elsewhere when they were made: what is between them and its position is no error."""
     radars = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
     write_association_report(tmp_path / "p.html", assoc.associate(radars), radars, ["s.npz"] * radars.num_scans)
-    views = [scan["view"] for scan in data_of(tmp_path / "p.html")["scans"]]
-    assert len(views) == radars.num_scans and all(view["residuals"] is None for view in views)
+    figure = figures_of(tmp_path / "p.html")["scene-0"]
+    texts = [text for k in range(radars.num_scans) for text in step_of(figure, k, "targets found")["hovertext"]]
+    assert texts and not any("\u03c3" in text for text in texts)

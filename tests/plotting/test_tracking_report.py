@@ -1,4 +1,6 @@
-"""The report of a tracker: figures against plain readings of the table, and the page in a browser."""
+"""The report of a tracker: figures against plain readings of the table."""
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,8 +10,8 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.report import write_tracking_report
 from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
-from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, press, screenshot, show
-from tests.plotting.test_association_report import EVIL, data_of, parsed
+from assoc.tracking import MultiSensorTracker, track_scene
+from tests.plotting.pages import EVIL, figures_of, parsed, step_of, text_of
 from tests.running import here
 
 
@@ -39,31 +41,44 @@ def page(scene, tmp_path_factory):
 
 
 def test_metric_lives_and_paths(page, scene):
-    data = data_of(page)
-    gospa = data["gospa"]
-    assert gospa["times"] == scene.times.tolist() and gospa["missed"] == [0.0] * 30
+    figures = figures_of(page)
+    gospa = {one["name"]: one for one in figures["gospa-over-time-cutoff-100-m-0"]["data"]}
+    assert gospa["GOSPA"]["x"] == scene.times.tolist() and gospa["missed"]["y"] == [0.0] * 30
     for k in range(30):
         # three errors of 30 m; a false track costs half the square of the cutoff
         squares = 3 * 30.0**2 + (100.0**2 / 2 if 2 <= k < 5 else 0.0)
-        assert gospa["distance"][k] == pytest.approx(np.sqrt(squares), rel=1e-3)
-    assert [one["id"] for one in data["tracks"]] == [10, 11, 12, 99] and len(data["truth"]) == 3
-    assert data["tracks"][3]["t"] == scene.times[2:5].tolist()
-    assert data["truth"][1]["x"] == pytest.approx([p[1, 0] for p in scene.truth.positions], abs=0.51)
-    text = " ".join(parsed(page).text)
+        assert gospa["GOSPA"]["y"][k] == pytest.approx(np.sqrt(squares), rel=1e-3)
+    figure = figures["tracks-over-time-0"]
+    for k, truth in enumerate(scene.truth.positions):
+        there, targets = step_of(figure, k, "tracks"), step_of(figure, k, "targets")
+        assert there["text"] == ["10", "11", "12"] + (["99"] if 2 <= k < 5 else [])
+        assert targets["y"] == pytest.approx((1e-3 * truth[:, 1]).tolist(), abs=6e-4)
+        assert there["x"][:3] == pytest.approx((1e-3 * (truth[:, 0] + 30.0)).tolist(), abs=6e-4)
+        assert len(step_of(figure, k, "measurements")["x"]) == sum(map(len, scene.measurements[k]))
+    assert "3 tracks, 3 targets" in figure["layout"]["sliders"][0]["steps"][0]["label"]
+    text = text_of(page)
     assert "python -m assoc.track" in text and text.count(EVIL) >= 2 and "100%" in text
-    assert sum(tag == "script" for tag, _ in parsed(page).tags) == 3
+    assert sum(tag == "script" for tag, _ in parsed(page).tags) == 1
 
 
-def test_every_row_stands_at_an_instant_of_the_slider(tmp_path):
-    """Times of thirds of a second are rounded alike wherever they stand; a score that is not known is not shown."""
-    scene = simulate("three-radar", 2, scans=5, interval=1.0 / 3.0)
-    write_tracking_report(tmp_path / "thirds.html", tracks_of(scene).assign(score=np.nan), scene)
-    data = data_of(tmp_path / "thirds.html")
-    assert len(data["instants"]) == 5
-    for one in [*data["tracks"], *data["truth"]]:
-        assert {*one["t"]} <= {*data["instants"]}
-    assert [one["t"] for one in data["measured"]] == data["instants"]
-    assert "score" not in " ".join(parsed(tmp_path / "thirds.html").text)
+def test_a_track_counts_at_every_instant_that_it_lives_through(tmp_path):
+    """Rows of different tracks at different times: none of them has one at each instant."""
+    rng = np.random.default_rng(3)
+    rows = [
+        {"track_id": number, "time": round(float(time), 3), "x": float(number), "y": 0.0}
+        for number in range(12)
+        for time in np.sort(rng.uniform(*np.sort(rng.uniform(0.0, 300.0, 2)), 25))
+    ]
+    frame = pd.DataFrame(rows)
+    write_tracking_report(tmp_path / "counts.html", frame)
+    (curve,) = figures_of(tmp_path / "counts.html")["number-of-tracks-over-time-0"]["data"]
+    assert curve["x"] == sorted({*frame["time"]})
+    lives = frame.groupby("track_id")["time"].agg(["min", "max"]).to_numpy()
+    assert curve["y"] == [sum(began <= time <= ended for began, ended in lives) for time in curve["x"]]
+    # the slider has fewer instants than there are rows' times, and says as many tracks
+    write_tracking_report(tmp_path / "long.html", pd.concat([frame.assign(time=frame["time"] + d) for d in (0.0, 0.5)]))
+    slider = figures_of(tmp_path / "long.html")["tracks-over-time-0"]["layout"]["sliders"][0]["steps"]
+    assert len(slider) <= 300 and not any(": 0 tracks" in step["label"] for step in slider[5:-5])
 
 
 def test_scans_of_one_time_are_one_instant_of_the_metric(tmp_path, scene):
@@ -71,22 +86,21 @@ def test_scans_of_one_time_are_one_instant_of_the_metric(tmp_path, scene):
         scene.sensors, np.repeat(scene.times, 2), [one for one in scene.measurements for _ in range(2)], scene.region,
         Truth(*([one for one in part for _ in range(2)] for part in (scene.truth.target_ids, scene.truth.positions))),
     )  # fmt: skip
-    frame = tracks_of(scene)
+    frame, name = tracks_of(scene), "gospa-over-time-cutoff-100-m-0"
     write_tracking_report(tmp_path / "twice.html", pd.concat([frame, frame]), twice, cutoff=100.0)
     write_tracking_report(tmp_path / "once.html", frame, scene, cutoff=100.0)
-    assert data_of(tmp_path / "twice.html")["gospa"] == data_of(tmp_path / "once.html")["gospa"]
+    assert figures_of(tmp_path / "twice.html")[name] == figures_of(tmp_path / "once.html")[name]
     # each track still follows its target at all of its instants
-    assert "100%" in " ".join(parsed(tmp_path / "twice.html").text)
+    assert "100%" in text_of(tmp_path / "twice.html")
 
 
 def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
     frame = tracks_of(scene)[["track_id", "time", "x", "y"]]
     write_tracking_report(tmp_path / "one.html", frame, name="plots.csv")
-    data = data_of(tmp_path / "one.html")
-    assert data["gospa"]["times"] == [] and data["truth"] == [] and len(data["tracks"]) == 4
-    assert "GOSPA" not in " ".join(parsed(tmp_path / "one.html").text)
+    names = {one["name"] for one in figures_of(tmp_path / "one.html")["tracks-over-time-0"]["data"]}
+    assert names == {"whole tracks", "sensors", "tracks"} and "GOSPA" not in text_of(tmp_path / "one.html")
     write_tracking_report(tmp_path / "none.html", frame.iloc[:0])
-    assert "No track was made" in " ".join(parsed(tmp_path / "none.html").text)
+    assert "No track was made" in text_of(tmp_path / "none.html")
     with pytest.raises(InvalidInputError, match="'y' is missing"):
         write_tracking_report(tmp_path / "bad.html", frame.drop(columns="y"))
     for column, value in (("time", np.nan), ("x", np.inf), ("track_id", "first")):
@@ -95,13 +109,35 @@ def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
     assert not (tmp_path / "bad.html").exists()
 
 
-def test_long_recordings_are_thinned(tmp_path):
+def test_long_recordings_are_thinned_and_say_so(tmp_path):
     count = 200_000
-    frame = pd.DataFrame({"track_id": np.arange(count) % 50, "time": np.arange(count) * 0.1})
+    frame = pd.DataFrame({"track_id": np.arange(count) % 700, "time": np.arange(count) * 0.1})
     frame = frame.assign(x=np.sin(frame["time"]) * 1e5, y=np.cos(frame["time"]) * 1e5)
     write_tracking_report(tmp_path / "long.html", frame)
-    assert (tmp_path / "long.html").stat().st_size < 8_000_000
-    assert data_of(tmp_path / "long.html")["tracks"][7]["t"][-1] == pytest.approx(frame["time"][count - 50 + 7])
+    assert (tmp_path / "long.html").stat().st_size < 11_000_000
+    text = text_of(tmp_path / "long.html")
+    for said in ("every 5th of their points", "of 200,000 instants", "The first 500 of 700 rows"):
+        assert said in text
+    # the last point of a path is always there
+    paths = figures_of(tmp_path / "long.html")["tracks-over-time-0"]["data"]
+    assert round(1e-3 * frame["x"].iloc[-1], 3) in {x for one in paths for x in one["x"] or ()}
+
+
+def test_names_uncertainty_and_places_on_the_earth(tmp_path, scene):
+    frame = tracks_of(scene).assign(sigma_x=20.0, sigma_y=10.0)
+    names = {10: "SWR12", 11: "4521"}
+    frame["target"] = [names.get(number, "") for number in frame.track_id]
+    write_tracking_report(tmp_path / "named.html", frame, scene)
+    first = step_of(figures_of(tmp_path / "named.html")["tracks-over-time-0"], 0, "tracks")
+    assert first["text"] == ["SWR12", "4521", "12"] and first["error_x"]["array"] == [0.04] * 3
+    assert "SWR12" in text_of(tmp_path / "named.html").partition("Life of the tracks")[2]
+    ground = replace(simulate("three-radar", 2, scans=4), origin=(0.82, 0.15, 400.0))
+    table = track_scene(MultiSensorTracker.for_scene(ground), ground)[0].to_frame()
+    write_tracking_report(tmp_path / "earth.html", table, ground)
+    shown = step_of(figures_of(tmp_path / "earth.html")["tracks-over-time-0"], 3, "tracks")["hovertext"]
+    last = table[table["time"] == table["time"].max()].sort_values("track_id")
+    for text, (lat, lon) in zip(shown, last[["latitude", "longitude"]].to_numpy(), strict=True):
+        assert f"{lat:.5f}\u00b0, {lon:.5f}\u00b0" in text
 
 
 @pytest.mark.slow
@@ -111,84 +147,7 @@ def test_the_program_writes_it(tmp_path):
     done = here("assoc.track", *words, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     frame = pd.read_csv(tmp_path / "tracks.csv")
-    data = data_of(tmp_path / "tracks.html")
-    assert {one["id"] for one in data["tracks"]} == {*frame["track_id"]} and len(data["instants"]) == 6
-    assert "python -m assoc.track " + " ".join(words) in " ".join(parsed(tmp_path / "tracks.html").text)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_it_works_in_a_browser(browser, page, pictures, size):
-    show(browser, page, size)
-    assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"
-    assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
-    assert browser.find_element("tag name", "h1").text == EVIL
-    found = "return document.getElementById('scene-plot').data.find((t) => t.name === 'tracks').text"
-    assert browser.execute_script(found) == ["10", "11", "12"]
-    press(browser, browser.find_elements("css selector", "#track-table tbody tr")[3])
-    # a track that is not there any more takes the slider to its beginning
-    assert browser.execute_script("return document.getElementById('slider').value") == "2"
-    assert browser.execute_script(found) == ["10", "11", "12", "99"]
-    press(browser, browser.find_element("id", "after"))
-    assert "t = 3 s" in browser.find_element("id", "slider-label").text
-    screenshot(browser, pictures / f"tracks-{size[0]}.png")
-    assert complaints(browser) == []
-
-
-@pytest.mark.slow
-def test_a_crowd_fills_the_view(browser, tmp_path):
-    """With hundreds of tracks the view is theirs, not that of the sensors around them, and no legend lists them all."""
-    scene = simulate("crowd", 0, targets=100, scans=3, sensor="radar", width=20_000.0)
-    truth = scene.truth
-    rows = [
-        {"track_id": t, "time": time, "x": p[t, 0], "y": p[t, 1], "z": p[t, 2], "altitude": p[t, 2]}
-        for time, p in zip(scene.times, truth.positions, strict=True)
-        for t in range(100)
-    ]
-    write_tracking_report(tmp_path / "crowd.html", pd.DataFrame(rows), scene)
-    show(browser, tmp_path / "crowd.html")
-    layout = "return document.getElementById('scene-plot').layout"
-    low, high = browser.execute_script(f"{layout}.yaxis.range")
-    assert high - low < 1.6 * 20.0 < 0.001 * np.ptp([sensor.position[1] for sensor in scene.sensors])
-    last = "return document.getElementById('altitude-plot').layout?.showlegend ?? null"
-    assert in_time(lambda: browser.execute_script(last) is not None)
-    assert browser.execute_script(last) is False
-    assert complaints(browser) == []
-
-
-def test_tracks_are_called_by_their_names(tmp_path, scene):
-    frame = tracks_of(scene)
-    names = {10: "SWR12", 11: "4521"}
-    frame["target"] = [names.get(number, "") for number in frame.track_id]
-    write_tracking_report(tmp_path / "named.html", frame, scene)
-    assert [one.get("target") for one in data_of(tmp_path / "named.html")["tracks"]] == ["SWR12", "4521", None, None]
-    text = " ".join(parsed(tmp_path / "named.html").text)
-    assert "SWR12" in text and "name" in text
-    write_tracking_report(tmp_path / "nameless.html", tracks_of(scene), scene)
-    assert " name " not in " ".join(parsed(tmp_path / "nameless.html").text).partition("Life of the tracks")[2]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("dark", [False, True])
-def test_on_paper_nothing_is_cut(browser, pictures, page, dark):
-    """A4 without its margins is 703 units wide."""
-    feature = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-    try:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": feature})
-        show(browser, page)
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": feature})
-        metrics = {"width": 703, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
-        wide = (
-            "return [...document.querySelectorAll('.main-svg, table, pre')].map((one) => one.getBoundingClientRect())"
-        )
-        assert in_time(lambda: all(0 <= one["left"] and one["right"] <= 703 for one in browser.execute_script(wide)))
-        assert browser.execute_script("return document.documentElement.scrollWidth") <= 703
-        screenshot(browser, pictures / f"tracking-paper-{'dark' if dark else 'light'}.png")
-        white = "return document.getElementById('scene-plot')._fullLayout.paper_bgcolor"
-        assert browser.execute_script(white) == "#fff"
-        browser.execute_script("window.dispatchEvent(new Event('afterprint'))")
-        assert in_time(lambda: (browser.execute_script(white) == "#fff") is not dark)
-    finally:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+    figures = figures_of(tmp_path / "tracks.html")
+    figure = figures["tracks-over-time-0"]
+    assert {name for k in range(6) for name in step_of(figure, k, "tracks")["text"]} == {*map(str, frame["track_id"])}
+    assert "python -m assoc.track " + " ".join(words) in text_of(tmp_path / "tracks.html")

@@ -2,51 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
-from typing import Any
+
+import numpy as np
 
 from assoc._system.door import door
 from assoc._text.html import escape, warning_list
 from assoc._text.times import moment
+from assoc._types import Array
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source, warnings_of
+from assoc.costs import tuple_costs
 from assoc.errors import InvalidInputError
-from assoc.plotting.report.page import Page, cards, controls, definitions, settings_section, sortable_table
-from assoc.plotting.report.pheromone import add_pheromone
+from assoc.plotting.report.figures import Dicts, evenly, layout, line, plain_numbers, scatter, sliding, within_budget
+from assoc.plotting.report.page import Part, cards, definitions, note, settings_part, table, write_page
+from assoc.plotting.report.pheromone import pheromone_figure
 from assoc.plotting.report.plotly_script import check_report
-from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
+from assoc.plotting.report.scene import scene_figure
+from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 
-_SCENE = (
-    controls("scan")
-    + """<div class="controls"><div class="buttons" id="dimensions" hidden>
-<button type="button" id="plan" aria-pressed="true">Plan</button>
-<button type="button" id="space" aria-pressed="false">3-D</button></div>
-<div class="buttons" id="zooms"><button type="button" id="nearer" disabled>Zoom to target</button>
-<button type="button" id="whole">Whole scene</button>
-<button type="button" id="legend" aria-pressed="true">Legend</button></div>
-<a href="#scans" id="to-row">row of this scan in the table</a></div>
-<div class="split"><div id="scene-plot" class="plot large"></div>
-<div><div id="detail" class="detail" aria-live="polite"></div>
-<h3>Targets of this scan</h3><div class="scroll" id="targets" tabindex="0" role="region" aria-label="targets"></div>
-</div></div>"""
-)
-
-_PHEROMONE = (
-    """<p class="note">How the ants came to agree in this scan: what they lay on a tuple, how they see it, and
-the chance that they draw it. What was chosen comes first, then what has the most pheromone in the end.</p>"""
-    + controls("cycle", "cycle-")
-    + """<div class="controls"><label>show <select id="ants-measure"></select></label></div>
-<div id="ants-plot" class="plot large"></div>"""
-)
-
-_HISTORY = """<div class="halves"><div><h3>This scan: cost and lower bound</h3>
-<div class="controls"><label>over <select id="trace-axis"><option value="0">iterations</option>
-<option value="1">time</option></select></label></div><div id="trace-plot" class="plot small"></div></div>
-<div><h3>Over all scans</h3><div class="controls"><label>show <select id="measure"></select></label></div>
-<div id="scans-plot" class="plot small"></div></div></div>"""
+_MOST_SOURCES = 12
+_LINES_OF_TRACE = 200
+_CSV = "; --csv writes all"
 
 
 @door
@@ -87,49 +68,87 @@ def write_association_report(
             f"sources, names: expected one for each of the {len(association.scans)} scans, "
             f"got {len(each)} and {len(files)}"
         )
-    _page(association, each, files, words).write(path)
-
-
-def _page(association: Association, each: list[Source], files: list[str], words: Sequence[str] | None) -> Page:
-    numbers: dict[tuple[int, str], int] = {}
-    views: list[dict[str, Any]] = []
-    for source, file in zip(each, files, strict=True):
-        if (id(source), file) not in numbers:
-            numbers[id(source), file] = len(views)
-            views.append(source_view(source, file))
-    owners = [numbers[id(source), file] for source, file in zip(each, files, strict=True)]
-    scans = [scan_view(s, n, scan) for s, n, scan in zip(each, owners, association.scans, strict=True)]
-    drawn = [i for i, source in enumerate(each) if isinstance(source, Scene)]
-    kept = thin(
-        (scene_view(each[i], association.scans[i], views[owners[i]]["decimals"]) for i in drawn),  # type: ignore[arg-type]
-        [scans[i] for i in drawn],
-    )
-    warnings = [line for source in {id(source): source for source in each}.values() for line in warnings_of(source)]
-    sections = [("summary", "Summary", warning_list(warnings) + _summary(association))]
-    if association.scans:
-        note = ""
-        if kept < len(drawn):
-            note = f'<p class="note">{kept} of {len(drawn)} scans are drawn: all would make this file too large.</p>'
-        sections += [
-            ("scene", "Scene" if drawn else "Chosen tuples", note + _SCENE),
-            ("scans", "Scans", _scans_table(association.scans, files, [views[n]["title"] for n in owners])),
-            ("convergence", "Convergence", _HISTORY),
-        ]
-    if any(scan.pheromone is not None for scan in association.scans):
-        add_pheromone(scans, association.scans)
-        sections.append(("pheromone", "Pheromone", _PHEROMONE))
-    sections += [("sensors", "Sensors", _sensors(each, files)), ("settings", "Settings", _settings(association, words))]
-    title = ", ".join(dict.fromkeys(view["title"] for view in views if view["title"])) or "Association"
+    title, parts = _content(association, each, files, words)
     lead = f"Association of {len(association.scans)} scans with {association.solver}, seed {association.seed}"
-    scripts = ["scene.js", "pheromone.js", "association.js"]
-    return Page(title, lead, sections, {"sources": views, "scans": scans}, scripts)
+    write_page(path, title, lead, parts)
+
+
+def _content(
+    association: Association, each: list[Source], files: list[str], words: Sequence[str] | None
+) -> tuple[str, list[Part]]:
+    scans = association.scans
+    costs = [_costs(source, scan) for source, scan in zip(each, scans, strict=True)]
+    owned: dict[tuple[int, str], list[int]] = {}
+    for i, (source, file) in enumerate(zip(each, files, strict=True)):
+        owned.setdefault((id(source), file), []).append(i)
+    titles = {key: (getattr(each[rows[0]], "name", "") or key[1]) for key, rows in owned.items()}
+    warnings = [line for rows in owned.values() for line in warnings_of(each[rows[0]])]
+    parts = [Part("Summary", warning_list(warnings) + _summary(association))]
+    drawn = [key for key, rows in owned.items() if isinstance(each[rows[0]], Scene)]
+    for key in drawn[:_MOST_SOURCES]:
+        scene, rows = each[owned[key][0]], owned[key]
+        assert isinstance(scene, Scene)
+        share = min(len(drawn), _MOST_SOURCES)
+        figure, kept = scene_figure(scene, [scans[i] for i in rows], [costs[i] for i in rows], share)
+        said = (
+            "" if kept == len(rows) else note(f"{kept} of {len(rows)} scans are drawn: all would make this too large.")
+        )
+        parts.append(Part("Scene" if len(drawn) == 1 else f"Scene {titles[key]}", said, [figure]))
+    if len(drawn) > _MOST_SOURCES:
+        parts.append(Part("Further scenes", note(f"{_MOST_SOURCES} of {len(drawn)} scenes are drawn.")))
+    if scans:
+        parts += [
+            Part("Scans", _scans(scans, files)),
+            Part("Targets", _targets(scans, costs)),
+            Part("Convergence", "", [_convergence(scans)] + ([_over_scans(scans)] if len(scans) > 1 else [])),
+        ]
+    asked = [(_name(scan), scan.pheromone) for scan in scans if scan.pheromone is not None]
+    walked = [(name, history) for name, history in asked if len(history.cycles)]
+    if len(walked) < len(asked):
+        parts.append(Part("Without ants", note(f"In {len(asked) - len(walked)} of {len(asked)} scans no ant walked.")))
+    if walked:
+        about = "What the ants lay on a tuple, how they see it, and the chance that they draw it, cycle by cycle."
+        parts.append(Part("Pheromone", note(about), [pheromone_figure(walked)]))
+    # scenes and problems show themselves in notebooks in the same way
+    shown = [
+        (f"<h3>{escape(file)}</h3>" if file else "") + f'<div class="scroll">{each[rows[0]]._repr_html_()}</div>'
+        for (_, file), rows in owned.items()
+    ]
+    used = {"solver": association.solver, "seed": association.seed, **association.parameters}
+    settings = settings_part(f"<h3>Parameters</h3>{definitions(used)}", "assoc.solve", words)
+    return ", ".join(dict.fromkeys(filter(None, titles.values()))) or "Association", [
+        *parts, Part("Sensors", "".join(shown[:_MOST_SOURCES])), settings,
+    ]  # fmt: skip
+
+
+def _name(scan: ScanAssociation) -> str:
+    return f"scan {scan.scan}" + ("" if scan.time is None else f", t = {moment(scan.time)}")
+
+
+def _costs(source: Source, scan: ScanAssociation) -> Array:
+    """Cost of each target of a scan."""
+    if scan.costs is not None:
+        return scan.costs
+    if not isinstance(source, AssignmentProblem):
+        return tuple_costs(source, scan.scan, scan.targets)
+    rows = map(tuple, scan.solution.tuples.tolist())
+    known = dict(zip(rows, source.costs[scan.solution.indices].tolist(), strict=True))
+    return np.array([known[tuple(row)] for row in scan.targets.tolist()])
+
+
+def _closed_gap(scan: ScanAssociation) -> float | None:
+    """Return the gap, 0 if it is only rounding; None without a bound."""
+    gap = scan.solution.gap
+    if gap <= 1e-9 * max(1.0, abs(scan.solution.cost)):
+        return 0.0
+    return float(gap) if math.isfinite(gap) else None
 
 
 def _summary(association: Association) -> str:
     total = association.totals()
     count = total["scans"]
     bound = total["lower_bound"]
-    gaps = [closed_gap(scan) for scan in association.scans]
+    gaps = [_closed_gap(scan) for scan in association.scans]
     gap = None if any(gap is None for gap in gaps) else sum(gap or 0.0 for gap in gaps)
     content = {
         "Targets": (f"{total['targets']:,}", f"in {count:,} scans"),
@@ -154,50 +173,92 @@ def _figure(value: float | None) -> str:
     return "unknown" if value is None else f"{value:,.6g}".replace("-", "\u2212")
 
 
-def _scans_table(scans: Sequence[ScanAssociation], files: Sequence[str], titles: Sequence[str]) -> str:
-    several = len({*files}) > 1
-    timed = any(scan.time is not None for scan in scans)
-    known = any(scan.true_tuples is not None for scan in scans)
-    ranked = max((len(scan.ranked) for scan in scans), default=0) > 1
-    headers = ["scan", *(["file"] if several else []), *(["time"] if timed else []), "measurements", "targets"]
-    headers += ["false alarms", "cost", "lower bound", "gap", "status", "ms", *(["correct"] if known else [])]
-    headers += ["to the second best"] if ranked else []
-    rows = []
-    for scan, file in zip(scans, files, strict=True):
-        solution, gap = scan.solution, closed_gap(scan)
-        row: list[tuple[str, Any]] = [(str(scan.scan), scan.scan)]
-        row += [(file, file)] if several else []
-        row += [("" if scan.time is None else moment(scan.time), scan.time)] if timed else []
-        row += [
-            (" + ".join(map(str, scan.sizes)), sum(scan.sizes)),
-            (str(len(scan.targets)), len(scan.targets)),
-            (str(scan.false_alarms), scan.false_alarms),
-            (f"{solution.cost:.4f}", solution.cost),
-            (f"{solution.lower_bound:.4f}", solution.lower_bound),
-            ("unknown" if gap is None else f"{gap:.2g}", gap),
-            (solution.status, solution.status),
-            (f"{1e3 * solution.runtime:.2f}", 1e3 * solution.runtime),
+def _scans(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
+    columns: dict[str, list[str]] = {"scan": [str(scan.scan) for scan in scans]}
+    if len({*files}) > 1:
+        columns["file"] = list(files)
+    if any(scan.time is not None for scan in scans):
+        columns["time"] = ["" if scan.time is None else moment(scan.time) for scan in scans]
+    gaps = [_closed_gap(scan) for scan in scans]
+    columns |= {
+        "measurements": [" + ".join(map(str, scan.sizes)) for scan in scans],
+        "targets": [str(len(scan.targets)) for scan in scans],
+        "false alarms": [str(scan.false_alarms) for scan in scans],
+        "cost": [f"{scan.solution.cost:.4f}" for scan in scans],
+        "lower bound": [f"{scan.solution.lower_bound:.4f}" for scan in scans],
+        "gap": ["unknown" if gap is None else f"{gap:.2g}" for gap in gaps],
+        "status": [scan.solution.status for scan in scans],
+        "ms": [f"{1e3 * scan.solution.runtime:.2f}" for scan in scans],
+    }
+    if any(scan.true_tuples is not None for scan in scans):
+        columns["correct"] = [
+            "" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}" for scan in scans
         ]
-        if known:
-            true = scan.true_tuples
-            share = None if not true else (scan.correct_tuples or 0) / true
-            row.append(("" if true is None else f"{scan.correct_tuples}/{true}", share))
-        if ranked:
-            other = scan.ranked[1].solution.cost - scan.ranked[0].solution.cost if len(scan.ranked) > 1 else None
-            row.append(("" if other is None else f"{other:.4f}", other))
-        rows.append(row)
-    return sortable_table("scan-table", headers, rows, link="scan")
+    if any(len(scan.ranked) > 1 for scan in scans):
+        costs = [[one.solution.cost for one in scan.ranked[:2]] for scan in scans]
+        columns["to the second best"] = [f"{pair[1] - pair[0]:.4f}" if len(pair) > 1 else "" for pair in costs]
+    return table([*columns], [list(row) for row in zip(*columns.values(), strict=True)], rest=_CSV)
 
 
-def _sensors(sources: Sequence[Source], files: Sequence[str]) -> str:
-    parts = []
-    for source, file in {id(s): (s, f) for s, f in zip(sources, files, strict=True)}.values():
-        # scenes and problems show themselves in notebooks in the same way
-        title = f"<h3>{escape(file)}</h3>" if file else ""
-        parts.append(f'{title}<div class="scroll">{source._repr_html_()}</div>')
-    return "".join(parts)
+def _targets(scans: Sequence[ScanAssociation], costs: Sequence[Array]) -> str:
+    """The chosen tuples; where probabilities are known, those most in doubt come first."""
+    rows = []
+    for scan, values in zip(scans, costs, strict=True):
+        sure = scan.probabilities
+        for t, (row, cost) in enumerate(zip(scan.targets.tolist(), values.tolist(), strict=True)):
+            doubt, cells = 0.0, [str(scan.scan), str(t + 1), f"({', '.join(map(str, row))})", f"{cost:.4f}"]
+            if sure is not None:
+                low, doubt, high = sure[t].tolist()
+                cells += [f"{100 * doubt:.3g} %", f"{100 * low:.3g} to {100 * high:.3g} %"]
+            rows.append((doubt, cells))
+    known = any(scan.probabilities is not None for scan in scans)
+    headers = ["scan", "target", "tuple", "cost", *(["probability", "proved"] if known else [])]
+    if known:
+        rows.sort(key=lambda row: row[0])
+    return table(headers, [cells + [""] * (len(headers) - len(cells)) for _, cells in rows], most=300, rest=_CSV)
 
 
-def _settings(association: Association, words: Sequence[str] | None) -> str:
-    used = {"solver": association.solver, "seed": association.seed, **association.parameters}
-    return settings_section(f"<h3>Parameters</h3>{definitions(used)}", "assoc.solve", words)
+def _convergence(scans: Sequence[ScanAssociation]) -> Dicts:
+    """Cost and lower bound of a scan over the iterations, with a slider over the scans."""
+    steps = [(_name(scans[i]), _trace(scans[i])) for i in evenly(len(scans))]
+    marker = {"symbol": "x-thin", "size": 11, "line": {"width": 2, "color": line(5)["color"]}}
+    data = [
+        scatter("cost of the best known", "lines+markers", line={**line(0), "shape": "hv"}, marker={"size": 9}),
+        scatter("lower bound", "lines+markers", line={**line(5), "shape": "hv"}, marker=marker),
+    ]
+    for trace in data:
+        trace["hovertemplate"] = "iteration %{x}, %{customdata:.3g} ms<br>%{y:.6g}"
+    return sliding({"data": data, "layout": layout("iteration", "cost (nats)")}, within_budget(steps))
+
+
+def _trace(scan: ScanAssociation) -> list[Dicts]:
+    trace = scan.solution.trace
+    step = max(1, math.ceil(len(trace) / _LINES_OF_TRACE))
+    # the last line is the final answer and is always kept
+    kept = [*trace[:-1:step], *trace[-1:]]
+    rows = np.array([[1e3 * one.seconds, one.cost, one.lower_bound] for one in kept], dtype=float).reshape(-1, 3)
+    at = {"x": [one.iteration for one in kept], "customdata": plain_numbers(rows[:, 0], 3)}
+    return [{**at, "y": plain_numbers(rows[:, column], 6)} for column in (1, 2)]
+
+
+def _over_scans(scans: Sequence[ScanAssociation]) -> Dicts:
+    """Figures of all scans, one of them at a time; a press in the legend shows another."""
+    measures: dict[str, list[float]] = {
+        "cost": [scan.solution.cost for scan in scans],
+        "lower bound": [scan.solution.lower_bound for scan in scans],
+        "gap": [math.nan if (gap := _closed_gap(scan)) is None else gap for scan in scans],
+        "time in the solver, ms": [1e3 * scan.solution.runtime for scan in scans],
+        "targets": [len(scan.targets) for scan in scans],
+        "false alarms": [scan.false_alarms for scan in scans],
+    }
+    if any(scan.true_tuples for scan in scans):
+        measures["correct, %"] = [
+            100.0 * (scan.correct_tuples or 0) / scan.true_tuples if scan.true_tuples else math.nan for scan in scans
+        ]
+    where = [_name(scan) for scan in scans]
+    data = [
+        scatter(name, "lines", y=plain_numbers(values, 4), text=where, line=line(i), hovertemplate="%{text}<br>%{y}",
+                visible=True if i < 2 else "legendonly")
+        for i, (name, values) in enumerate(measures.items())
+    ]  # fmt: skip
+    return {"data": data, "layout": layout("row of the table of scans, from 0", "all scans")}

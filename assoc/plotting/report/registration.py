@@ -10,16 +10,17 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._text.html import escape
-from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
+from assoc._types import Array
+from assoc.plotting.colours import BLUE, GREY, ORANGE
+from assoc.plotting.report.figures import layout
+from assoc.plotting.report.page import Part, cards, note, settings_part, table, write_page
 from assoc.plotting.report.plotly_script import check_report
-from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.residuals import residual_columns
 from assoc.registration import Registration
 from assoc.registration.terms import label_of
 from assoc.sensors.base import ANGLES
 
 _COMPONENTS = ("range", "azimuth", "elevation", "x", "y", "z")
-_MOST_SHOWN = 4_000
 
 
 @door
@@ -47,24 +48,18 @@ def write_registration_report(
     """
     check_report()
     shown = [component for component in _COMPONENTS if residual_columns(registration, component)]
-    plots = "".join(f'<div id="residuals-{component}" class="plot small"></div>' for component in shown)
-    note = (
-        '<p class="note">Each measurement against the position that fits its tuple best. A box holds the middle half, '
-        "its line is the median; the dotted lines are the sensor's own noise, 95 %.</p>"
+    about = note(
+        "Each measurement against the position that fits its tuple best. A box holds the middle half, its line is the "
+        "median, its whiskers 95 %; the grey marks are the sensor's own noise, 95 %."
     )
     lead = f"{registration.tuples:,} targets seen in single scans by two or more of {len(registration.sensors)} sensors"
-    Page(
-        title=f"Registration of {name}" if name else "Registration",
-        lead=lead,
-        sections=[
-            ("summary", "Summary", _summary(registration)),
-            ("biases", "Biases", _table(registration)),
-            ("residuals", "Residuals before and after", note + plots),
-            ("made", "Made with", definitions(made_with("assoc.register", words))),
-        ],
-        data={"residuals": [_boxes(registration, component) for component in shown]},
-        scripts=["registration.js"],
-    ).write(path)
+    parts = [
+        Part("Summary", _summary(registration)),
+        Part("Biases", _biases(registration)),
+        Part("Residuals before and after", about, [_boxes(registration, component) for component in shown]),
+        settings_part("", "assoc.register", words),
+    ]
+    write_page(path, f"Registration of {name}" if name else "Registration", lead, parts)
 
 
 def _summary(registration: Registration) -> str:
@@ -81,28 +76,35 @@ def _summary(registration: Registration) -> str:
     return found + (f"<p>Not observable, these sums of biases:</p><ul>{items}</ul>" if items else "")
 
 
-def _table(registration: Registration) -> str:
+def _biases(registration: Registration) -> str:
     headers = ["sensor", "component", "unit", "bias", "sigma", "observed"]
-    rows = []
-    for row in registration.rows():
-        cells: list[tuple[str, Any]] = [(str(row[name]), row[name]) for name in headers[:3]]
-        cells += [(f"{row[name]:.4g}", row[name]) for name in headers[3:5]]
-        rows.append([*cells, ("yes" if row["observed"] else "no", str(row["observed"]))])
-    return sortable_table("bias-table", headers, rows)
+    rows = [
+        [*(str(row[name]) for name in headers[:3]), f"{row['bias']:.4g}", f"{row['sigma']:.4g}",
+         "yes" if row["observed"] else "no"]
+        for row in registration.rows()
+    ]  # fmt: skip
+    return table(headers, rows)
 
 
 def _boxes(registration: Registration, component: str) -> dict[str, Any]:
     scale, unit = (float(np.degrees(1.0)), "deg") if component in ANGLES else (1.0, "m")
-    sensors = []
-    for s, i in residual_columns(registration, component):
-        residuals = registration.residuals[s]
-        step = max(1, len(residuals.before) // _MOST_SHOWN)
-        sensors.append(
-            {
-                "name": label_of(registration.sensors, s),
-                "limit": 1.96 * scale * float(np.sqrt(registration.sensors[s].covariance[i, i])),
-                "before": plain_numbers(scale * residuals.before[::step, i], 5),
-                "after": plain_numbers(scale * residuals.after[::step, i], 5),
-            }
-        )
-    return {"component": component, "unit": unit, "sensors": sensors}
+    columns = residual_columns(registration, component)
+    names = [escape(label_of(registration.sensors, s)) for s, _ in columns]
+    data: list[dict[str, Any]] = []
+    for when, colour in (("before", BLUE), ("after", ORANGE)):
+        parts = [scale * getattr(registration.residuals[s], when)[:, i] for s, i in columns]
+        ends = np.array([_quantiles(part) for part in parts]).T.tolist()
+        keys = zip(("lowerfence", "q1", "median", "q3", "upperfence"), ends, strict=True)
+        data.append({"type": "box", "name": when, "x": names, "marker": {"color": colour}, **dict(keys)})
+    limits = [1.96 * scale * float(np.sqrt(registration.sensors[s].covariance[i, i])) for s, i in columns]
+    for sign in (1.0, -1.0):
+        marks = {"symbol": "line-ew", "size": 60, "line": {"width": 2, "color": GREY}}
+        data.append(
+            {"type": "scatter", "mode": "markers", "name": "noise, 95 %", "x": names, "y": [sign * y for y in limits],
+             "marker": marks, "showlegend": False}
+        )  # fmt: skip
+    return {"data": data, "layout": layout("", f"residual of {component} ({unit})", boxmode="group")}
+
+
+def _quantiles(values: Array) -> list[float | None]:
+    return [None] * 5 if not len(values) else np.quantile(values, [0.025, 0.25, 0.5, 0.75, 0.975]).tolist()

@@ -1,10 +1,10 @@
-"""The report of a parameter study: table, heat maps, convergence, design."""
+"""The report of a parameter study: table, heat maps, convergence."""
 
 from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,11 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._text.html import escape
+from assoc.plotting.colours import SERIES
 from assoc.plotting.heat_map import LABELS, cells
-from assoc.plotting.report.page import Page, cards, definitions, settings_section, sortable_table
+from assoc.plotting.report.figures import FAINT, Choices, Dicts, layout, line, menu, plain_numbers, scatter
+from assoc.plotting.report.page import Part, cards, definitions, note, settings_part, table, write_page
 from assoc.plotting.report.plotly_script import check_report
-from assoc.plotting.report.views import number
 from assoc.plotting.study_figures import setting_title
 from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import RESULTS, load, load_traces
@@ -28,18 +29,14 @@ if TYPE_CHECKING:
 _MOST_VALUES = 15
 _MOST_PARAMETERS = 5
 _MOST_CURVES = 60
+_MOST_MAPS = 10
 
-_MAPS = """<div class="controls"><label>show <select id="measure"></select></label>
-<label>over <select id="parameters"></select></label></div>
-<div id="map-plot" class="plot large"></div>
-<p class="note">Means over all runs with these values; the 95 % interval by the bootstrap over scans and repeats is in
-brackets, on a narrow screen where it is pointed at.</p>"""
-
-_CURVES = """<div class="controls"><label>over <select id="trace-axis"><option value="iteration">iterations</option>
-<option value="seconds">time</option></select></label><span id="chosen-setting"></span></div>
-<div id="curves-plot" class="plot large"></div>
-<p class="note">A run counts with the best it has found by then. The settings of least mean excess are in colour,
-the one chosen in the table is black.</p>"""
+_NOTE_MAPS = "Means over all runs with these values; point at a cell for the 95 % interval, by the bootstrap."
+_NOTE_ALONE = "Mean of each setting with its 95 % interval, over one parameter."
+_NOTE_CURVES = (
+    "Mean cost above the best known. A run counts with the best it has found by then. The settings of least mean "
+    "excess come first."
+)
 
 
 @door
@@ -83,30 +80,27 @@ def write_sweep_report(
     sources = "".join(f"<li>{escape(name)}</li>" for name in manifest.sources.values())
     settings = f"<h3>Sources</h3><ul>{sources}</ul><h3>Study</h3>{definitions(used)}"
     settings += "".join(f"<h3>Parameters of {escape(solver)}</h3>{definitions(same)}" for solver, same in _fixed(frame))
-    settings = settings_section(settings, "assoc.sweep", words)
+    about = settings_part(settings, "assoc.sweep", words)
     name = Path(folder).resolve().name
     lead = f"Parameter study of {', '.join(map(str, frame['solver'].unique())) or 'nothing yet'}"
     if frame.empty:
-        sections = [("summary", "Summary", "<p>The study has no runs yet.</p>"), ("settings", "Settings", settings)]
-        Page(name, lead, sections, {"settings": []}, ["sweep.js"]).write(path)
+        write_page(path, name, lead, [Part("Summary", "<p>The study has no runs yet.</p>"), about])
         return
-    table = summarize(frame).sort_values(["excess", "time"], kind="stable").reset_index(drop=True)
+    summary = summarize(frame).sort_values(["excess", "time"], kind="stable").reset_index(drop=True)
     names = varied(frame)
-    titles = [setting_title(row, names, frame["solver"].nunique() > 1) for row in table.to_dict("records")]
-    sections = [
-        ("summary", "Summary", _summary(frame, table, titles)),
-        ("table", "Settings compared", _table(table, names)),
-        ("maps", "Over the parameters", _MAPS),
-        ("convergence", "Convergence", _CURVES),
-        ("settings", "Study", settings),
-    ]
-    data = {
-        "measures": {name: label for name, label in LABELS.items() if table[name].notna().any()},
-        "settings": [_setting(row, text, names) for row, text in zip(table.to_dict("records"), titles, strict=True)],
-        "maps": _maps(frame),
-        "curves": _curves(frame, load_traces(folder), table),
-    }
-    Page(name, lead, sections, data, ["sweep.js"]).write(path)
+    titles = [setting_title(row, names, frame["solver"].nunique() > 1) for row in summary.to_dict("records")]
+    measures = [measure for measure in LABELS if summary[measure].notna().any()]
+    # begin with what differs
+    measures.sort(key=lambda measure: summary[measure].nunique() < 2)
+    parts = [Part("Summary", _summary(frame, summary, titles)), Part("Settings compared", _table(summary, names))]
+    figures = [_map(*one, measures) for one in _pairs(frame)]
+    if figures:
+        parts.append(Part("Over two parameters", note(_NOTE_MAPS), figures))
+    if names:
+        parts.append(Part("Over one parameter", note(_NOTE_ALONE), [_alone(summary, names, titles, measures)]))
+    curves = _curves(frame, load_traces(folder), summary, titles)
+    parts += [Part("Convergence", note(_NOTE_CURVES), curves), about]
+    write_page(path, name, lead, parts)
 
 
 def _fixed(frame: pd.DataFrame) -> list[tuple[str, dict[str, str]]]:
@@ -115,16 +109,16 @@ def _fixed(frame: pd.DataFrame) -> list[tuple[str, dict[str, str]]]:
     names = [str(name) for name in frame.columns[1:last] if name not in RESULTS]
     groups = frame.groupby("solver") if len(frame) else ()
     return [
-        (str(solver), {name: _value(part[name].iloc[0])[0] for name in names if part[name].nunique() == 1})
+        (str(solver), {name: _value(part[name].iloc[0]) for name in names if part[name].nunique() == 1})
         for solver, part in groups
     ]
 
 
-def _summary(frame: pd.DataFrame, table: pd.DataFrame, titles: Sequence[str]) -> str:
-    best = table.iloc[0]
+def _summary(frame: pd.DataFrame, summary: pd.DataFrame, titles: Sequence[str]) -> str:
+    best = summary.iloc[0]
     problems = frame.groupby(["scene", "scan"]).ngroups
     content = {
-        "Settings": (f"{len(table):,}", "solvers with all their parameters"),
+        "Settings": (f"{len(summary):,}", "solvers with all their parameters"),
         "Runs": (f"{len(frame):,}", f"{problems:,} scans or problems, {frame['repeat'].nunique():,} repeats"),
         "Certified optimal": (f"{100 * frame['optimal'].astype(float).mean():.1f} %", "of all runs"),
         "Time": (f"{frame['time'].astype(float).sum():.3g} s", "in the solvers"),
@@ -134,75 +128,114 @@ def _summary(frame: pd.DataFrame, table: pd.DataFrame, titles: Sequence[str]) ->
     return cards(content)
 
 
-def _table(table: pd.DataFrame, names: Sequence[str]) -> str:
+def _table(summary: pd.DataFrame, names: Sequence[str]) -> str:
     headers = ["rank", "solver", *names, "runs"]
-    shown = [name for name in LABELS if table[name].notna().any()]
+    shown = [name for name in LABELS if summary[name].notna().any()]
     for name in shown:
         headers += [LABELS[name], "95 %"]
     rows = []
-    for rank, row in enumerate(table.to_dict("records"), start=1):
-        line: list[tuple[str, Any]] = [(str(rank), rank), (str(row["solver"]), str(row["solver"]))]
-        line += [_value(row[name]) for name in names]
-        line.append((str(row["runs"]), int(row["runs"])))
+    for rank, row in enumerate(summary.to_dict("records"), start=1):
+        line = [str(rank), str(row["solver"]), *(_value(row[name]) for name in names), str(row["runs"])]
         for name in shown:
             middle, low, high = (FACTORS.get(name, 1.0) * row[f"{name}{end}"] for end in ("", "_low", "_high"))
-            interval = "" if np.isnan(low) else f"{low:.4g} .. {high:.4g}"
-            line += [(f"{middle:.4g}", number(middle)), (interval, number(high - low))]
+            line += [f"{middle:.4g}", "" if np.isnan(low) else f"{low:.4g} .. {high:.4g}"]
         rows.append(line)
-    return sortable_table("setting-table", headers, rows, link="setting")
+    return table(headers, rows, rest="; --csv writes all")
 
 
-def _value(value: Any) -> tuple[str, Any]:
-    """Text and sort key of a parameter; a solver may not have it."""
+def _value(value: Any) -> str:
+    """Text of a parameter; a solver may not have it."""
     if value is None or value != value:
-        return "", None
+        return ""
     plain = value.item() if isinstance(value, np.generic) else value
-    return (f"{plain:.6g}" if isinstance(plain, float) else str(plain)), plain
+    return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
 
 
-def _setting(row: Mapping[Any, Any], text: str, names: Sequence[str]) -> dict[str, Any]:
-    means = {}
-    for name in LABELS:
-        factor = FACTORS.get(name, 1.0)
-        means[name] = [number(factor * row[f"{name}{end}"]) for end in ("", "_low", "_high")]
-    return {"title": text, "values": {name: _value(row[name])[1] for name in names}, "means": means}
-
-
-def _maps(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Means and intervals over all pairs of parameters with few values, for each solver."""
-    maps: list[dict[str, Any]] = []
-    several = frame["solver"].nunique() > 1
+def _pairs(frame: pd.DataFrame) -> list[tuple[str, pd.DataFrame, str, str]]:
+    """Title, runs of a solver, and two of its parameters with few values."""
+    pairs = []
     for solver, part in frame.groupby("solver"):
         few = [name for name in varied(part) if part[name].nunique() <= _MOST_VALUES][:_MOST_PARAMETERS]
-        for across, up in itertools.combinations(few, 2):
-            shown: dict[str, Any] = {}
-            for measure in LABELS:
-                if np.isnan(measured(part, measure)).all():
-                    continue
-                xs, ys, *tables = cells(part, measure, across, up)
-                shown[measure] = [[[number(value) for value in row] for row in table.tolist()] for table in tables]
-            maps.append(
-                {
-                    "title": f"{solver}: {across}, {up}" if several else f"{across}, {up}",
-                    "across": across,
-                    "up": up,
-                    "xs": [_value(x)[0] for x in xs],
-                    "ys": [_value(y)[0] for y in ys],
-                    "measures": shown,
-                }
-            )
-    return maps
+        pairs += [(str(solver), part, *two) for two in itertools.combinations(few, 2)]
+    return pairs[:_MOST_MAPS]
 
 
-def _curves(frame: pd.DataFrame, traces: pd.DataFrame, table: pd.DataFrame) -> list[dict[str, Any]]:
+def _map(solver: str, part: pd.DataFrame, across: str, up: str, measures: Sequence[str]) -> Dicts:
+    """Means of a measure over two parameters, with a menu of the measures."""
+    data: list[Dicts] = []
+    for measure in measures:
+        if np.isnan(measured(part, measure)).all():
+            continue
+        xs, ys, middle, low, high = cells(part, measure, across, up)
+        texts = [
+            [
+                "" if np.isnan(value) else f"{value:.3g} ({low[i, j]:.3g} .. {high[i, j]:.3g})"
+                for j, value in enumerate(row)
+            ]
+            for i, row in enumerate(middle)
+        ]
+        data.append(
+            {
+                "type": "heatmap", "name": LABELS[measure], "x": [escape(_value(x)) for x in xs],
+                "y": [escape(_value(y)) for y in ys], "z": plain_numbers(middle, 6), "hovertext": texts,
+                "texttemplate": "%{z:.3g}", "colorscale": "Cividis", "colorbar": {"thickness": 12},
+                "hovertemplate": "%{hovertext}<extra></extra>", "visible": not data,
+            }
+        )  # fmt: skip
+    choices: Choices = [(one["name"], [{"visible": [other is one for other in data]}]) for one in data]
+    shown = layout(
+        f"{across} ({escape(solver)})", up, showlegend=False, updatemenus=[menu(choices)], margin={"t": 50},
+        xaxis={"type": "category"}, yaxis={"type": "category"},
+    )  # fmt: skip
+    return {"data": data, "layout": shown}
+
+
+def _alone(summary: pd.DataFrame, names: Sequence[str], titles: Sequence[str], measures: Sequence[str]) -> Dicts:
+    """Means of the settings over one parameter, with menus of measures and parameters."""
+    data: list[Dicts] = []
+    columns = {
+        name: [value if isinstance(value, (int, float)) else escape(_value(value)) or None for value in kept]
+        for name, kept in ((name, summary[name].astype(object).where(summary[name].notna(), None)) for name in names)
+    }
+    for measure in measures:
+        middle, low, high = (
+            FACTORS.get(measure, 1.0) * summary[f"{measure}{end}"].to_numpy(dtype=float)
+            for end in ("", "_low", "_high")
+        )
+        bars = {
+            "array": plain_numbers(high - middle, 6),
+            "arrayminus": plain_numbers(middle - low, 6),
+            "symmetric": False,
+        }
+        data.append(
+            scatter(LABELS[measure], x=columns[names[0]], y=plain_numbers(middle, 6), error_y=bars, visible=not data,
+                    text=[*map(escape, titles)], hovertemplate="%{text}<br>%{y}<extra></extra>", marker={"size": 8})
+        )  # fmt: skip
+    of: Choices = [
+        (LABELS[one], [{"visible": [other == one for other in measures]}, {"yaxis.title.text": LABELS[one]}])
+        for one in measures
+    ]
+    over: Choices = [
+        (f"over {name}", [{"x": [columns[name]] * len(data)}, {"xaxis.title.text": name}]) for name in names
+    ]
+    menus = [menu(of), *([menu(over, 0.55)] if len(names) > 1 else [])]
+    shown = layout(names[0], LABELS[measures[0]], showlegend=False, updatemenus=menus, margin={"t": 50})
+    return {"data": data, "layout": shown}
+
+
+def _curves(frame: pd.DataFrame, traces: pd.DataFrame, summary: pd.DataFrame, titles: Sequence[str]) -> list[Dicts]:
     """Mean excess of the best settings over iterations and over time, in the order of the table."""
     traces = with_excess(frame, traces)
-    curves = []
-    for key in table["setting"][:_MOST_CURVES]:
-        part = traces[traces["setting"] == key]
-        entry = {}
-        for column in ("iteration", "seconds") if len(part) else ():
-            at, excess = mean_excess(part, column)
-            entry[column] = [[float(f"{value:.5g}") for value in array.tolist()] for array in (at, excess)]
-        curves.append(entry)
-    return curves
+    figures = []
+    for column, label in (("iteration", "iteration"), ("seconds", "time (ms)")):
+        data = []
+        for i, (key, title) in enumerate(zip(summary["setting"][:_MOST_CURVES], titles, strict=False)):
+            part = traces[traces["setting"] == key]
+            if len(part):
+                at, excess = mean_excess(part, column)
+                x, y = (plain_numbers(values, 6) for values in (at, excess))
+                style = {**line(i), "shape": "hv"} if i < len(SERIES) else {"color": FAINT, "width": 1, "shape": "hv"}
+                data.append(scatter(title, "lines", x=x, y=y, line=style, showlegend=i < len(SERIES)))
+        axes: Dicts = {"xaxis": {"type": "log"}, "yaxis": {"rangemode": "tozero"}}
+        figures.append({"data": data, "layout": layout(label, "excess cost (nats)", **axes)})
+    return figures
