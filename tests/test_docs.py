@@ -197,6 +197,13 @@ def find_spec_of(parts: list[str]) -> bool:
         return False
 
 
+def test_the_example_of_an_own_sensor_runs(capsys):
+    text = (ROOT / "docs" / "own_sensor.md").read_text(encoding="utf-8")
+    cells = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+    exec(compile(cells, "own_sensor.md", "exec", dont_inherit=True), {"__name__": "page"})
+    assert "[10." in capsys.readouterr().out
+
+
 def test_the_example_of_an_own_solver_runs(capsys):
     text = (ROOT / "docs" / "own_solver.md").read_text(encoding="utf-8")
     cells = "\n".join(re.findall(r"```\{code-cell\}\n(.*?)```", text, re.DOTALL))

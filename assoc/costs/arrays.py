@@ -14,7 +14,7 @@ from assoc.costs.symmetric import inverse_by_cofactors
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.sensors.codes import BEARING, CODES
+from assoc.sensors.codes import BEARING, CODES, OWN
 from assoc.sensors.kernels.dispatch import convert_one
 from assoc.sensors.kernels.radar import START_REACH
 
@@ -98,7 +98,7 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     # the prior of a flat region must not overrule measurements
     half = np.maximum(half, 0.1 * half.max())
     return SensorArrays(
-        code=np.array([CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
+        code=np.array([CODES.get(type(sensor), OWN) for sensor in scene.sensors], dtype=np.int64),
         dim=np.array([sensor.position_part.dim for sensor in scene.sensors], dtype=np.int64),
         position=np.array([sensor.position for sensor in scene.sensors]),
         covariance=covariance,

@@ -16,6 +16,7 @@ from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays, unmisse
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import fitting
+from assoc.costs.own_sensors import any_own, grow_own
 from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
@@ -127,6 +128,12 @@ def _gated_problem(
         misses = np.log1p([-sensor.detection_probability for sensor in scene.sensors])
         sensors = unmissed(sensors, misses, blind)
     gates = _gates(scene, sensors, probability)
+    if any_own(scene):
+        rates = range_rates(scene, scan, speed)
+        tuples, costs = grow_own(scene, sensors, scan, gates, rates, prior, scan.index, most)
+        if blind is not None and blind.any():
+            costs = costs - np.where(blind & (tuples == 0), misses, 0.0).sum(axis=1)
+        return AssignmentProblem(tuples, costs, scan.sizes)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
     measured, index = scan_arrays(sensors, scan, reach, least)

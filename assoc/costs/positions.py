@@ -10,7 +10,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
-from assoc.costs.prices import position_prior, prices, with_prior
+from assoc.costs.own_sensors import any_own, fit_own, flat_scan, rows_of
+from assoc.costs.prices import position_prior, prices_at, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
@@ -29,11 +30,12 @@ def tuple_costs(
     """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
     prior = position_prior(scene, sensor_arrays(scene), target_density)
     sensors = with_prior(sensor_arrays(scene), prior)
-    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
+    rows, chi, positions, covariances = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
     if rates is not None or prior is not None:
-        flat, _ = scan_arrays(sensors, scan_of(scene, scan), 1.0, 1.0)
-        chi = chi + prices(sensors, flat, rows, rates, prior)
+        chosen = scan_of(scene, scan)
+        flat = flat_scan(sensors, chosen) if any_own(scene) else scan_arrays(sensors, chosen, 1.0, 1.0)[0]
+        chi = chi + prices_at(sensors, flat, rows, rates, prior, positions, covariances)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)
@@ -76,6 +78,10 @@ _known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.W
 def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array) -> tuple[Array, Array]:
     count = len(scene.sensors)
     parts = tuple(measured if s == sensor else np.empty((0, other.dim)) for s, other in enumerate(scene.sensors))
+    if any_own(scene):
+        alone = np.zeros((len(measured), count), dtype=np.int64)
+        alone[:, sensor] = np.arange(1, len(measured) + 1)
+        return fit_own(scene, sensors, Scan(0, 0.0, parts), alone)[1:]
     flat, index = scan_arrays(sensors, Scan(0, 0.0, parts), 1.0, 1.0)
     rows = np.full((len(measured), count), -1, dtype=np.int32)
     rows[index - 1, sensor] = np.arange(len(measured))
@@ -98,6 +104,9 @@ def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, A
     """Rows of measurements (K, S), chi-square (K,), positions (K, 3) and covariances (K, 3, 3) of tuples."""
     scan = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
+    if any_own(scene):
+        wanted = checked_tuples(tuples, scan.sizes)
+        return (rows_of(wanted, scan), *fit_own(scene, sensors, scan, wanted))
     measured, index = scan_arrays(sensors, scan, 1.0, 1.0)  # gates do not matter here
     sizes = scan.sizes
     wanted = checked_tuples(tuples, sizes)

@@ -94,6 +94,14 @@ def prices(
     price.
     """
     _, positions, covariances = fit(sensors, scan, rows, False)
+    return prices_at(sensors, scan, rows, rates, prior, positions, covariances)
+
+
+def prices_at(
+    sensors: SensorArrays, scan: ScanArrays, rows: Array, rates: RangeRates | None, prior: PositionPrior | None,
+    positions: Array, covariances: Array,
+) -> Array:  # fmt: skip
+    """`prices` of tuples with these positions (K, 3) and covariances (K, 3, 3)."""
     total = np.zeros(len(rows))
     if rates is not None:
         total += range_rate_prices(sensors, scan, rates, rows, positions)

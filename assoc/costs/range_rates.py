@@ -32,6 +32,7 @@ from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors import Radar3D
 from assoc.sensors.kernels.records import TURN
 
 SPEED = 300.0
@@ -69,6 +70,12 @@ def range_rates(scene: Scene, scan: Scan, speed: float | Sequence[float]) -> Ran
     sigma = checked_speed(speed)
     if not any(sensor.measures_velocity for sensor in scene.sensors):
         return None
+    for number, sensor in enumerate(scene.sensors):
+        if sensor.measures_velocity and not isinstance(sensor, Radar3D):
+            raise InvalidInputError(
+                f"{sensor.label(number)}: costs know velocities from range rates of a Radar3D alone; give a sensor of "
+                "your own without them"
+            )
     variance, slope, values = np.zeros(len(scene.sensors)), np.zeros((len(scene.sensors), 3)), []
     for s, (sensor, measured) in enumerate(zip(scene.sensors, scan.measurements, strict=True)):
         values.append(measured[:, 3] if sensor.measures_velocity else np.zeros(len(measured)))

@@ -259,13 +259,21 @@ class Sensor(ABC):
         ndarray (n, d)
         """
 
-    @abstractmethod
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives of `measure` by the position, shape (n, d, 3).
 
         Of a sensor that measures a velocity, by position and velocity, shape (n, d, 6). At the
-        sensor itself, where angles have no derivative, the distance is taken as 1e-9 m.
+        sensor itself, where angles have no derivative, the distance is taken as 1e-9 m. Of a class that says none they
+        are central differences.
         """
+        points, slopes = self._places(positions), []
+        x = points if not self.measures_velocity else np.hstack([points, np.asarray(velocities, dtype=np.float64)])
+        for axis in range(x.shape[1]):
+            step = np.zeros(x.shape)
+            step[:, axis] = np.maximum(1e-6 * np.abs(points - self.position).max(axis=1), 1e-4)
+            ends = [self.measure(*np.split(x + sign * step, x.shape[1] // 3, axis=1)) for sign in (1, -1)]
+            slopes.append(self.residual(*ends) / (2.0 * step[:, axis, None]))
+        return np.stack(slopes, axis=2)
 
     def residual(self, measured: Array, predicted: Array) -> Array:
         """Return measured - predicted, shape (n, d), angles wrapped into (-pi, pi], folded range rates likewise."""

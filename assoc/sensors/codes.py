@@ -8,6 +8,8 @@ from assoc.sensors.position import PositionSensor
 from assoc.sensors.radar import Radar2D, Radar3D
 
 POSITION, RADAR3D, RADAR2D, BEARING = 0, 1, 2, 3
+OWN = 9
+"""A user's own class, which no kernel knows."""
 
 CODES: dict[type[Sensor], int] = {
     PositionSensor: POSITION,
