@@ -3,7 +3,8 @@
 A removed option, name, argument or value does nothing any more; where it is met, one line says so. The spelling tells
 where:
 
-- ``--flag``: an option of the programs, also as a key of their TOML files; ``--flag value``: one of its values
+- ``--flag``: an option of the programs, also as a key of their TOML files; ``assoc.program --flag``: of one of them;
+  ``--flag value``: one of its values
 - ``assoc.room.name``: a public name of a package
 - ``Class.name``: an attribute or a method
 - ``function(argument)``, ``Class.method(argument)``: an argument by keyword of a function that `door` decorates, or
@@ -12,7 +13,13 @@ where:
 
 from __future__ import annotations
 
-REMOVED: dict[str, str] = {}
+_ONE_PROCESS = "a recording is tracked by one process, which takes about 0.3 hours for a day of 26 million plots"
+
+REMOVED: dict[str, str] = {
+    "--slice": _ONE_PROCESS,
+    "assoc.track --jobs": _ONE_PROCESS,
+    "assoc.track --scheduler": _ONE_PROCESS,
+}
 """By old spelling, the sentence that says what to use instead."""
 
 

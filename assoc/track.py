@@ -12,14 +12,13 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from contextlib import closing as closing_of
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
-from assoc._cli.options import Given, Parser, check_scheduler
+from assoc._cli.options import Given, Parser
 from assoc._cli.program import Program, command, prepare_streams
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
@@ -47,15 +46,12 @@ if TYPE_CHECKING:
     from assoc.recordings.survey import StoredPlots
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker
-    from assoc.tracking.adapting.identity_watch import OddIdentity
     from assoc.tracking.offline.ended_tracks import EndedTracks
     from assoc.tracking.offline.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
-# seconds of a slice
-_SLICE = 900.0
 
 
 def start(arguments: Sequence[str] | None = None) -> int:
@@ -88,7 +84,6 @@ def _track(words: list[str]) -> None:
     given, settings = read_options(words, track_parser())
     given.check_outputs(given["files"])
     given["file"] = given["files"][0]
-    check_scheduler(given)
     if given["check"] and given["no_adapt"]:
         raise InvalidInputError("--check: nothing is estimated with --no-adapt; leave one of them out")
     with messages(given):
@@ -110,8 +105,7 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
         write_and_print(found, given, elapsed, compiling)
     _EARLY_END.say(f"the tracks of {found.num_tracked} of {found.total} scans are written")
     if found.missing:
-        again = "; the same command does what is left" if given["jobs"] or given["scheduler"] or given["slice"] else ""
-        raise LimitExceededError(f"{given['output']}: written without {', '.join(found.missing)}{again}")
+        raise LimitExceededError(f"{given['output']}: written without {', '.join(found.missing)}")
 
 
 def _is_npz(file: str) -> bool:
@@ -229,14 +223,9 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
     # these show all tracks at once
     whole = any(given[name] for name in ("report", "map", "asterix"))
-    sliced = given["jobs"] or given["scheduler"] or given["slice"]
-    if sliced and (whole or given["smooth"] or given["check"]):
-        raise InvalidInputError("--slice, --jobs, --scheduler: leave out --smooth, --report, --map, --asterix, --check")
-
-    missing: list[str] = []
     odd, plots = None, None
     judged: Any
-    table: Any = None if sliced or whole else _ended_tracks(given, stored, outputs)
+    table: Any = None if whole else _ended_tracks(given, stored, outputs)
 
     def track(scans: Iterator[Window]) -> PlotTracks | Judged:
         if not whole:
@@ -244,19 +233,15 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         recording = joined([*stored], notes, os.path.basename(file))
         return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
 
-    if sliced:
-        table, judged, missing, odd = _in_slices(given, tracker, windows, stored, outputs)
-        count = len(judged.ends)
-    else:
-        turns = 1 + (survey.last - survey.first) / windows.rotation
-        judged, count = _watched(
-            given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
-        )
-        if isinstance(judged, PlotTracks):
-            plots, table = judged, judged.table
-            table.origin = given["origin"]
-            sizes = [len(window) for window in plots.windows]
-            judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
+    turns = 1 + (survey.last - survey.first) / windows.rotation
+    judged, count = _watched(
+        given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
+    )
+    if isinstance(judged, PlotTracks):
+        plots, table = judged, judged.table
+        table.origin = given["origin"]
+        sizes = [len(window) for window in plots.windows]
+        judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
         odd = ()
@@ -272,7 +257,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
             table.finish()
 
     ends_here = None if whole else finish
-    return Tracked(tracker, table, None, judged, count, total, plots, [*left, *missing], ends_here, odd)
+    return Tracked(tracker, table, None, judged, count, total, plots, left, ends_here, odd)
 
 
 def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedTracks, stored: StoredPlots) -> Judged:
@@ -312,46 +297,6 @@ def _ended_tracks(given: Given, stored: StoredPlots, outputs: ExitStack) -> Ende
 
     identified = given["identity"] != "ignore" and (stored.survey.coded or stored.addressed)
     return EndedTracks(outputs.enter_context(table_writer(given["output"])), given["origin"], identified)
-
-
-def _in_slices(
-    given: Given, tracker: Tracker, windows: Windows, stored: StoredPlots, outputs: ExitStack
-) -> tuple[Any, Judged, list[str], Sequence[OddIdentity]]:
-    """Track slices of the recording, write their tracks, and name what is missing, and odd identities."""
-    import numpy as np
-
-    from assoc._cli.track.slices import kept_slices
-    from assoc.tracking.offline.plots import TakenPlots
-    from assoc.tracking.offline.slices import Stitching, TrackSlice, overlap
-
-    work = TrackSlice(tracker, not given["all"], given["origin"])
-    places = {"jobs": given["jobs"] or 1, "scheduler": given["scheduler"]}
-    takers, stitching = TakenPlots(stored.survey.named, stored.addressed), Stitching()
-    ends, sizes = [np.zeros(0)], []
-    # these go when the tracks are written
-    slices = outputs.enter_context(kept_slices(given, given["files"]))
-    table = _ended_tracks(given, stored, outputs)
-    seconds, early = given["slice"] or _SLICE, overlap(tracker, windows.rotation)
-
-    def kept() -> str:
-        return f"{len(slices.done())} slices are kept; the same command goes on from there" if slices.stay else ""
-
-    with (
-        _EARLY_END.work(0.0, kept),
-        closing_of(slices.run(work, windows, seconds, early, places)) as parts,
-    ):
-        for part in map(stitching.add, parts):
-            table.add_frame(part.frame)
-            table.count_identities(part.tracks, part.known[:, 1:])
-            takers.add(np.repeat(np.arange(len(part.sizes)), part.sizes), part.known, part.tracks, part.sure)
-            living = {*part.tracks.tolist(), *part.frame.track_id.tolist()}
-            takers.keep(living)
-            table.end(living)
-            ends.append(part.ends)
-            sizes += part.sizes.tolist()
-    times = np.concatenate(ends)
-    judged = Judged(times, sizes, stored.sourced, takers.rates(), takers.kept())
-    return table, judged, slices.missing(), stitching.odd_identities
 
 
 def _watched(

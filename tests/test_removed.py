@@ -76,7 +76,9 @@ def test_what_was_removed_is_not_there(spelling):
     line = removed(spelling)
     assert line.startswith(spelling) and "\n" not in line
     flag, _, value = spelling.partition(" ")
-    if spelling.startswith("--") and not value:
+    if value.startswith("--"):
+        assert value not in flags(importlib.import_module(flag).parser())
+    elif spelling.startswith("--") and not value:
         parsers = {name: importlib.import_module(f"assoc.{name}").parser() for name in PROGRAMS}
         assert flag not in flags(parsers)
     elif spelling.startswith("assoc."):

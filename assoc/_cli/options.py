@@ -175,7 +175,8 @@ class Parser(argparse.ArgumentParser):
         """Parse; the error for an unknown flag says what to use instead, or suggests similar ones."""
         for word in sys.argv[1:] if args is None else args:
             flag = word.partition("=")[0]
-            if flag not in self._option_string_actions and (line := removed(flag)):
+            line = removed(flag) or removed(f"{self.prog} {flag}")
+            if line and flag not in self._option_string_actions:
                 self.error(line)
         parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:

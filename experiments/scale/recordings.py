@@ -3,10 +3,7 @@
 500 aircraft at a time within 250 km, each for half an hour, turns of 4 s, P_d 0.9, 5 % false plots, altitudes and
 codes: a CSV file, tracked by the program `assoc track` in a process of its own. Plots a second of processor time, all
 of it: reading, grouping, tracking, writing. A first run on a short recording compiles modules and kernels. Memory at
-the peak is that of the process; that of the longer recording says whether it grows. Two processes track slices of a
-quarter of an hour of the longest recording (a short one has too few to share them out evenly): the wall time of one
-process without slices over theirs, and their processor time over its. A day of three radars, each tracked from its own
-files, is extrapolated from these slices.
+the peak is that of the process; that of the longer recording says whether it grows.
 """
 
 import os
@@ -27,8 +24,6 @@ from experiments.common.command import main
 GOAL = "chosen by us"
 AIRCRAFT, TURN, LIFE, REACH = 500, 4.0, 1_800.0, 250e3
 SIZES = (100_000, 500_000, 5_000_000)
-DAY = 26_000_000
-"""Plots of three radars in a day."""
 GOALS = {"nearest-neighbour": 20_000.0, "mht": 10_000.0}
 WORDS = ("--range-noise", "30", "--bearing-noise", "0.1", "--detection-probability", "0.9", "--false-alarms", "25")
 
@@ -73,9 +68,9 @@ class Run(NamedTuple):
     """MB."""
 
 
-def track(recording: Path, tracker: str, *more: str) -> Run:
+def track(recording: Path, tracker: str) -> Run:
     """Track a recording in a process of its own."""
-    words = [sys.executable, "-m", "assoc.track", str(recording), "--tracker", tracker, "-q", *WORDS, *more]
+    words = [sys.executable, "-m", "assoc.track", str(recording), "--tracker", tracker, "-q", *WORDS]
     words += ["-o", str(recording.with_suffix(".tracks.csv"))]
     # as usual, Python keeps modules that it has compiled
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
@@ -106,21 +101,7 @@ def lengths(files: Mapping[int, Path]) -> list[Claim]:
     return claims
 
 
-def processes(files: Mapping[int, Path]) -> list[Claim]:
-    """The longest recording by one process and by two, and a day."""
-    longest = files[max(files)]
-    one, two = (track(longest, "nearest-neighbour", *more) for more in ((), ("--jobs", "2")))
-    print(f"one process: {one}\ntwo: {two}", flush=True)
-    day, hours = "a day of three radars in slices", two.processor * DAY / two.plots / 3_600.0
-    return [
-        Claim("two processes: wall time", "", ours=one.wall / two.wall, band=(1.7, None), source=GOAL),
-        Claim("two processes: processor time", "", ours=two.processor / one.processor, source=GOAL),
-        Claim(f"{day}: processor time", "h", ours=hours, band=(None, 12.0), source=GOAL),
-        Claim(f"{day}: memory of a process", "MB", ours=two.peak, band=(None, 4_000.0), source=GOAL),
-    ]
-
-
-PARTS: dict[str, Callable[[Mapping[int, Path]], list[Claim]]] = {"lengths": lengths, "processes": processes}
+PARTS: dict[str, Callable[[Mapping[int, Path]], list[Claim]]] = {"lengths": lengths}
 
 
 def experiment(chosen: Namespace) -> list[Claim]:

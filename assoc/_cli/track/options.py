@@ -136,9 +136,6 @@ OF_PLOTS = (
     Option("range_noise", "M", "standard deviation of range, metres (default: from the plots' steps)", kinds.number,
            _PLOTS),
     Option("bearing_noise", "DEG", "standard deviation of bearing, degrees (default: likewise)", kinds.degrees, _PLOTS),
-    *(replace(COMMON[name], only=_PLOTS) for name in ("jobs", "scheduler")),
-    Option("slice", "S", "track slices of so many seconds, each by itself (default with --jobs or --scheduler: 900)",
-           kinds.positive, _PLOTS),
     Option("false_alarms", "X", "mean number of false plots in a rotation (default 2.5)", kinds.number, _PLOTS),
 )  # fmt: skip
 # names of these options in `assoc.recordings.radar_of`

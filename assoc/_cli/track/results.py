@@ -38,7 +38,7 @@ class Tracked(NamedTuple):
     whole: PlotTracks | None = None
     """For reports."""
     missing: Sequence[str] = ()
-    """Files and slices that they lack."""
+    """Files that they lack."""
     finish: Callable[[], object] | None = None
     """Writes the rest of tracks that were written as they ended."""
     odd: Sequence[object] | None = None

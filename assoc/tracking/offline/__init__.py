@@ -1,1 +1,1 @@
-"""Whole recordings: windows of plots to tracks, slices of time tracked apart and stitched, smoothing."""
+"""Whole recordings: windows of plots to tracks, smoothing."""
