@@ -14,8 +14,12 @@ where:
 from __future__ import annotations
 
 _ONE_PROCESS = "a recording is tracked by one process, which takes about 0.3 hours for a day of 26 million plots"
+_NOT_TOLD = "identities are evidence (identity=IdentityParameters()); those that do not fit are not told by name"
 
 REMOVED: dict[str, str] = {
+    "Tracker.odd_identities": _NOT_TOLD,
+    "LatePlots.odd_identities": _NOT_TOLD,
+    "Health.identities": _NOT_TOLD,
     "--slice": _ONE_PROCESS,
     "assoc.track --jobs": _ONE_PROCESS,
     "assoc.track --scheduler": _ONE_PROCESS,

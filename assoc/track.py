@@ -223,7 +223,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
     # these show all tracks at once
     whole = any(given[name] for name in ("report", "map", "asterix"))
-    odd, plots = None, None
+    plots = None
     judged: Any
     table: Any = None if whole else _ended_tracks(given, stored, outputs)
 
@@ -244,7 +244,6 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         judged = Judged(plots.ends, sizes, stored.sourced, plots.rates, plots.kept)
     if given["identity"] == "ignore":
         # do not judge by plots that were left out
-        odd = ()
         judged = judged._replace(rates=None, kept=None)
         plots = plots and plots._replace(rates=None, kept=None)
         if whole:
@@ -257,7 +256,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
             table.finish()
 
     ends_here = None if whole else finish
-    return Tracked(tracker, table, None, judged, count, total, plots, left, ends_here, odd)
+    return Tracked(tracker, table, None, judged, count, total, plots, left, ends_here)
 
 
 def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedTracks, stored: StoredPlots) -> Judged:

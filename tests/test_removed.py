@@ -10,8 +10,11 @@ from assoc import solve, track
 from assoc.__main__ import PROGRAMS
 from assoc._removed import REMOVED, removed
 from assoc.errors import InvalidInputError, RemovedError
-from assoc.tracking import TRACKERS
+from assoc.tracking import TRACKERS, LatePlots, Tracker
+from assoc.tracking.adapting.health import Health
 
+OWNERS = (Tracker, LatePlots, Health)
+"""Classes whose attributes went."""
 OLD = {
     "--warp": "use --solver",
     "--tracker ants": "use mht",
@@ -81,6 +84,11 @@ def test_what_was_removed_is_not_there(spelling):
     elif spelling.startswith("--") and not value:
         parsers = {name: importlib.import_module(f"assoc.{name}").parser() for name in PROGRAMS}
         assert flag not in flags(parsers)
+    elif spelling[0].isupper() and "(" not in spelling:
+        owner, _, name = spelling.partition(".")
+        (kind,) = [kind for kind in OWNERS if kind.__name__ == owner]
+        with pytest.raises(AttributeError, match="exists no longer"):
+            getattr(kind.__new__(kind), name)
     elif spelling.startswith("assoc."):
         package, _, name = spelling.rpartition(".")
         with pytest.raises(RemovedError):

@@ -18,7 +18,6 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
-from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
@@ -96,7 +95,6 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         "next_id": np.array(state.next_id),
         "solver_calls": np.array(state.solver_calls),
         "filter_rng": np.array("" if state.rng is None else json.dumps(state.rng)),
-        "watch": np.array(state.watch.text()),
         **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
         **{f"lost.{name}": value for name, value in state.lost.arrays().items()},
         **{f"doubles.{name}": value for name, value in state.doubles._asdict().items()},
@@ -137,7 +135,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         tracks=tracks, lost=lost, doubles=_doubles(model.doubles, saved.part("doubles.")), turns=turns,
         time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
-        rng=_rng_state(settings, str(saved["filter_rng"]), model.rng), watch=_watch(saved),
+        rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
         registration=None if model.registration is None else model.registration.restored(saved),
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
@@ -153,15 +151,6 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
     saved.require(good, "unseen", "how often each sensor has missed each track")
     return state._replace(starter=Starter(inner, Unseen(ids, misses)))
-
-
-def _watch(saved: Saved) -> IdentityWatch:
-    """What is known of identities in these arrays, checked."""
-    try:
-        return IdentityWatch.restored(str(saved["watch"]))
-    except (ValueError, TypeError, RecursionError, OverflowError):
-        saved.require(False, "watch", "identities of tracks as JSON")
-        raise
 
 
 def _doubles(model: Doubles, saved: Saved) -> Doubles:

@@ -11,7 +11,6 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
-from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.estimates import Estimates
@@ -45,8 +44,6 @@ class TrackerState(NamedTuple):
     """Number of calls of the solver so far."""
     registration: OnlineRegistration | None = None
     identities: Identities | None = None
-    watch: IdentityWatch = IdentityWatch()
-    """Identities of tracks so far, and those that cannot all be right."""
     estimates: Estimates | None = None
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None

@@ -34,7 +34,6 @@ from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.starter import current, end_ghosts, step_starter, take_over
 from assoc.tracking.stages.taking_up import take_up
-from assoc.tracking.stages.watching import watch_identities
 from assoc.tracking.state import TrackerState, rng_of
 
 Stage = Callable[[Progress], Progress]
@@ -58,7 +57,6 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
         *([] if starting else [take_up, merge, name_parents]),
-        watch_identities,
         report,
     ]
 

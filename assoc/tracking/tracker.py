@@ -23,7 +23,6 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
-from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.method import Method
 from assoc.tracking.records.identity_evidence import IdentityParameters
@@ -197,14 +196,7 @@ class Tracker:
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
         found = self.state.estimates
-        return (
-            None if found is None else health(self.sensors, found, self.odd_identities, self.settings.initiation.speed)
-        )
-
-    @property
-    def odd_identities(self) -> tuple[OddIdentity, ...]:
-        """Codes and addresses that `step` was given and that cannot all be right; `health` has them, too."""
-        return self.state.watch.found
+        return None if found is None else health(self.sensors, found, self.settings.initiation.speed)
 
     @property
     def solver_calls(self) -> int:
@@ -279,8 +271,8 @@ class Tracker:
             look, as one that is off or reports on its own (AIS). Default: all looked everywhere.
         identities : sequence over sensors of int arrays (n_s, 2), optional
             Mode 3/A code and ICAO address (of a ship its MMSI, `assoc.tracking.records.identity_evidence.ship`) of each
-            measurement, 0 or -1 where it has none. Trackers that were made without `identity` only watch them
-            (`health`).
+            measurement, 0 or -1 where it has none. Trackers that were made without `identity` leave them
+            aside.
 
         Returns
         -------

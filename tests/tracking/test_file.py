@@ -200,3 +200,12 @@ def test_a_state_under_another_process_noise_of_a_users_model_is_refused(tmp_pat
     tracker(5.0).restore(tmp_path / "state.npz")
     with pytest.raises(InvalidInputError, match="other settings: filter was"):
         tracker(7.0).restore(tmp_path / "state.npz")
+
+
+def test_a_file_that_knows_more_is_read(tmp_path):
+    """States of former programs hold a field that nothing uses any more."""
+    tracker, path = saved(TRACKERS["multi-sensor"], tmp_path / "new.npz"), tmp_path / "old.npz"
+    save_npz(path, FORMAT, VERSION, {**arrays_of(tracker), "watch": np.array('{"found": []}')})
+    other = TRACKERS["multi-sensor"].for_scene(SCENE)
+    other.restore(path)
+    assert [one.tolist() for one in step(other).assigned] == [one.tolist() for one in step(tracker).assigned]

@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from assoc.tracking.offline.plots import PlotTracks
 
 
-# odd identities that are named without --check
-_ODD = 3
-
-
 class Tracked(NamedTuple):
     """Tracks of a scene or of plots, and how many of all scans were tracked."""
 
@@ -41,13 +37,6 @@ class Tracked(NamedTuple):
     """Files that they lack."""
     finish: Callable[[], object] | None = None
     """Writes the rest of tracks that were written as they ended."""
-    odd: Sequence[object] | None = None
-    """Identities that cannot all be right; None: those that the tracker found."""
-
-    @property
-    def odd_identities(self) -> Sequence[object]:
-        """Identities that cannot all be right."""
-        return self.tracker.odd_identities if self.odd is None else self.odd
 
 
 class Judged(NamedTuple):
@@ -82,7 +71,6 @@ def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: flo
         (given["report"], lambda: _write_report(given, found)),
         (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
         (given["check"], lambda: print_lines(str(found.tracker.health))),
-        (not given["check"], lambda: _print_odd(found.odd_identities)),
         (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
         (found.plots, lambda: _print_rates(found.plots, given["identity"])),
     )
@@ -159,14 +147,6 @@ def _print_rates(plots: Judged, identity: str | None) -> None:
         for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
     )
     print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
-
-
-def _print_odd(identities: Sequence[object]) -> None:
-    """Name the first identities that cannot all be right."""
-    for odd in identities[:_ODD]:
-        print_lines(str(odd))
-    if len(identities) > _ODD:
-        print_lines(f"{len(identities) - _ODD} more identities that do not fit; --check names them")
 
 
 def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float) -> None:

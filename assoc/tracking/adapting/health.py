@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assoc._system.imports import removed_attribute
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.folding import assumed_folding
-from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
 _WIDTH = 1.96
@@ -101,17 +102,17 @@ class Health:
     sensors : tuple of SensorHealth
     manoeuvres : Quantity
         Process noise of the filter, of its most agile model, relative to that declared.
-    identities : tuple of OddIdentity
-        Codes and addresses that cannot all be right.
     """
 
     sensors: tuple[SensorHealth, ...]
     manoeuvres: Quantity
-    identities: tuple[OddIdentity, ...] = ()
+
+    if not TYPE_CHECKING:
+        __getattr__ = removed_attribute
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """One line for each sensor, one for the targets, and one for each odd identity."""
+        """One line for each sensor, and one for the targets."""
         agile = self.manoeuvres.differs and self.manoeuvres.seen > 1.0
         targets = (
             f"manoeuvre about {_times(self.manoeuvres.seen)} as hard as the filter expects"
@@ -119,7 +120,7 @@ class Health:
             else ("no harder manoeuvres than the filter expects")
         )
         sensors = (f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors)
-        return (*sensors, f"targets: {targets}", *map(str, self.identities))
+        return (*sensors, f"targets: {targets}")
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
@@ -140,13 +141,8 @@ def _times(factor: float) -> str:
     return f"{factor:.2g} times"
 
 
-def health(
-    sensors: Sequence[Sensor], estimates: Estimates, identities: tuple[OddIdentity, ...], speed: float | Sequence[float]
-) -> Health:
-    """Compare estimates with what was declared of these sensors; `identities` are those that are odd.
-
-    `speed`, m/s, is that of `assoc.tracking.Initiation`.
-    """
+def health(sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float]) -> Health:
+    """Compare estimates with what was declared of these sensors; `speed`, m/s, is that of `assoc.tracking.Initiation`."""
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
@@ -164,7 +160,7 @@ def health(
             )
         )
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
-    return Health(tuple(rows), manoeuvres, identities)
+    return Health(tuple(rows), manoeuvres)
 
 
 def _quantity(declared: float, seen: float, spread: float, column: int) -> Quantity:

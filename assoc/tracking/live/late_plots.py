@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from assoc._parameters import positive
 from assoc._system.door import doors
+from assoc._system.imports import removed_attribute
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
-from assoc.tracking.adapting.identity_watch import OddIdentity
 from assoc.tracking.records.identity_evidence import checked_identities, no_identities
 from assoc.tracking.records.track import Decision, Step, Track
 from assoc.tracking.records.track_batch import ID, PARENT, TrackBatch
@@ -132,11 +132,8 @@ class LatePlots:
         order = np.argsort(counts[:, ID], kind="stable")
         return TrackBatch(inner.states, inner.numbers, counts)[order].tracks(settings.filter, state.time)
 
-    @property
-    def odd_identities(self) -> tuple[OddIdentity, ...]:
-        """Identities that cannot all be right, of tracks whose names are known; see `Tracker.odd_identities`."""
-        found = self.tracker.odd_identities
-        return tuple(odd.named(self.names.__getitem__) for odd in found if self.names.keys() >= {*odd.tracks})
+    if not TYPE_CHECKING:
+        __getattr__ = removed_attribute
 
     @property
     def scans(self) -> list[float]:

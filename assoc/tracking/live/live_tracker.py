@@ -21,7 +21,6 @@ from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.arrays import LARGEST
-from assoc.tracking.adapting.identity_watch import IdentityWatch
 from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
@@ -93,7 +92,6 @@ class LiveTracker:
         self.confirmed: set[int] = set()
         """Ids of the tracks that were confirmed after the last step."""
         self._kept = KeptIdentities()
-        self._odd_reported: set[tuple[object, ...]] = set()
         self._qualities = Qualities(len(scene.sensors))
         self._refused = [0] * len(scene.sensors)
         self._first: list[list[Array]] = [[] for _ in scene.sensors]
@@ -103,10 +101,7 @@ class LiveTracker:
         """Wall time of each of the last steps."""
 
     def _begun(self, **ids: int) -> LatePlots:
-        tracker = self.settings.make()
-        # codes are their four octal digits, read as decimal numbers
-        tracker.state = tracker.state._replace(watch=IdentityWatch(decimal=True))
-        return LatePlots(tracker, self.settings.horizon, **ids)
+        return LatePlots(self.settings.make(), self.settings.horizon, **ids)
 
     @property
     def positions(self) -> tuple[int, ...]:
@@ -143,7 +138,6 @@ class LiveTracker:
             The file is not such a state.
         """
         self.state, self.confirmed, self.counts = state_file.restore(path, self.settings)
-        self._odd_reported = {odd.key for odd in self.state.tracker.odd_identities}
 
     @property
     def heard(self) -> list[SensorState]:
@@ -308,7 +302,6 @@ class LiveTracker:
         """Start tracks anew, with unused ids."""
         self._kept.settle(set(), math.inf)
         self._qualities.keep(())
-        self._odd_reported.clear()
         late = self._begun(first_id=self.state.tracker.next_id)
         antennas = [Antenna(silent=antenna.silent) for antenna in self.state.antennas]
         self.state = LiveState(late, antennas, self.state.own_positions)
@@ -388,11 +381,6 @@ class LiveTracker:
             step = state.tracker.step(end, z, times, sectors, identities)
             for of_sensor in zip(step.assigned, step.confirmed, times, identities, strict=True):
                 self._kept.take(*of_sensor)
-            for odd in state.tracker.odd_identities:
-                if odd.key not in self._odd_reported:
-                    self._odd_reported.add(odd.key)
-                    self.counts["odd identities"] += 1
-                    settings.tell(f"warning: {odd}")
             self.counts["late"] += step.late
             if step.refused:
                 self.counts["too old"] += step.refused
