@@ -15,11 +15,15 @@ from __future__ import annotations
 
 _ONE_PROCESS = "a recording is tracked by one process, which takes about 0.3 hours for a day of 26 million plots"
 _NOT_TOLD = "identities are evidence (identity=IdentityParameters()); those that do not fit are not told by name"
+_LOSS = "associate twice, with gate_probability 0.999 and 1, and compare costs"
 
 REMOVED: dict[str, str] = {
     "Tracker.odd_identities": _NOT_TOLD,
     "LatePlots.odd_identities": _NOT_TOLD,
     "Health.identities": _NOT_TOLD,
+    "--tiles": "scans are solved in one piece, 10 million tuples in seconds",
+    "--gate-loss": "solve twice, with --gate-probability 0.999 and 1, and compare costs",
+    "associate(gate_loss)": _LOSS,
     "--slice": _ONE_PROCESS,
     "assoc.track --jobs": _ONE_PROCESS,
     "assoc.track --scheduler": _ONE_PROCESS,

@@ -59,8 +59,7 @@ _SCANS = Option("scans", "A:B", "only scans A to B-1, counted from 0; A alone is
 _KBEST = Option("kbest", "K", "the K best associations of each scan, in order", whole(1))
 _LINES = Output(".jsonl", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
 _SHARED = [COMMON[name] for name in ("seed", "time_limit", "jobs", "scheduler")]
-_TILES = Option("tiles", "N", "build and solve each scan in N tiles of space: for huge scans", whole(1), _SCENES)
-_OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST, _TILES)
+_OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST)
 """Options that a TOML file may have."""
 _OPTIONS = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "+"}),
@@ -74,7 +73,6 @@ _OPTIONS = (
     COMMON["config"],
     Option("proof", "FILE", "write a proof for 'assoc check' as JSON, and its problem beside it as .txt",
            Output(".json", strict=True, streams=False)),
-    Option("gate_loss", "", "bound what the gates may have cost (takes about three times as long)", only=_SCENES),
     Option("marginals", "", "how probable each target is among all associations of its scan"),
     COMMON["import"],
     *verbosity("all parameters, and how cost and bound change while a scan is solved"),
@@ -117,8 +115,6 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     log = SolverLog(bar, given["verbose"])
     plan = _plan(sources, solver, parameters, given, log)
     items = _items(plan, given)
-    if given["proof"] and (given["tiles"] or 0) > 1:
-        raise InvalidInputError("--proof: leave out --tiles: a proof is of a problem in one piece")
     if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
     if given["verbose"]:
@@ -261,11 +257,10 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
         solver,
         parameters=parameters,
         gating=given.some(parameter.name for parameter in _GATING),
-        pheromone=given["report"] is not None and not given["tiles"],
-        gate_loss=bool(given["gate_loss"]),
+        pheromone=given["report"] is not None,
         marginals=bool(given["marginals"]),
         watch=log,
-        **given.some(("seed", "time_limit", "kbest", "tiles")),
+        **given.some(("seed", "time_limit", "kbest")),
     )
 
 

@@ -23,7 +23,6 @@ def associate(
     time_limit: float | None = None,
     jobs: int = 1,
     gating: Mapping[str, Any] | None = None,
-    gate_loss: bool = False,
     marginals: bool = False,
     **parameters: Any,
 ) -> Association:
@@ -44,9 +43,6 @@ def associate(
     gating : mapping, optional
         Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``speed``, ``target_density``,
         ``all_tuples``.
-    gate_loss : bool, default False
-        Whether to bound the loss by gating of each scan (``ScanAssociation.gate_loss``): the scan is built
-        and solved once more without gates, which takes about three times as long.
     marginals : bool, default False
         Whether to compute how probable each target is (``ScanAssociation.probabilities``, ``assoc.marginals``).
     **parameters
@@ -68,6 +64,5 @@ def associate(
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
     gates = {} if gating is None else gating
-    asked: Any = {"gate_loss": bool(gate_loss), "marginals": bool(marginals)}
-    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, **asked)
+    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, marginals=bool(marginals))
     return plan.gather(plan.run(plan.items(), jobs))

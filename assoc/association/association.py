@@ -124,7 +124,6 @@ class Totals:
         self._true = self._correct = self._known = 0
         # all values: sums of them are exact
         self._values = {name: array("d") for name in ("cost", "lower_bound", "gap", "runtime", "compile_time")}
-        self._losses = array("d")
         for scan in scans:
             self.add(scan)
 
@@ -137,8 +136,6 @@ class Totals:
         values = solution.cost, solution.lower_bound, solution.gap, solution.runtime, scan.compile_time
         for found, value in zip(self._values.values(), values, strict=True):
             found.append(value)
-        if scan.gate_loss is not None:
-            self._losses.append(scan.gate_loss)
         if scan.true_tuples is not None:
             self._known += 1
             self._true += scan.true_tuples
@@ -149,7 +146,6 @@ class Totals:
 
         ``optimal`` counts the scans whose status is "optimal"; ``true_tuples``, ``correct_tuples`` and
         their ratio ``share_correct`` are over the scans with known truth, None where there is none.
-        ``gate_loss`` is there only where it was asked for.
         """
         optimal = self._sums["optimal"]
         values = {name: math.fsum(found) for name, found in self._values.items()}
@@ -161,7 +157,6 @@ class Totals:
             "optimal": optimal,
             "runtime": values["runtime"],
             "compile_time": values["compile_time"],
-            **({"gate_loss": plain(math.fsum(self._losses))} if self._losses else {}),
             "true_tuples": self._true if self._known else None,
             "correct_tuples": self._correct if self._known else None,
             "share_correct": self._correct / self._true if self._true else None,
@@ -178,9 +173,6 @@ class Totals:
             f"cost {total['cost']:.6g}, lower bound {_text(total['lower_bound'])}, gap {_text(total['gap'])}",
             f"{solver}: {total['optimal']} of {total['scans']} scans certified optimal, median {median:.3g} ms a scan",
         ]
-        if "gate_loss" in total:
-            bound = total["gate_loss"]
-            lines.append("gating loss: unknown" if bound is None else f"gating loss: at most {bound:.3g}")
         if total["share_correct"] is not None:
             lines.append(
                 f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "

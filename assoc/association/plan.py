@@ -14,10 +14,8 @@ from assoc._system.compile_time import compile_seconds
 from assoc._system.engine import spread
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
-from assoc.association.gate_loss import bound_without_gates
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
-from assoc.association.tiles import solve_in_tiles, targets_of, without_scans
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.costs.range_rates import SPEED
 from assoc.errors import InvalidInputError
@@ -58,9 +56,6 @@ class Plan:
     """Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it."""
     watch: Callable[[int, TracePoint], object] | None = None
     """Called with the number of a scan and each TracePoint of its solver, in this process only."""
-    gate_loss: bool = False
-    tiles: int = 0
-    """Above 1: build and solve each scan of a scene in so many tiles of space; see `assoc.association.tiles`."""
     marginals: bool = False
 
     def __post_init__(self) -> None:
@@ -109,9 +104,6 @@ class Plan:
         # a position at another time than the measurements' depends on how fast targets usually fly
         speed = self.gating.get("speed", SPEED)
         scans = [_of_scan(scene, scan, problem, solution, speed) for solution in solutions]
-        if self.gate_loss:
-            bound = bound_without_gates(scene, scan, self.gating, self.time_limit)
-            scans = [replace(ranked, gate_loss=max(0.0, ranked.solution.cost - bound)) for ranked in scans]
         return self._best(self._with_probabilities(problem, scans), history, compiled)
 
     def _with_probabilities(self, problem: AssignmentProblem, scans: list[ScanAssociation]) -> list[ScanAssociation]:
@@ -124,15 +116,6 @@ class Plan:
             replace(scan, probabilities=values[[row[key] for key in map(tuple, scan.targets.tolist())]].reshape(-1, 3))
             for scan in scans
         ]
-
-    def _tiled(self, item: tuple[int, int], jobs: int, scheduler: str | None) -> ScanAssociation:
-        source, compiled = self.sources[item[0]], compile_seconds()
-        if isinstance(source, AssignmentProblem):
-            raise InvalidInputError("tiles: expected a scene; a problem has its tuples already")
-        scan = source.scan(item[1])
-        solution, targets, costs = solve_in_tiles(self, source, scan, self.tiles, jobs=jobs, scheduler=scheduler)
-        found = _scan_of_targets(source, scan, solution, targets, costs, self.gating.get("speed", SPEED))
-        return replace(found, compile_time=compile_seconds() - compiled)
 
     def problem(self, item: tuple[int, int]) -> AssignmentProblem:
         """The assignment problem of scan ``item[1]`` of source ``item[0]``."""
@@ -173,8 +156,6 @@ class Plan:
         """Associate scans one after the other, or several at once in processes or on a cluster; results in order."""
         if isinstance(jobs, bool) or not isinstance(jobs, (int, np.integer)) or jobs < 1:
             raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
-        if self.tiles > 1:
-            return (self._tiled(item, int(jobs), scheduler) for item in items)
         # enough batches that processes end at about the same time
         together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
         # what other processes do is not watched
@@ -182,7 +163,7 @@ class Plan:
         work: Sequence[tuple[int, int | Scan]] = items
         if jobs > 1 and scheduler is None and self.gating.get("target_density") != "auto":
             # a process is sent the scans that it solves; "auto" is found from all of them
-            bare = [without_scans(source) if isinstance(source, Scene) else source for source in self.sources]
+            bare = [_without_scans(source) if isinstance(source, Scene) else source for source in self.sources]
             plan = replace(plan, sources=tuple(bare))
             work = [(number, self._scan(number, k)) for number, k in items]
         return spread(plan, work, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
@@ -205,24 +186,28 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Pla
 
 def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
     sizes = tuple(int(n) for n in problem.sizes)
-    targets, costs = targets_of(problem, solution)
+    targets, costs = _targets_of(problem, solution)
     return ScanAssociation(0, None, sizes, solution, targets, costs=costs)
+
+
+def _targets_of(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Tuples that are targets, and their costs."""
+    number = np.count_nonzero(solution.tuples, axis=1)
+    alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
+    real = (number >= 2) | alone_but_real
+    return solution.tuples[real], problem.costs[solution.indices[real]]
+
+
+def _without_scans(scene: Scene) -> Scene:
+    """The sensors and the region of a scene."""
+    empty = [[np.zeros((0, sensor.dim)) for sensor in scene.sensors]]
+    return Scene(scene.sensors, scene.times[:1], empty, region=scene.region)
 
 
 def _of_scan(
     scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution, speed: float | Sequence[float]
 ) -> ScanAssociation:
-    return _scan_of_targets(scene, scan, solution, *targets_of(problem, solution), speed)
-
-
-def _scan_of_targets(
-    scene: Scene,
-    scan: Scan,
-    solution: Solution,
-    targets: NDArray[np.int32],
-    costs: NDArray[np.float64],
-    speed: float | Sequence[float],
-) -> ScanAssociation:
+    targets, costs = _targets_of(problem, solution)
     positions, covariances = positions_and_covariances(scene, scan, targets, speed=speed)
     truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})

@@ -50,9 +50,6 @@ class ScanAssociation(Shown):
     compile_time : float
         Seconds of compiling or loading kernels for this scan, costs and positions included; not part of
         ``solution.runtime``.
-    gate_loss : float or None
-        Bound of the cost above the optimum of all tuples of negative cost, gated or not; infinite if unknown, None if
-        not requested.
     probabilities : array (T, 3) or None
         Probability of each target among all associations of the scan, if requested: lower bound, estimate, upper bound
         (``assoc.marginals``).
@@ -71,7 +68,6 @@ class ScanAssociation(Shown):
     ranked: tuple[ScanAssociation, ...] = ()
     pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
-    gate_loss: float | None = None
     probabilities: NDArray[np.float64] | None = None
 
     @property
@@ -119,8 +115,6 @@ class ScanAssociation(Shown):
             "runtime": solution.runtime,
             "compile_time": self.compile_time,
         }
-        if self.gate_loss is not None:
-            content["gate_loss"] = plain(self.gate_loss)
         if self.ranked:
             content["ranked"] = [{"rank": rank, **scan.to_dict()} for rank, scan in enumerate(self.ranked, start=1)]
         return content

@@ -39,10 +39,9 @@ def rows(
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
     truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
-    losses = any(scan.gate_loss is not None for scan in scans)
     headers = [*(["file"] if several else []), *_HEADERS]
     probable = any(scan.probabilities is not None for scan in scans)
-    headers += [*(["gate loss"] if losses else []), *(["least sure"] if probable else [])]
+    headers += [*(["least sure"] if probable else [])]
     headers += ["correct"] if truth else []
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
@@ -62,8 +61,6 @@ def rows(
             solution.status,
             f"{1e3 * solution.runtime:.2f}",
         ]
-        if losses:
-            row.append(_loss(scan))
         if probable:
             row.append("" if scan.least_probable is None else f"{scan.least_probable:.3f}")
         if truth:
@@ -76,13 +73,6 @@ def rows(
         kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
         headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
-
-
-def _loss(scan: ScanAssociation) -> str:
-    """Bound of the loss by gating; 0 within the tolerance of a certificate."""
-    if scan.gate_loss is None:
-        return ""
-    return "0" if scan.gate_loss <= 1e-6 * max(1.0, abs(scan.solution.cost)) else f"{scan.gate_loss:.2g}"
 
 
 def _short_names(files: Sequence[str]) -> list[str]:
@@ -101,14 +91,13 @@ def _lines(scans: Sequence[ScanAssociation], files: Sequence[str]) -> Iterator[t
 def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
     ranked = any(scan.ranked for scan in scans)
-    losses = any(scan.gate_loss is not None for scan in scans)
     probable = any(scan.probabilities is not None for scan in scans)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
         + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
-        + ["compile_time", *(["gate_loss"] if losses else []), *(["least_probable"] if probable else [])]
+        + ["compile_time", *(["least_probable"] if probable else [])]
     )
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
@@ -118,7 +107,6 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
             + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap]
             + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
             + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
-            + ([scan.gate_loss] if losses else [])
             + ([scan.least_probable] if probable else [])
         )
     return text.getvalue()

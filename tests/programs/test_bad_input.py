@@ -205,9 +205,7 @@ def test_a_failure_leaves_an_older_result_as_it_was(run, tmp_path, scene_fields)
     assert (tmp_path / "o.json").read_text() == "old"
 
 
-@pytest.mark.parametrize(
-    "words", [["--gate-probability", "0.9"], ["--max-tuples", "99"], ["--target-density", "auto"], ["--gate-loss"]]
-)
+@pytest.mark.parametrize("words", [["--gate-probability", "0.9"], ["--max-tuples", "99"], ["--target-density", "auto"]])
 def test_options_of_scenes_are_refused_for_problems(tmp_path, monkeypatch, capsys, words):
     monkeypatch.chdir(tmp_path)
     assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1]).save("p.npz")
