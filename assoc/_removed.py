@@ -18,6 +18,9 @@ _NOT_TOLD = "identities are evidence (identity=IdentityParameters()); those that
 _LOSS = "associate twice, with gate_probability 0.999 and 1, and compare costs"
 
 REMOVED: dict[str, str] = {
+    "assoc.integrations.stonesoup.AssocTracker": "make a scene by scene_from_detections, track it by assoc.tracking",
+    "assoc.integrations.stonesoup.TrackFusionTracker": "use assoc.tracking.fusion.TrackFusion on the tracks' states",
+    "assoc.integrations.stonesoup.RegistrationFeeder": "make a scene by scene_from_detections, for assoc.registration",
     "Tracker.odd_identities": _NOT_TOLD,
     "LatePlots.odd_identities": _NOT_TOLD,
     "Health.identities": _NOT_TOLD,

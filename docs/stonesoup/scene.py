@@ -36,8 +36,8 @@ prior = GaussianState(np.zeros((4, 1)), np.diag([0.0, 100.0, 0.0, 100.0]) ** 2, 
 pda = PDAHypothesiser(predictor, updater, clutter_spatial_density=3e-6, prob_detect=0.9, prob_gate=0.999)
 
 
-def make(seed, biases=((0.0, 0.0),) * 3):
-    """Detections, a set of each radar every 4 s, and true paths; biases of bearing (rad) and range (m)."""
+def make(seed):
+    """Detections, a set of each radar every 4 s, and true paths."""
     rng = np.random.default_rng(seed)
     paths, stream = [GroundTruthPath() for _ in TARGETS], []
     for k in range(20):
@@ -45,10 +45,10 @@ def make(seed, biases=((0.0, 0.0),) * 3):
         there[:, [0, 2]] += 4.0 * k * there[:, [1, 3]]
         for path, state in zip(paths, there, strict=True):
             path.append(GroundTruthState(state[:, None], timestamp=now))
-        for radar, bias in zip(RADARS, biases, strict=True):
+        for radar in RADARS:
             seen = there[rng.random(4) < 0.9]
             false = np.insert(rng.uniform(-5e3, 5e3, (rng.poisson(5), 2)), [1, 2], 0.0, axis=1)
-            noise = rng.normal(0, 1, (len(seen) + len(false), 2)) * [0.006, 30.0] + np.array(bias)
+            noise = rng.normal(0, 1, (len(seen) + len(false), 2)) * [0.006, 30.0]
             found = [
                 radar.function(State(x[:, None])) + z[:, None] for x, z in zip([*seen, *false], noise, strict=True)
             ]

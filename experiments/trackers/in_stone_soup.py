@@ -18,7 +18,7 @@ from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
 
 FOLDER = Path(__file__).parents[2] / "docs" / "stonesoup"
-EXAMPLES = ("associator", "initiator", "trackers", "registration", "track_fusion", "late", "fusion")
+EXAMPLES = ("associator", "initiator", "fusion")
 """Scripts that have `ways`, in the order of the page."""
 
 

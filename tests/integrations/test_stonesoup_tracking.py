@@ -245,7 +245,7 @@ def test_stone_soup_finds_the_plugin(tmp_path):
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
     (about / "entry_points.txt").write_text(f"[stonesoup.plugins]\nassoc = {points['assoc']}\n")
-    script = "from stonesoup.plugins.assoc import AssignmentInitiator, AssocTracker"
+    script = "from stonesoup.plugins.assoc import AssignmentInitiator, FusionFeeder"
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     printed("-W", "error", "-c", script, PYTHONPATH=path)
 
@@ -261,7 +261,7 @@ def test_every_example_is_on_the_page():
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [pytest.param(*one, marks=[] if one[0] == "trackers" else pytest.mark.slow) for one in PRINTED if one[1]],
+    [pytest.param(*one, marks=[] if one[0] == "fusion" else pytest.mark.slow) for one in PRINTED if one[1]],
 )
 def test_the_page_runs_as_printed(name, expected):
     """In a process of its own, as a user does; a GOSPA within a metre, since sets have another order each time."""

@@ -91,20 +91,14 @@ def _own_times(
     return [[np.array([(stamp - zero).total_seconds() for stamp in part]) for part in parts] for parts in stamps]
 
 
-def in_sets(detections: Iterable[tuple[datetime, Any]]) -> Iterator[tuple[datetime, list[Any]]]:
-    """Sets of detections that follow each other and have the same time."""
-    for time, group in groupby(detections, key=lambda pair: pair[0]):
-        yield time, [found for _, found in group]
-
-
 def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[list[Any]]]]:
-    """The same in order of time."""
+    """Sets of detections that follow each other and have the same time, in order of time."""
     previous: datetime | None = None
-    for time, sets in in_sets(detections):
+    for time, group in groupby(detections, key=lambda pair: pair[0]):
         if previous is not None and time < previous:
             raise InvalidInputError(f"detections: time {time} comes after {previous}, expected increasing times")
         previous = time
-        yield time, [list(found) for found in sets]
+        yield time, [list(found) for _, found in group]
 
 
 def region_of(frame: Frame, region: ArrayLike | None) -> Array:
