@@ -27,6 +27,7 @@ REMOVED: dict[str, str] = {
     "--tiles": "scans are solved in one piece, 10 million tuples in seconds",
     "--gate-loss": "solve twice, with --gate-probability 0.999 and 1, and compare costs",
     "associate(gate_loss)": _LOSS,
+    "--lines": "use --json, or --csv for a row a scan",
     "--slice": _ONE_PROCESS,
     "assoc.track --jobs": _ONE_PROCESS,
     "assoc.track --scheduler": _ONE_PROCESS,

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -34,14 +33,13 @@ from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.signals import EarlyEnd
 from assoc._cli.table import GrowingTable, print_table
 from assoc._cli.values import Output, csv_table, html_page, scan_range, whole
-from assoc._files.output import write_json, write_text, written_gradually
+from assoc._files.output import write_json, write_text
 from assoc._parameters import Parameter, parameters_of
 from assoc._system.cluster import LostError
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.solvers import registry
 
 if TYPE_CHECKING:
-    from assoc._cli.solver_log import SolverLog
     from assoc.association.association import Association, Totals
     from assoc.association.plan import Plan
     from assoc.association.scan import ScanAssociation
@@ -57,7 +55,6 @@ _GATING = [replace(COMMON[name], only=_SCENES) for name in ("gate_probability", 
 _SOLVER = Option("solver", "NAME", f"name of the solver (default {DEFAULT_SOLVER})")
 _SCANS = Option("scans", "A:B", "only scans A to B-1, counted from 0; A alone is one scan")
 _KBEST = Option("kbest", "K", "the K best associations of each scan, in order", whole(1))
-_LINES = Output(".jsonl", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
 _SHARED = [COMMON[name] for name in ("seed", "time_limit", "jobs", "scheduler")]
 _OF_FILE = (_SOLVER, *_SHARED, _SCANS, *_GATING, _KBEST)
 """Options that a TOML file may have."""
@@ -67,15 +64,13 @@ _OPTIONS = (
     Option("all", "", f"print all scans on a terminal, not only the first {_SHOWN}"),
     Option("json", "FILE", "write the result as JSON", Output(".json")),
     Option("csv", "FILE", "write the table as CSV", csv_table),
-    Option("lines", "FILE", "write each scan as it is done, and keep none in memory: .jsonl, a line a scan; or "
-           ".parquet, a row a target", _LINES),
     Option("report", "FILE", "write an HTML page: scene, association, convergence (needs assoc[report])", html_page),
     COMMON["config"],
     Option("proof", "FILE", "write a proof for 'assoc check' as JSON, and its problem beside it as .txt",
            Output(".json", strict=True, streams=False)),
     Option("marginals", "", "how probable each target is among all associations of its scan"),
     COMMON["import"],
-    *verbosity("all parameters, and how cost and bound change while a scan is solved"),
+    *verbosity("all parameters"),
 )  # fmt: skip
 
 
@@ -102,7 +97,6 @@ def _solve(words: list[str]) -> None:
 
 
 def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
-    from assoc._cli.solver_log import SolverLog
     from assoc.association.association import Totals
     from assoc.association.source import load_source
 
@@ -112,8 +106,7 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     given.check_use(_OPTIONS, input="scenes" if scenes else "problems, which have their tuples already")
     started = time.perf_counter()
     bar = ProgressBar("associating", "scans", shown=not given["quiet"])
-    log = SolverLog(bar, given["verbose"])
-    plan = _plan(sources, solver, parameters, given, log)
+    plan = _plan(sources, solver, parameters, given)
     items = _items(plan, given)
     if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
@@ -123,23 +116,17 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     # output to a pipe comes at the end, with all scans and columns: programs read it
     table = _ScanTable(sources, names, len(names) if given["all"] else _SHOWN) if sys.stdout.isatty() else None
     progress = with_progress(plan.run(items, jobs, given["scheduler"]), len(items), bar)
-    # with -v the log already has a line for each scan
-    watched = progress if table is None or given["verbose"] else table.watch(progress)
-    # all that needs the scans afterwards
-    kept = given["lines"] is None or any(given[name] for name in ("json", "csv", "report", "proof", "all"))
+    watched = progress if table is None else table.watch(progress)
     totals = Totals()
     scans: list[ScanAssociation] = []
     failed: LostError | LimitExceededError | None = None
     # other processes do not receive the request to end: their scans are abandoned
     patience = 0.0 if jobs > 1 or given["scheduler"] else _LAST_SCAN
-    with _written(given, sources) as write, _EARLY_END.work(patience):
+    with _EARLY_END.work(patience):
         try:
-            for (number, _), scan in zip(items, _until_asked(watched), strict=False):
-                log.end(scan)
+            for scan in _until_asked(watched):
                 totals.add(scan)
-                write(scan, number)
-                if kept or len(scans) < _SHOWN:
-                    scans.append(scan)
+                scans.append(scan)
         except (LostError, LimitExceededError) as error:
             # what is finished is written all the same
             failed = error
@@ -161,36 +148,6 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     if failed is not None:
         raise type(failed)(f"{failed}; {done} of {len(items)} scans are finished and written")
     _EARLY_END.say(f"{done} of {len(items)} scans are finished and written")
-
-
-@contextmanager
-def _written(given: Given, sources: Sequence[Source]) -> Iterator[Callable[[ScanAssociation, int], object]]:
-    """A function that writes a scan of one of the sources at once."""
-    path, files = given["lines"], given["files"]
-    if path is None:
-        yield lambda scan, number: None
-    elif _LINES.ending(path) == ".parquet":
-        from assoc._files.tables import table_writer
-        from assoc.association.association import frame_of_scan
-
-        count = max(len(source.sizes) if hasattr(source, "sizes") else len(source.sensors) for source in sources)
-        with table_writer(path) as writer:
-
-            def add(scan: ScanAssociation, number: int) -> None:
-                frame = frame_of_scan(scan, count)
-                writer.add(frame if len(files) == 1 else frame.assign(file=files[number]))
-
-            yield add
-    else:
-        import json
-
-        with written_gradually(path) as file:
-
-            def add_line(scan: ScanAssociation, number: int) -> None:
-                of_file = {} if len(files) == 1 else {"file": files[number]}
-                file.write(json.dumps({**scan.to_dict(), **of_file}, allow_nan=False).encode() + b"\n")
-
-            yield add_line
 
 
 def _until_asked(scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
@@ -249,7 +206,7 @@ def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) ->
     }
 
 
-def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given: Given, log: SolverLog) -> Plan:
+def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given: Given) -> Plan:
     from assoc.association.plan import Plan
 
     return Plan(
@@ -259,7 +216,6 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
         gating=given.some(parameter.name for parameter in _GATING),
         pheromone=given["report"] is not None,
         marginals=bool(given["marginals"]),
-        watch=log,
         **given.some(("seed", "time_limit", "kbest")),
     )
 
@@ -352,8 +308,6 @@ def _print(
         table.finish(association, total["scans"])
     else:
         _print_table(association.scans, names, brief=False)
-        if total["scans"] > len(association.scans):
-            print_lines(f"... and {total['scans'] - len(association.scans)} more scans")
     print()
     print_lines(totals.summary(association.solver))
     solving, compiling = total["runtime"], total["compile_time"]

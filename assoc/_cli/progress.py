@@ -25,8 +25,6 @@ class ProgressBar:
 
     def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit
-        self.note = ""
-        """Text below the bar."""
         self.done = 0
         """Number of items that are done."""
         self._progress: Any = None
@@ -44,16 +42,13 @@ class ProgressBar:
             )
             from rich.text import Text
 
-            bar = self
-
             class WithNote(Progress):
-                """Shows the note below the bar, or why the first scans take so long."""
+                """Says below the bar why the first scans take so long."""
 
                 def get_renderables(self) -> Any:
                     yield self.make_tasks_table(self.tasks)
-                    note = "compiling, once after installation" if is_compiling(_SOON) else bar.note
-                    if note:
-                        yield Text(note, overflow="ellipsis", no_wrap=True)
+                    if is_compiling(_SOON):
+                        yield Text("compiling, once after installation", overflow="ellipsis", no_wrap=True)
 
             self._progress = WithNote(
                 TextColumn("{task.description}"),

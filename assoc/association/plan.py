@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -19,13 +19,12 @@ from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.costs.range_rates import SPEED
 from assoc.errors import InvalidInputError
-from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
 from assoc.ranking.marginals import marginals
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.solution import Solution, TracePoint
+from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.aco.pheromone_history import PheromoneHistory, pheromone
 from assoc.solvers.assign import assign
@@ -54,8 +53,6 @@ class Plan:
     """Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver."""
     pheromone: bool = False
     """Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it."""
-    watch: Callable[[int, TracePoint], object] | None = None
-    """Called with the number of a scan and each TracePoint of its solver, in this process only."""
     marginals: bool = False
 
     def __post_init__(self) -> None:
@@ -73,8 +70,7 @@ class Plan:
     def __reduce__(self) -> Any:
         # another process must be given solvers that were registered in this one
         names = () if self.kbest is not None else (self.solver,)
-        alone = replace(self, watch=None)
-        return _received, (registry.own(names), tuple(getattr(alone, field.name) for field in fields(self)))
+        return _received, (registry.own(names), tuple(getattr(self, field.name) for field in fields(self)))
 
     @property
     def all_parameters(self) -> dict[str, Any]:
@@ -89,7 +85,7 @@ class Plan:
         source, scan = self.sources[item[0]], item[1]
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
-            solutions, history = self._solve(source, self.seed, 0)
+            solutions, history = self._solve(source, self.seed)
             found = [_of_problem(source, solution) for solution in solutions]
             return self._best(self._with_probabilities(source, found), history, compiled)
         return self.associate(source, scan if isinstance(scan, Scan) else source.scan(scan))
@@ -100,7 +96,7 @@ class Plan:
         # a seed for each scan that depends on neither the process nor the scans before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
-        solutions, history = self._solve(problem, seed, scan.index)
+        solutions, history = self._solve(problem, seed)
         # a position at another time than the measurements' depends on how fast targets usually fly
         speed = self.gating.get("speed", SPEED)
         scans = [_of_scan(scene, scan, problem, solution, speed) for solution in solutions]
@@ -125,20 +121,15 @@ class Plan:
         return build_problem(source, source.scan(item[1]), **self.gating)
 
     def _solve(
-        self, problem: AssignmentProblem, seed: int | np.random.SeedSequence, scan: int
+        self, problem: AssignmentProblem, seed: int | np.random.SeedSequence
     ) -> tuple[list[Solution], PheromoneHistory | None]:
         if self.kbest is not None:
             return kbest(problem, self.kbest, time_limit=self.time_limit), None
-        common: Any = {"seed": seed, "time_limit": self.time_limit, "callback": self._callback(scan)}
+        common: Any = {"seed": seed, "time_limit": self.time_limit}
         if self.pheromone and self.solver == "aco":
             history = pheromone(problem, **common, **self.parameters).top(_NODES)
             return [history.solution], history
         return [assign(problem, self.solver, **common, **self.parameters)], None
-
-    def _callback(self, scan: int) -> Callback | None:
-        """Return the callback for each TracePoint of a scan; it never stops the solver."""
-        watch = self.watch
-        return None if watch is None else lambda point: watch(scan, point) and None
 
     def _best(self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float) -> ScanAssociation:
         """Return the first of ranked associations, which holds all of them, if requested."""
@@ -158,8 +149,7 @@ class Plan:
             raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
         # enough batches that processes end at about the same time
         together = max(1, min(_TOGETHER, len(items) // (16 * int(jobs))))
-        # what other processes do is not watched
-        plan = self if jobs == 1 and scheduler is None else replace(self, watch=None)
+        plan = self
         work: Sequence[tuple[int, int | Scan]] = items
         if jobs > 1 and scheduler is None and self.gating.get("target_density") != "auto":
             # a process is sent the scans that it solves; "auto" is found from all of them

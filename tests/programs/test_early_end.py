@@ -10,9 +10,6 @@ import time
 
 import pytest
 
-from assoc._cli.progress import ProgressBar
-from assoc._cli.solver_log import SolverLog
-from assoc.association.plan import Plan
 from assoc.packing.run import Run
 from assoc.simulation import simulate
 from tests.running import process
@@ -106,10 +103,10 @@ def solve(packing, parameters, run):
     start, _, end = ASLEEP.partition("def solve")
     rest = end[end.index("    return") :]
     (work / "asleep.py").write_text(start + slow + rest)
-    words = ["solve", "scene.npz", "--import", "asleep", "--solver", "asleep", "--lines", "o.jsonl"]
+    words = ["solve", "scene.npz", "--import", "asleep", "--solver", "asleep", "--json", "o.json"]
     code, _, errors = interrupted(words, work, "scan 3")
     assert (code, errors) == (130, "assoc.solve: interrupted; 2 of 5 scans are finished and written\n")
-    assert len((work / "o.jsonl").read_text().splitlines()) == 2
+    assert len(json.loads((work / "o.json").read_text())["scans"]) == 2
 
 
 @pytest.mark.slow
@@ -133,29 +130,6 @@ def test_tracks_that_are_finished_are_written(work):
     # a tracker may call its solver twice in a scan
     assert 1 <= int(told[1]) <= 3 and f"{told[1]} scans" in out
     assert (work / "t.csv").read_text().startswith("track_id") and (work / "t.html").exists()
-
-
-def test_a_solver_tells_how_far_it_is(capsys):
-    """The log has the last line of every scan, and of long ones the history in between."""
-    scene = simulate("three-radar", 2, scans=3)
-    log = SolverLog(ProgressBar("associating", "scans", shown=False), verbose=True)
-    heard = []
-
-    def watch(scan, point):
-        heard.append((scan, point.cost))
-        log(scan, point._replace(seconds=10.0 * len(heard)))
-
-    plan = Plan((scene,), "exact", watch=watch)
-    for one in plan.run(plan.items()):
-        log.end(one)
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[0].split() == ["scan", "seconds", "iteration", "cost", "bound", "gap"]
-    ends = [line.split() for line in lines if line.endswith("optimal")]
-    assert [row[0] for row in ends] == ["0", "1", "2"]
-    assert {scan for scan, _ in heard} == {0, 1, 2} and len(lines) == 1 + len(heard) + 3
-    for row, one in zip(ends, plan.run(plan.items()), strict=True):
-        assert float(row[3]) == pytest.approx(one.solution.cost, abs=1e-4)
-        assert float(row[4]) == pytest.approx(one.solution.lower_bound, abs=1e-4)
 
 
 def test_long_searches_tell_where_they_are():

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 
-import pandas as pd
 import pytest
 
 import assoc
@@ -61,44 +60,6 @@ def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
         results.append(content(path))
     assert results[0] == results[1]
     assert results[0]["seed"] == 3 and results[0]["parameters"]["mode"] == "paper"
-
-
-def test_scans_are_written_as_they_come(scene_file, tmp_path, capsys):
-    from assoc.association.association import Association
-    from assoc.solve import main
-
-    expected = assoc.associate(assoc.Scene.load(scene_file), "greedy")
-    for name in ("o.jsonl", "o.parquet"):
-        assert main([str(scene_file), "--solver", "greedy", "--lines", str(tmp_path / name)]) == 0
-        assert expected.summary().splitlines()[1] in capsys.readouterr().out
-    lines = [json.loads(line) for line in (tmp_path / "o.jsonl").read_text().splitlines()]
-    whole = expected.to_dict()["scans"]
-    for one in (*lines, *whole):
-        del one["runtime"], one["compile_time"]
-    assert lines == whole
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "o.parquet"), expected.to_frame())
-    # two files, and scans whose rows fill no group
-    assert main([*[str(scene_file)] * 2, "--solver", "greedy", "--lines", str(tmp_path / "two.parquet")]) == 0
-    assert len(pd.read_parquet(tmp_path / "two.parquet")) == 2 * len(expected.to_frame())
-    assert Association((), "greedy").totals()["scans"] == 0
-
-
-def test_scans_that_were_written_are_not_kept(scene_file, tmp_path):
-    import gc
-
-    from assoc.association.association import ScanAssociation
-    from assoc.solve import main
-    from assoc.solvers import Outcome, registry
-
-    living = []
-
-    def count(packing, parameters, run):
-        living.append(sum(type(one) is ScanAssociation for one in gc.get_objects()))
-        return Outcome([], 1)
-
-    registry.register("count", registry.parameters("greedy"), count)
-    assert main([*[str(scene_file)] * 10, "--solver", "count", "--lines", str(tmp_path / "o.jsonl"), "-q"]) == 0
-    assert len(living) == 60 and max(living) - living[0] <= 22
 
 
 @pytest.mark.slow
