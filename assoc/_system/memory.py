@@ -1,23 +1,19 @@
 """Available memory, and refusal of work that would take more.
 
-The limit is the least of what is left of the machine's memory, of the control group's (a container), and of the address
-space (``ulimit -v``). A constant would be too small for a server and too large for a laptop. Where the system gives no
-figures nothing is refused.
+The limit is the lesser of what is left of the machine's memory and of the address space (``ulimit -v``). A constant
+would be too small for a server and too large for a laptop. Where the system gives no figures nothing is refused.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from assoc.errors import LimitExceededError
 
 # below this the system is not asked
 _SMALL = 64 * 1024**2
-# the kernel's value for a control group without a limit
-_ENDLESS = 1 << 60
 # reserve for what estimates leave out
 _SHARE = 0.9
 
@@ -51,7 +47,7 @@ def at_most(count: int, each: float) -> int:
 
 def available(here: bool = True) -> float:
     """Bytes that this process (or others that it starts) may still take; infinite where the system gives no figures."""
-    return _SHARE * max(min(_of_machine(), _of_group(), _of_address_space() if here else math.inf), 0.0)
+    return _SHARE * max(min(_of_machine(), _of_address_space() if here else math.inf), 0.0)
 
 
 def in_words(count: float) -> str:
@@ -77,60 +73,6 @@ def _of_machine() -> float:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):
         return math.inf
-
-
-def _of_group() -> float:
-    return min(_left_in_groups(_groups()), default=math.inf)
-
-
-def _left_in_groups(groups: Iterable[tuple[str, str, str, str, bytes]]) -> Iterator[float]:
-    """Bytes left in the control group of this process and in the groups that contain it."""
-    for root, path, limit, usage, cache in groups:
-        folder = root + path
-        while True:
-            most = _number(f"{folder}/{limit}")
-            used = _number(f"{folder}/{usage}")
-            if most is not None and used is not None and most < _ENDLESS:
-                yield most - used + _reclaimable(f"{folder}/memory.stat", cache)
-            if len(folder) <= len(root):
-                break
-            folder = folder.rpartition("/")[0]
-
-
-def _groups() -> Iterator[tuple[str, str, str, str, bytes]]:
-    """Folder of the hierarchy, path within it, file names of limit and usage, and field of the reclaimable cache."""
-    try:
-        lines = Path("/proc/self/cgroup").read_text().splitlines()
-    except OSError:
-        return
-    for line in lines:
-        _, _, rest = line.partition(":")
-        names, _, path = rest.partition(":")
-        path = path.rstrip("/")
-        if not names:
-            yield "/sys/fs/cgroup", path, "memory.max", "memory.current", b"inactive_file"
-        elif "memory" in names.split(","):
-            yield (
-                "/sys/fs/cgroup/memory", path, "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file",
-            )  # fmt: skip
-
-
-def _number(path: str) -> float | None:
-    try:
-        return float(Path(path).read_bytes())
-    except (OSError, ValueError):  # no such file, or "max"
-        return None
-
-
-def _reclaimable(path: str, name: bytes) -> float:
-    try:
-        for line in Path(path).read_bytes().splitlines():
-            key, _, value = line.partition(b" ")
-            if key == name:
-                return float(value)
-    except (OSError, ValueError):
-        pass
-    return 0.0
 
 
 def _of_address_space() -> float:

@@ -63,19 +63,6 @@ def test_an_address_space_limit_counts() -> None:
     assert re.search(r"LimitExceededError: tuples = 3 would take about 1\.95 GB of memory, .* available; take f", last)
 
 
-def test_control_groups_count(tmp_path: Path) -> None:
-    """Of a group and those around it the one with least left decides; cache that can be given back is no use of it."""
-    inner = tmp_path / "a" / "b"
-    inner.mkdir(parents=True)
-    groups = ((inner, "max", 5, 0), (inner.parent, "1000", 900, 300), (tmp_path, "2000", 1, 0))
-    for folder, most, used, cache in groups:
-        (folder / "memory.max").write_text(f"{most}\n")
-        (folder / "memory.current").write_text(f"{used}\n")
-        (folder / "memory.stat").write_text(f"anon 7\ninactive_file {cache}\n")
-    group = (str(tmp_path), "/a/b", "memory.max", "memory.current", b"inactive_file")
-    assert list(memory._left_in_groups([group])) == [400.0, 1999.0]
-
-
 # --- refusals ---------------------------------------------------------------------------------------------------
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
