@@ -131,7 +131,7 @@ def _call(task: Callable[[Any], Any], item: tuple[int, Any]) -> tuple[int, Any]:
 
 
 def dask_map(task: Callable[[Any], Any], items: Iterable[Any], address: str, *, ordered: bool = True) -> Generator[Any]:
-    """Yield ``task(item)`` for each item, from the workers of the scheduler at ``address``; see `engine.spread`.
+    """Yield ``task(item)`` for each item, from the workers of the scheduler at ``address``; see `engine.parallel_map`.
 
     The task is sent to every worker once. Workers may come and go: the items of a lost worker are repeated by another.
     `LostError` if the connection is lost, or workers in several attempts at an item.

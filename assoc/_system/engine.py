@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any
 
 from assoc._system.cluster import dask_map
-from assoc._system.processes import parallel_map
+from assoc._system.processes import process_map
 
 
 class _Batch:
@@ -20,7 +20,7 @@ class _Batch:
         return [self.task(item) for item in items]
 
 
-def spread(
+def parallel_map(
     task: Callable[[Any], Any],
     items: Iterable[Any],
     *,
@@ -47,9 +47,9 @@ def spread(
     if together > 1 and not alone:
         left = iter(items)
         batches = list(iter(lambda: list(islice(left, together)), []))
-        for results in spread(_Batch(task), batches, jobs=jobs, scheduler=scheduler, ordered=ordered, here=here):
+        for results in parallel_map(_Batch(task), batches, jobs=jobs, scheduler=scheduler, ordered=ordered, here=here):
             yield from results
     elif scheduler is None:
-        yield from parallel_map(task, items, jobs, ordered=ordered, here=here)
+        yield from process_map(task, items, jobs, ordered=ordered, here=here)
     else:
         yield from dask_map(task, items, scheduler, ordered=ordered)

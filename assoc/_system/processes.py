@@ -67,10 +67,10 @@ class _Exchange:
             self.left.put(None)
 
 
-def parallel_map(
+def process_map(
     task: Callable[[Any], Any], items: Iterable[Any], jobs: int, *, ordered: bool = True, here: bool = False
 ) -> Generator[Any]:
-    """Yield ``task(item)`` for each item, made by ``jobs`` processes; the rest is as of `engine.spread`."""
+    """Yield ``task(item)`` for each item, made by ``jobs`` processes; the rest is as of `engine.parallel_map`."""
     if isinstance(items, Sized):
         jobs = min(jobs, len(items))
     if jobs <= 1:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assoc._parameters import whole_seed
 from assoc._system.compile_time import compile_seconds
-from assoc._system.engine import spread
+from assoc._system.engine import parallel_map
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
@@ -156,7 +156,7 @@ class Plan:
             bare = [_without_scans(source) if isinstance(source, Scene) else source for source in self.sources]
             plan = replace(plan, sources=tuple(bare))
             work = [(number, self._scan(number, k)) for number, k in items]
-        return spread(plan, work, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
+        return parallel_map(plan, work, jobs=int(jobs), scheduler=scheduler, together=together, here=True)
 
     def _scan(self, number: int, k: int) -> int | Scan:
         source = self.sources[number]

@@ -12,7 +12,7 @@ from typing import Any
 from assoc._parameters import checked_time_limit, is_whole, whole_seed
 from assoc._system.cluster import LostError
 from assoc._system.door import doors
-from assoc._system.engine import spread
+from assoc._system.engine import parallel_map
 from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
@@ -198,7 +198,7 @@ class Study(Shown):
         job = Job(tuple(self.sources), self.manifest)
         batches = Batches(self.settings, self.missing(done), batch_seconds or (0.2 if scheduler is None else 0.5))
         work = partial(run_batch, job)
-        results = spread(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
+        results = parallel_map(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
         try:
             for result in results:
                 new = store.append(result.batch.settings, result.rows)

@@ -138,7 +138,7 @@ def test_processes_are_sent_the_scans_that_they_solve(monkeypatch):
         sent.extend([task, *items])
         return map(task, items)
 
-    monkeypatch.setattr("assoc.association.plan.spread", spread)
+    monkeypatch.setattr("assoc.association.plan.parallel_map", spread)
     for gating in ({}, {"target_density": "auto"}):
         plan = Plan((scene,), "greedy", gating=gating)
         sent.clear()

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import Parameters
-from assoc._system.processes import parallel_map
+from assoc._system.processes import process_map
 from assoc.errors import AssocWarning, InfeasibleError
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
@@ -337,7 +337,7 @@ def main(arguments: list[str] | None = None) -> int:
     kinds: Counter[str] = Counter()
     numbers = range(chosen.start, chosen.start + chosen.count)
     started = said = time.perf_counter()
-    judged = parallel_map(Judge(chosen.seed, names), numbers, chosen.processes)
+    judged = process_map(Judge(chosen.seed, names), numbers, chosen.processes)
     for number, (structure, temper, lines) in zip(numbers, judged, strict=True):
         for line in lines:
             kind = f"[{temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))

@@ -19,7 +19,7 @@ import pytest
 
 from assoc._files.npz import save_npz
 from assoc._files.output import write_atomically
-from assoc._system.processes import leave, parallel_map, send, start_python
+from assoc._system.processes import leave, process_map, send, start_python
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.simulation import simulate
 from tests.running import process
@@ -107,7 +107,7 @@ def test_a_killed_worker_is_one_clear_line(tmp_path):
 
 def test_a_worker_that_dies_is_an_error_of_the_library():
     with pytest.raises(LimitExceededError, match="worker process died"):
-        list(parallel_map(os._exit, [1, 1], 2))
+        list(process_map(os._exit, [1, 1], 2))
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
@@ -124,7 +124,7 @@ def test_a_worker_that_dies_before_it_has_read_a_large_task():
     killer = threading.Thread(target=kill)
     killer.start()
     with pytest.raises(LimitExceededError, match="worker process died"):
-        list(parallel_map(large, [1, 2], 2))
+        list(process_map(large, [1, 2], 2))
     killer.join()
 
 
@@ -133,9 +133,9 @@ def test_functions_of_a_script_and_what_they_print(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import pathlib, sys\n"
-        "from assoc._system.processes import parallel_map\n"
+        "from assoc._system.processes import process_map\n"
         "sys.path.append(pathlib.Path())\n"
-        "print([*parallel_map(lambda item: sys.stdout.write('said\\n') and 2 * item, range(5), 2)])\n"
+        "print([*process_map(lambda item: sys.stdout.write('said\\n') and 2 * item, range(5), 2)])\n"
     )
     done = process(script)
     assert (done.returncode, done.stdout, done.stderr) == (0, "[0, 2, 4, 6, 8]\n", "said\n" * 5)
@@ -145,7 +145,7 @@ def test_what_other_processes_cannot_import_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "only_here", types.ModuleType("only_here"))
     exec("def task(item): pass", vars(sys.modules["only_here"]))
     with pytest.raises(InvalidInputError, match="jobs: .* cannot be imported by other processes .*only_here"):
-        list(parallel_map(sys.modules["only_here"].task, [1, 2], 2))
+        list(process_map(sys.modules["only_here"].task, [1, 2], 2))
 
 
 def test_a_process_that_is_to_leave_finishes_what_it_is_at(tmp_path):
@@ -163,5 +163,5 @@ def test_a_process_that_is_to_leave_finishes_what_it_is_at(tmp_path):
 
 def test_an_error_comes_back_with_where_it_came_from():
     with pytest.raises(ZeroDivisionError) as raised:
-        list(parallel_map(partial(operator.floordiv, 1), [1, 0], 2))
+        list(process_map(partial(operator.floordiv, 1), [1, 0], 2))
     assert "_answer" in raised.value.__notes__[0]

@@ -122,11 +122,11 @@ def test_solvers_refuse_what_their_arguments_cost(
 
 
 def test_processes_are_counted(little: Callable[[float], None]) -> None:
-    from assoc._system.processes import parallel_map
+    from assoc._system.processes import process_map
 
     little(1e9)
     with pytest.raises(LimitExceededError, match="jobs: 300 processes would take about 30 GB"):
-        list(parallel_map(abs, range(300), 10**6))
+        list(process_map(abs, range(300), 10**6))
 
 
 def test_repeats_are_not_written_down() -> None:

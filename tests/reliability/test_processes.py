@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import assoc
-from assoc._system.processes import parallel_map
+from assoc._system.processes import process_map
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.simulation import simulate
@@ -202,7 +202,7 @@ def test_an_interrupt_can_leave_no_lock_locked():
     sys.setprofile(look)
     try:
         choices = [{"ordered": ordered, "here": here} for here in (False, True) for ordered in (True, False)]
-        found = [list(parallel_map(abs, range(-40, 0), 2, **choice)) for choice in choices]
+        found = [list(process_map(abs, range(-40, 0), 2, **choice)) for choice in choices]
     finally:
         sys.setprofile(before)
     assert found[0] == found[2] == list(range(40, 0, -1))
@@ -225,14 +225,14 @@ def test_this_process_works_while_others_start(tmp_path):
 
     for ordered in (True, False):
         there.unlink(missing_ok=True)
-        found = list(parallel_map(task, range(40), 2, ordered=ordered, here=True))
+        found = list(process_map(task, range(40), 2, ordered=ordered, here=True))
         assert sorted(item for item, _ in found) == list(range(40)) and found[0] == (0, here)
         assert len({process for _, process in found}) == 2
         assert not ordered or [item for item, _ in found] == list(range(40))
 
 
 def test_an_error_here_is_raised_in_its_turn():
-    results = parallel_map(lambda item: 1 / (item - 3), range(40), 2, here=True)
+    results = process_map(lambda item: 1 / (item - 3), range(40), 2, here=True)
     assert [next(results) for _ in range(3)] == [1 / -3, 1 / -2, -1.0]
     with pytest.raises(ZeroDivisionError):
         next(results)
@@ -255,7 +255,7 @@ def test_what_others_have_done_is_handed_on_when_this_process_is_interrupted(tmp
 
     found = []
     with pytest.raises(KeyboardInterrupt):
-        for result in parallel_map(task, range(40), 2, ordered=ordered, here=True):
+        for result in process_map(task, range(40), 2, ordered=ordered, here=True):
             found.append(result)
     # item 0 was done here, and item 1 was at work
     assert found == [0] if ordered else len(found) > 1

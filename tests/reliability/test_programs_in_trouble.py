@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from assoc._system.processes import parallel_map
+from assoc._system.processes import process_map
 from assoc.errors import InvalidInputError
 from assoc.simulation import simulate
 from tests.reliability.test_faults import PYTHON, children
@@ -171,4 +171,4 @@ def alive(pid):
 )
 def test_what_cannot_be_sent_is_one_clear_line(task, item):
     with pytest.raises(InvalidInputError, match="jobs: cannot be sent from one process to another"):
-        list(parallel_map(task, [item, item], 2))
+        list(process_map(task, [item, item], 2))
