@@ -31,7 +31,7 @@ from assoc._cli.options import (
 from assoc._cli.program import Program, command, write_all
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.signals import EarlyEnd
-from assoc._cli.table import GrowingTable, print_table
+from assoc._cli.table import print_table
 from assoc._cli.values import Output, csv_table, html_page, scan_range, whole
 from assoc._files.output import write_json, write_text
 from assoc._parameters import Parameter, parameters_of
@@ -113,10 +113,7 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     if given["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     names = [files[number] for number, _ in items]
-    # output to a pipe comes at the end, with all scans and columns: programs read it
-    table = _ScanTable(sources, names, len(names) if given["all"] else _SHOWN) if sys.stdout.isatty() else None
     progress = with_progress(plan.run(items, jobs, given["scheduler"]), len(items), bar)
-    watched = progress if table is None else table.watch(progress)
     totals = Totals()
     scans: list[ScanAssociation] = []
     failed: LostError | LimitExceededError | None = None
@@ -124,7 +121,7 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     patience = 0.0 if jobs > 1 or given["scheduler"] else _LAST_SCAN
     with _EARLY_END.work(patience):
         try:
-            for scan in _until_asked(watched):
+            for scan in _until_asked(progress):
                 totals.add(scan)
                 scans.append(scan)
         except (LostError, LimitExceededError) as error:
@@ -143,7 +140,7 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
         (given["csv"], lambda: _write_csv(given["csv"], found, names)),
         (given["report"], lambda: _write_report(given, found, of_items, names)),
         (given["proof"], lambda: _write_proof(given["proof"], plan, found, items)),
-        (given, lambda: _print(found, totals, names, elapsed, table)),
+        (given, lambda: _print(found, totals, names, elapsed, given["all"])),
     )
     if failed is not None:
         raise type(failed)(f"{failed}; {done} of {len(items)} scans are finished and written")
@@ -265,34 +262,6 @@ def _problem_beside(proof: str) -> str:
     return f"{proof.removesuffix('.json')}.txt"
 
 
-class _ScanTable:
-    """The table on a terminal: each row is printed as soon as its scan is done, if the terminal is wide enough."""
-
-    def __init__(self, sources: Sequence[Source], names: list[str], most: int) -> None:
-        self._names = names
-        self._most = most
-        self._truth = any(getattr(source, "truth", None) is not None for source in sources)
-        self._growing: GrowingTable | None = None
-
-    def watch(self, scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
-        """Yield each scan after printing its row."""
-        from assoc.association.table import LEFT_ALIGNED, WIDTHS, rows
-
-        for number, scan in enumerate(scans):
-            headers, cells = rows([scan], self._names, first=number, truth=self._truth, brief=True)
-            if self._growing is None:
-                self._growing = GrowingTable(headers, WIDTHS, LEFT_ALIGNED, self._most)
-            self._growing.add(cells)
-            yield scan
-
-    def finish(self, association: Association, total: int) -> None:
-        """Print the remaining rows."""
-        if self._growing is None or not self._growing.fits:
-            _print_table(association.scans[: self._most], self._names, brief=True)
-        if total > self._most:
-            print_lines(f"... and {total - self._most} more scans (--all shows them)")
-
-
 def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: bool) -> None:
     from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
@@ -300,14 +269,14 @@ def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: b
     print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
 
 
-def _print(
-    association: Association, totals: Totals, names: list[str], elapsed: float, table: _ScanTable | None
-) -> None:
-    total = totals.sums()
-    if table is not None:
-        table.finish(association, total["scans"])
-    else:
-        _print_table(association.scans, names, brief=False)
+def _print(association: Association, totals: Totals, names: list[str], elapsed: float, everything: bool) -> None:
+    total, scans = totals.sums(), association.scans
+    # a pipe gets all scans and columns: programs read it
+    brief = sys.stdout.isatty()
+    shown = _SHOWN if brief and not everything else len(scans)
+    _print_table(scans[:shown], names, brief=brief)
+    if len(scans) > shown:
+        print_lines(f"... and {len(scans) - shown} more scans (--all shows them)")
     print()
     print_lines(totals.summary(association.solver))
     solving, compiling = total["runtime"], total["compile_time"]

@@ -21,7 +21,6 @@ from assoc._cli.messages import messages
 from assoc._cli.options import Given, Parser
 from assoc._cli.program import Program, command, prepare_streams
 from assoc._cli.progress import ProgressBar, with_progress
-from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import EarlyEnd
 from assoc._cli.track.options import (
     OF_PLOTS,
@@ -170,9 +169,7 @@ def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = No
 
     (tracks, decisions), count = _watched(
         given,
-        tracker,
         range(scene.num_scans),
-        lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
         lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans, identities=identities),
         scene.num_scans,
     )
@@ -234,9 +231,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         return track_plots(tracker, recording, scans, confirmed=not given["all"], smooth=given["smooth"])
 
     turns = 1 + (survey.last - survey.first) / windows.rotation
-    judged, count = _watched(
-        given, tracker, windows, lambda window: (window.times[-1], [len(window)]), track, total=math.ceil(turns)
-    )
+    judged, count = _watched(given, windows, track, total=math.ceil(turns))
     if isinstance(judged, PlotTracks):
         plots, table = judged, judged.table
         table.origin = given["origin"]
@@ -300,16 +295,14 @@ def _ended_tracks(given: Given, stored: StoredPlots, outputs: ExitStack) -> Ende
 
 def _watched(
     given: Given,
-    tracker: Tracker,
     scans: Iterable[Any],
-    describe: Callable[[Any], tuple[float, Sequence[int]]],
     track: Callable[[Iterator[Any]], Any],
     total: int,
 ) -> tuple[Any, int]:
     """Track the scans and show progress; returns the result, and how many of them were tracked."""
     bar = ProgressBar("tracking", "scans", shown=not given["quiet"])
     with _EARLY_END.work(_LAST_SCAN):
-        found = track(with_scan_table(with_progress(scans, total, bar), tracker, describe))
+        found = track(with_progress(scans, total, bar))
     bar.close()
     if not bar.done:
         _EARLY_END.say("")

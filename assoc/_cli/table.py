@@ -1,20 +1,21 @@
-"""Text tables: plain columns into a pipe; on a terminal fitted to its width without cutting any cell."""
+"""Text tables, fitted to at most 80 columns on a terminal and 120 in a pipe without cutting any cell."""
 
 from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from assoc._text.plain import printable
 
 _BETWEEN = "  "
+_TERMINAL, _PIPE = 80, 120
 # headers longer than this are broken between words if a table is too wide
 _SHORT = 5
 
 
 class _Layout:
-    """Columns as wide as their cells, and at least as wide as requested; callers select columns by index."""
+    """Columns as wide as their cells; callers select columns by index."""
 
     def __init__(
         self,
@@ -23,14 +24,12 @@ class _Layout:
         left: Sequence[str],
         *,
         broken: bool = False,
-        least: Mapping[str, int] | None = None,
     ) -> None:
         self.headers = [header.split(" ") if broken and len(header) > _SHORT else [header] for header in headers]
         self.rows = [[printable(cell) for cell in row] for row in rows]
         self.left = [header in left for header in headers]
         self.widths = [
-            max(*map(len, header), *(len(row[i]) for row in self.rows), (least or {}).get(headers[i], 0))
-            for i, header in enumerate(self.headers)
+            max(*map(len, header), *(len(row[i]) for row in self.rows)) for i, header in enumerate(self.headers)
         ]
         self.every = [*range(len(headers))]
 
@@ -66,14 +65,16 @@ def print_table(
 ) -> None:
     """Print a table to stdout.
 
-    Headers of a table that is too wide for the terminal are broken into several lines. If that is not enough the table
-    is split into several, one below the other, each beginning with the first `keys` columns; or each row is printed as
-    a list. Columns named in `left` are left-aligned, those in `joined` stay beside the column before them.
+    It is at most 80 columns wide on a terminal, 120 in a pipe. Headers of a table that is too wide are broken into
+    several lines. If that is not enough the table is split into several, one below the other, each beginning with the
+    first `keys` columns; or each row is printed as a list. Columns named in `left` are left-aligned, those in `joined`
+    stay beside the column before them.
     """
-    if sys.stdout.isatty():
-        lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
+    plain, terminal = _Layout(headers, rows, left), sys.stdout.isatty()
+    most = min(shutil.get_terminal_size().columns, _TERMINAL) if terminal else _PIPE
+    if terminal or plain.width(plain.every) > most:
+        lines = fitted_lines(headers, rows, most, keys=keys, left=left, joined=joined)
     else:
-        plain = _Layout(headers, rows, left)
         lines = plain.lines(plain.every, ruled=False)
     for line in lines:
         print(line)
@@ -120,33 +121,3 @@ def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[s
         yield from ([""] if number else [])
         for header, cell in zip(headers, row, strict=True):
             yield f"{header.ljust(wide)}{_BETWEEN}{cell}"
-
-
-class GrowingTable:
-    """A table on a terminal whose rows are printed as they come, `most` times; the first row sets the widths.
-
-    `widths` are what later cells may need, by header; columns named in `left` are left-aligned.
-    """
-
-    def __init__(self, headers: Sequence[str], widths: Mapping[str, int], left: Sequence[str], most: int) -> None:
-        self._headers, self._widths, self._left, self._most = headers, widths, left, most
-        self._layout: _Layout | None = None
-        self.fits = True
-        """Whether the terminal is wide enough; otherwise nothing is printed. Known after the first row."""
-
-    def add(self, rows: Sequence[Sequence[str]]) -> None:
-        """Print rows; a cell that is too wide shifts the rest of its row."""
-        layout = self._layout or self._begin(rows)
-        if self.fits and self._most > 0:
-            self._most -= 1
-            for row in rows:
-                print(layout.line([*map(printable, row)], layout.every), flush=True)
-
-    def _begin(self, rows: Sequence[Sequence[str]]) -> _Layout:
-        for broken in (False, True):
-            layout = self._layout = _Layout(self._headers, rows, self._left, broken=broken, least=self._widths)
-            self.fits = layout.width(layout.every) <= shutil.get_terminal_size().columns
-            if self.fits:
-                print(*layout.heading(layout.every), sep="\n")
-                break
-        return layout

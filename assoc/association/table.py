@@ -13,9 +13,6 @@ from assoc.association.scan import ScanAssociation
 KEYS = ("file", "scan", "rank")
 """Columns that identify a row."""
 
-WIDTHS = {"cost": 10, "status": 11, "ms": 8, "correct": 7}
-"""Usual width of cells, by header."""
-
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")
 
@@ -24,21 +21,17 @@ def rows(
     scans: Sequence[ScanAssociation],
     files: Sequence[str],
     *,
-    first: int = 0,
-    truth: bool | None = None,
     brief: bool = False,
 ) -> tuple[list[str], list[list[str]]]:
     """Headers and cells for people; ``brief``, for a terminal, leaves out folders and bounds, and gaps that are closed.
 
-    ``files`` are those of all scans, of which the first here has the number ``first``; they are shown if there are
-    several. There is a column of correct tuples if ``truth`` says so, or without it if the truth of one of the scans is
-    known.
+    ``files`` are those of all scans, of which the first are here; they are shown if there are several.
     """
     if brief:
         files = _short_names(files)
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
-    truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
+    truth = any(scan.true_tuples is not None for scan in scans)
     headers = [*(["file"] if several else []), *_HEADERS]
     probable = any(scan.probabilities is not None for scan in scans)
     headers += [*(["least sure"] if probable else [])]
@@ -46,7 +39,7 @@ def rows(
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
     cells = []
-    for scan, file, rank in _lines(scans, files[first : first + len(scans)]):
+    for scan, file, rank in _lines(scans, files[: len(scans)]):
         solution = scan.solution
         row = [printable(file)] if several else []
         row += [

@@ -117,9 +117,6 @@ def test_every_program_fits_every_terminal(run_program, places, name, request):
         seen = {word for line in lines for word in line.split() if re.fullmatch(r"-?\d+\.\d{4}", word)}
         assert seen <= words, (width, seen - words)
         assert name == "track" or name == "simulate" or seen
-        if name == "track":
-            rows = [line.split()[0] for line in lines if re.match(r" +\d+ +\d", line)]
-            assert rows == [str(k) for k in range(20)] and "... and 3 more scans" in lines
 
 
 @pytest.mark.slow
