@@ -142,7 +142,7 @@ def _times(factor: float) -> str:
 
 
 def health(sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float]) -> Health:
-    """Compare estimates with what was declared of these sensors; `speed`, m/s, is that of `assoc.tracking.Initiation`."""
+    """Compare estimates with what was declared of these sensors; `speed` (m/s) is that of `Initiation`."""
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
