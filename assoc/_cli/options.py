@@ -14,10 +14,10 @@ from assoc._cli.lines import HelpFormatter
 from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
 from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._parameters import parameters_of
-from assoc._removed import removed
 from assoc._system.imports import check_extra
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
+from assoc._text.removed import removed
 from assoc.errors import InvalidInputError
 
 BAD_INPUT = 2

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from assoc._files.output import STDOUT, is_stream
-from assoc._removed import removed
 from assoc._system.imports import check_extra
+from assoc._text.removed import removed
 from assoc.errors import InvalidInputError
 
 Kind = Callable[[str, str], Any]

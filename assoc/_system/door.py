@@ -21,7 +21,7 @@ from typing import Any, Literal, TypeVar, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assoc._removed import removed
+from assoc._text.removed import removed
 from assoc.errors import AssocError, InvalidInputError
 
 Function = TypeVar("Function", bound=Callable[..., Any])

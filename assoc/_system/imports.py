@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, NoReturn
 
-from assoc._removed import removed
+from assoc._text.removed import removed
 from assoc.errors import MissingExtraError, RemovedError
 
 

@@ -14,10 +14,10 @@ from types import ModuleType
 from typing import Any
 
 from assoc._parameters import Parameters
-from assoc._removed import removed
 from assoc._system.compile_time import loading
 from assoc._system.door import door
 from assoc._text.near import did_you_mean
+from assoc._text.removed import removed
 from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
 

@@ -11,7 +11,7 @@ try:
 except ImportError as error:
     raise ImportError("the adapter needs Stone Soup: pip install 'assoc[stonesoup]'") from error
 
-from assoc._removed import removed
+from assoc._text.removed import removed
 from assoc.errors import RemovedError
 from assoc.integrations.stonesoup.adapted import AdaptedSensor, adapt
 from assoc.integrations.stonesoup.associator import AssignmentAssociator

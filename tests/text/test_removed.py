@@ -8,7 +8,7 @@ import pytest
 import assoc
 from assoc import solve, track
 from assoc.__main__ import PROGRAMS
-from assoc._removed import REMOVED, removed
+from assoc._text.removed import REMOVED, removed
 from assoc.errors import InvalidInputError, RemovedError
 from assoc.tracking import TRACKERS, LatePlots, Tracker
 from assoc.tracking.adapting.health import Health
