@@ -23,6 +23,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
+from assoc.tracking.adapting.speeds import speed_of_tracks
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.method import Method
 from assoc.tracking.records.identity_evidence import IdentityParameters
@@ -196,7 +197,10 @@ class Tracker:
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
         found = self.state.estimates
-        return None if found is None else health(self.sensors, found, self.settings.initiation.speed)
+        if found is None:
+            return None
+        flown = speed_of_tracks(self.settings, self.state.tracks)
+        return health(self.sensors, found, self.settings.initiation.speed, flown)
 
     @property
     def solver_calls(self) -> int:

@@ -101,5 +101,12 @@ def test_missiles_are_held_until_they_are_down_and_satellites_as_long_as_they_ar
     assert len(found) == 2 and off < 4e3
     speeds = [np.linalg.norm(track.velocity) for track in found]
     np.testing.assert_allclose(speeds, 7520.0, atol=150.0)
-    # such targets are beyond the usual prior: it loses them from scan to scan
+    # such targets are beyond the usual prior: it loses them from scan to scan, until a tracker that adapts sees them
+    learnt, ids = MultiSensorTracker.for_scene(orbits, adapt=True), []
+    for k in range(orbits.num_scans):
+        learnt.step(orbits.times[k], orbits.measurements[k])
+        ids.append([track.track_id for track in learnt.tracks if track.confirmed])
+    assert len(ids[-1]) == 2 and ids[-1] == ids[len(ids) // 2]
+    assert "faster than assumed" in str(learnt.health)
+    assert "than assumed" not in str(MultiSensorTracker.for_scene(orbits, adapt=True, targets="satellite").health)
     assert len(confirmed(orbits)) != 2 or max(track.track_id for track in confirmed(orbits)) > 20

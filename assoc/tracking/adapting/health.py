@@ -15,6 +15,8 @@ from assoc.tracking.adapting.folding import assumed_folding
 from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
 _WIDTH = 1.96
+# so many times slower or faster than the prior of speeds is worth a word
+_SLOWER, _FASTER = 15.0, 3.0
 # differences smaller than this share are not worth a word, nor those within so many standard deviations
 _SMALL, _UNSURE = 0.1, 3.0
 _WORDS = {2.0: "twice", 3.0: "three times", 4.0: "four times", 0.5: "half", 1 / 3: "a third of", 0.25: "a quarter of"}
@@ -106,6 +108,8 @@ class Health:
 
     sensors: tuple[SensorHealth, ...]
     manoeuvres: Quantity
+    speed: str = ""
+    """What the prior of speeds has to do with the tracks, where it does not suit them."""
 
     if not TYPE_CHECKING:
         __getattr__ = removed_attribute
@@ -120,7 +124,7 @@ class Health:
             else ("no harder manoeuvres than the filter expects")
         )
         sensors = (f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors)
-        return (*sensors, f"targets: {targets}")
+        return (*sensors, f"targets: {targets}{self.speed}")
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
@@ -141,8 +145,13 @@ def _times(factor: float) -> str:
     return f"{factor:.2g} times"
 
 
-def health(sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float]) -> Health:
-    """Compare estimates with what was declared of these sensors; `speed` (m/s) is that of `Initiation`."""
+def health(
+    sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float], flown: float = 0.0
+) -> Health:
+    """Compare estimates with what was declared of these sensors.
+
+    `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known.
+    """
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
     rows = []
@@ -160,7 +169,12 @@ def health(sensors: Sequence[Sensor], estimates: Estimates, speed: float | Seque
             )
         )
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
-    return Health(tuple(rows), manoeuvres)
+    prior = max(speed) if isinstance(speed, Sequence) else speed
+    text = ""
+    if flown and not prior / _SLOWER < flown < _FASTER * prior:
+        text = f"; {'faster' if flown > prior else 'slower'} than assumed: about {flown:.3g} m/s along an axis, "
+        text += f"the prior is {prior:.3g} (--targets, --speed)"
+    return Health(tuple(rows), manoeuvres, text)
 
 
 def _quantity(declared: float, seen: float, spread: float, column: int) -> Quantity:
