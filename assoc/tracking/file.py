@@ -192,6 +192,9 @@ def _clutter(model: ClutterMap, saved: Saved) -> ClutterMap:
         clocks = saved[f"clocks.{s}"]
         good = clocks.shape == (count,) and (np.diff(clocks) >= 0).all() and (clocks <= saved["clock"][s]).all()
         saved.require(good, f"clocks.{s}", f"{count} turns that do not descend")
+        votes = saved[f"votes.{s}"]
+        good = votes.shape == (count,) and bool((np.abs(votes) <= 1.0).all())
+        saved.require(good, f"votes.{s}", f"{count} numbers from -1 to 1")
     return model.restored(saved)
 
 

@@ -90,6 +90,8 @@ class Progress(NamedTuple):
     """The tracks that association began with, of a tracker that adapts."""
     dense: Sequence[Array] = ()
     """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
+    crowds: tuple[Array, ...] = ()
+    """Logarithms of the densities there, whether they are in use or not."""
     association: Association | None = None
     step: Step | None = None
 

@@ -51,9 +51,10 @@ class Judged(NamedTuple):
 class NoMap(ClutterMap):
     """A map that never shows clutter."""
 
-    def densities(self, sensors: Any, scan: Any) -> tuple[Array, ...]:
+    def used_and_found(self, sensors: Any, scan: Any) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """As dense as declared."""
-        return tuple(np.zeros(len(z)) for z in scan.measurements)
+        nothing = tuple(np.zeros(len(z)) for z in scan.measurements)
+        return nothing, nothing
 
 
 class Forgetful:

@@ -237,6 +237,7 @@ def test_a_file_of_a_tracker_that_does_not_adapt_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("field", "value"), [
     ("settings", None), ("clutter.places.1", np.zeros((4, 2))), ("clutter.clocks.0", np.zeros(1)),
+    ("clutter.votes.0", np.full(1, 2.0)),
 ])  # fmt: skip
 def test_the_map_of_another_sensor_is_refused(field, value, tmp_path):
     """Whole, of a tracker with other sensors; or in the file of this one."""
@@ -342,6 +343,45 @@ def test_a_closed_area_of_another_frame_is_told():
     make(radars(), region=REGION, initiation=Initiation(closed=[here]))
     with pytest.warns(AssocWarning, match="closed: area 2 lies outside of the region"):
         make(radars(), region=REGION, initiation=Initiation(closed=[here, there]))
+
+
+def planar(noise):
+    """A filter of nearly constant velocity in the plane."""
+    return ExtendedKalmanFilter(ConstantVelocity(noise, dimensions=2, kind="continuous"))
+
+
+def group(seed, speed, spacing, noise, scans=25):
+    """Twelve targets in rows of three, seen by one sensor each second: the sensor, and its measurements."""
+    rng, view = np.random.default_rng(seed), [[-10e3, 10e3], [-10e3, 10e3]]
+    sensor = PositionSensor(
+        position=np.zeros(3), noise=[noise] * 2, detection_probability=0.9, false_alarm_rate=5.0, field_of_view=view
+    )
+    at, plots = spacing * np.stack([np.arange(12) % 3, np.arange(12) // 3], axis=1), []
+    for k in range(scans):
+        seen = at + [k * speed, 0.0] + rng.normal(0.0, noise, (12, 2))
+        plots.append(np.concatenate([seen[rng.random(12) < 0.9], rng.uniform(-10e3, 10e3, (rng.poisson(5.0), 2))]))
+    return sensor, plots
+
+
+@pytest.mark.parametrize(("speed", "spacing", "noise"), [(120.0, 60.0, 50.0), (0.0, 60.0, 10.0)])
+def test_targets_close_together_are_no_clutter(speed, spacing, noise):
+    """Neither those that go on, nor those that stand, each near its own track."""
+    sensor, plots = group(3, speed, spacing, noise)
+    tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=True, initiation=Initiation(speed=max(speed, 10.0)))
+    for k, z in enumerate(plots):
+        tracker.step(float(k), [z])
+    assert sum(track.reported for track in tracker.tracks) >= 11
+
+
+def test_what_reports_by_itself_has_no_map_of_clutter():
+    """Ships at anchor tell their places; the sensor never looks, and its clock stands still."""
+    rng, view = np.random.default_rng(4), [[-20e3, 20e3], [-20e3, 20e3]]
+    sensor = PositionSensor(position=np.zeros(3), noise=[5.0] * 2, false_alarm_rate=0.1, field_of_view=view)
+    places = rng.uniform(-3e3, 3e3, (12, 2))
+    tracker = TRACKERS["multi-sensor"]([sensor], planar(0.3), adapt=True, initiation=Initiation(speed=5.0))
+    for k in range(25):
+        tracker.step(10.0 * k, [places + rng.normal(0.0, 5.0, (12, 2))], None, np.zeros((1, 2)))
+    assert sum(track.reported for track in tracker.tracks) == 12 and tracker.state.next_id == 13
 
 
 def test_traffic_is_no_clutter():

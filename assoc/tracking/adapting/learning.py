@@ -32,7 +32,7 @@ def use_estimates(progress: Progress) -> Progress:
     assert estimates is not None and clutter is not None
     settings = in_use(progress.settings, estimates)
     # units of noise as declared: places are kept in them
-    densities = clutter.densities(progress.settings.sensors, progress.scan)
+    densities, crowds = clutter.used_and_found(progress.settings.sensors, progress.scan)
     shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
     densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
     dense = tuple(found > 0.0 for found in densities)
@@ -40,7 +40,9 @@ def use_estimates(progress: Progress) -> Progress:
         bands = map(bands_of_measured, progress.settings.sensors, progress.scan.measurements)
         seen = zip(densities, settings.by_range, bands, strict=True)
         densities = tuple(found - np.log(share[band]) for found, share, band in seen)
-    return progress._replace(settings=settings, scan=replace(progress.scan, clutter=densities), dense=dense)
+    return progress._replace(
+        settings=settings, scan=replace(progress.scan, clutter=densities), dense=dense, crowds=crowds
+    )
 
 
 def remember_tracks(progress: Progress) -> Progress:
@@ -80,8 +82,39 @@ def learn(progress: Progress) -> Progress:
         estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
     declared = progress.work.settings.sensors
     assert state.clutter is not None
-    clutter = state.clutter.after(declared, progress.scan, turns)
+    clutter = state.clutter.after(declared, progress.scan, turns, _votes(progress))
     return progress.with_state(estimates=estimates.forgotten(turns).settled(declared), clutter=clutter)
+
+
+def _votes(progress: Progress) -> list[Array]:
+    """How much better places predicted each measurement than tracks did that had two of them, (n_s,) for each sensor.
+
+    Differences of log likelihoods, from -1 to 1; 0 outside of places, and in the first turns, before tracks could.
+    """
+    settings, tracks, clutter = progress.settings, progress.before, progress.state.clutter
+    assert tracks is not None and clutter is not None
+    votes = [np.zeros(len(z)) for z in progress.crowds]
+    if not any(found.any() for found in progress.crowds):
+        return votes
+    tracks = tracks[tracks.hits >= 2]
+    if progress.timed is not None and len(tracks):
+        tracks = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
+    for s, (sensor, found) in enumerate(zip(settings.sensors, progress.crowds, strict=True)):
+        rows = np.flatnonzero(found)
+        if clutter.clock[s] < 2.0 or not len(rows):
+            continue
+        dense, z = np.zeros(len(rows)), progress.scan.measurements[s][rows]
+        if len(tracks):
+            expected = settings.filter.expected(tracks.states, sensor)
+            gate = gate_of(sensor, settings.gate_probability)
+            track, near = near_pairs(expected, z, periods_of(sensor), gate)
+            off = sensor.residual(z[near], expected.mean[track])
+            square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[track], off)
+            size = np.sqrt(np.linalg.det(2.0 * np.pi * expected.covariance))[track]
+            density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
+            np.add.at(dense, near, density * np.exp(-0.5 * square) / size)
+        votes[s][rows] = np.clip(found[rows] - np.log1p(dense), -1.0, 1.0)
+    return votes
 
 
 def _turns(progress: Progress) -> Array:

@@ -1,9 +1,10 @@
 """Where false alarms come from: their density at each measurement, by the plots that lie near it.
 
-The last plots of each sensor are kept, whoever took them. Of those near a measurement, the nearest three of each turn
-may be of targets: only the others show clutter, and the density follows from the distance within which there are six
-of them, in units of the sensor's noise. So neither are targets that stand or circle each other's clutter, nor are
-trails of those that move; a wind farm, a shore or a road returns many plots from the same place in every turn.
+The last plots of each sensor are kept. Of those near a measurement, the nearest three of each turn may be of targets:
+only the others show clutter, and the density follows from the distance within which there are six of them, in units of
+the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
+fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
+And it must have predicted its plots better than tracks did: where targets stand or circle, each is near its own track.
 """
 
 from __future__ import annotations
@@ -26,6 +27,12 @@ _LOOKED_AT, _TARGETS, _OTHERS = 64, 3, 6
 # it is clutter of a place at so many times the density of false alarms, and so many plots a turn within this distance:
 # traffic is less dense
 _LEAST, _IN_GATE, _GATE = 30.0, 0.002, 4.0
+# of so many turns before, these at least must have had plots: then it is 90 % sure that more than half of all have
+_SURE = 0.9
+_NEEDED = [
+    next((h for h in range(n) if sum(math.comb(n + 1, k) for k in range(h + 1)) >= _SURE * 2.0 ** (n + 1)), n)
+    for n in range(int(_TURNS) + 1)
+]
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 
@@ -39,41 +46,65 @@ class ClutterMap(NamedTuple):
     """Turns of the sensor when they came; (n_s,) each."""
     clock: Array
     """Turns of each sensor so far, (S,)."""
+    votes: tuple[Array, ...]
+    """By how much the place predicted each plot better than the tracks did, from -1 to 1; (n_s,) each."""
 
     @staticmethod
     def empty(sensors: Sequence[Sensor]) -> ClutterMap:
         """No plots."""
         none = [np.zeros((0, sensor.position_part.dim)) for sensor in sensors]
-        return ClutterMap(tuple(none), tuple(np.zeros(0) for _ in sensors), np.zeros(len(sensors)))
+        nothing = tuple(np.zeros(0) for _ in sensors)
+        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), nothing)
 
     def arrays(self) -> dict[str, Array]:
         """Everything as plain arrays."""
         found = {f"places.{s}": array for s, array in enumerate(self.places)}
-        return found | {f"clocks.{s}": array for s, array in enumerate(self.clocks)} | {"clock": self.clock}
+        for name, arrays in (("clocks", self.clocks), ("votes", self.votes)):
+            found |= {f"{name}.{s}": array for s, array in enumerate(arrays)}
+        return found | {"clock": self.clock}
 
     def restored(self, arrays: Mapping[str, Array]) -> ClutterMap:
         """The map, of as many sensors as this one, from the `arrays` of another."""
         sensors = range(len(self.places))
-        places, clocks = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in ("places", "clocks"))
-        return ClutterMap(places, clocks, arrays["clock"])
+        names = ("places", "clocks", "votes")
+        places, clocks, votes = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in names)
+        return ClutterMap(places, clocks, arrays["clock"], votes)
 
     def densities(self, sensors: Sequence[Sensor], scan: Scan) -> tuple[Array, ...]:
         """Logarithms of the densities at a scan's measurements relative to that of the sensors' false alarms, >= 0."""
+        return self.used_and_found(sensors, scan)[0]
+
+    def used_and_found(self, sensors: Sequence[Sensor], scan: Scan) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """The `densities`, and beside them those that also hold places where tracks predict better."""
         found = []
         for s, sensor in enumerate(sensors):
             here = _places(sensor, scan.measurements[s])
-            found.append(_densities(sensor, here, self.places[s], self.clocks[s], float(self.clock[s])))
-        return tuple(found)
+            if scan.sectors is not None and scan.sectors[s, 0] == scan.sectors[s, 1]:
+                # what reports by itself, and does not look, returns no clutter of a place
+                found.append((np.zeros(len(here)), np.zeros(len(here))))
+            else:
+                known = self.places[s], self.clocks[s], self.votes[s]
+                found.append(_densities(sensor, here, *known, float(self.clock[s])))
+        used, every = zip(*found, strict=True)
+        return used, every
 
-    def after(self, sensors: Sequence[Sensor], scan: Scan, turns: Array) -> ClutterMap:
-        """The map after a scan in which each sensor made so many turns, (S,)."""
-        places, clocks = [], []
+    def after(
+        self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None
+    ) -> ClutterMap:
+        """The map after a scan in which each sensor made so many turns, (S,).
+
+        `votes` (n_s,) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
+        """
+        kept: list[tuple[Array, ...]] = []
+        votes = [np.zeros(len(z)) for z in scan.measurements] if votes is None else votes
         for s, sensor in enumerate(sensors):
-            when = np.concatenate([self.clocks[s], np.full(len(scan.measurements[s]), self.clock[s])])
-            kept = slice(max(int(np.searchsorted(when, self.clock[s] - _TURNS)), len(when) - _PLOTS), None)
-            places.append(np.concatenate([self.places[s], _places(sensor, scan.measurements[s])])[kept])
-            clocks.append(when[kept])
-        return ClutterMap(tuple(places), tuple(clocks), self.clock + turns)
+            fresh = np.arange(len(votes[s]) if turns[s] > 0.0 else 0)
+            when = np.concatenate([self.clocks[s], np.full(len(fresh), self.clock[s])])
+            last = slice(max(int(np.searchsorted(when, self.clock[s] - _TURNS)), len(when) - _PLOTS), None)
+            places = np.concatenate([self.places[s], _places(sensor, scan.measurements[s][fresh])])
+            kept.append((places[last], when[last], np.concatenate([self.votes[s], votes[s][fresh]])[last]))
+        places_of_all, clocks, votes_of_all = zip(*kept, strict=True)
+        return ClutterMap(places_of_all, clocks, self.clock + turns, votes_of_all)
 
 
 def _units(sensor: Sensor) -> Array:
@@ -89,33 +120,41 @@ def _places(sensor: Sensor, measured: Array) -> Array:
     return np.asarray(z / _units(sensor))
 
 
-def _densities(sensor: Sensor, here: Array, places: Array, clocks: Array, now: float) -> Array:
+def _densities(
+    sensor: Sensor, here: Array, places: Array, clocks: Array, votes: Array, now: float
+) -> tuple[Array, Array]:
+    """See `ClutterMap.densities`."""
     n, part = len(here), sensor.position_part
-    result = np.zeros(n)
-    every = np.concatenate([places, here])
-    if len(every) <= _OTHERS or not n:
-        return result
+    result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    before = int(min(round(now), _TURNS))
+    age = np.append(np.rint(now - clocks), np.zeros(n))
+    places, votes, turns = np.concatenate([places, here]), np.append(votes, np.zeros(n)), before + 1
+    if len(places) <= _OTHERS or not n:
+        return result, result
     units, d = _units(sensor), part.dim
     around: Any = [
-        (2.0 * math.pi + 1e-9) / unit if turns else 0.0 for unit, turns in zip(units, part.angular, strict=False)
+        (2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in zip(units, part.angular, strict=False)
     ]
-    # volume of a ball of radius 1, and false alarms there since the first plot
+    # volume of a ball of radius 1, and false alarms there in these turns
     ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
-    span = max(now - float(clocks[0]) if len(clocks) else 0.0, 0.0) + 1.0
-    usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * span * ball
-    least = max(_LEAST, _IN_GATE * span / (_GATE**d * usual))
-    tree, near_by = cKDTree(every, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
+    usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
+    least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
+    tree, near_by = cKDTree(places, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
     # few places are dense: only there many neighbours are sought
     farther = np.asarray(tree.query(here, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
     dense = np.flatnonzero(farther < near_by)
     if not len(dense):
-        return result
-    distance, near = (np.asarray(array) for array in tree.query(here[dense], min(_LOOKED_AT, len(every))))
-    turn = np.floor(np.append(clocks, np.full(n, now)))[near]
+        return result, result
+    distance, near = (np.asarray(array) for array in tree.query(here[dense], min(_LOOKED_AT, len(places))))
+    turn = age[near]
     nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
     others = np.cumsum(nearer >= _TARGETS, axis=1)
     last = np.argmax(others == _OTHERS, axis=1)
     radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
+    within = np.arange(near.shape[1]) <= last[:, None]
+    hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
     ratio = (last + 1) / (radius**d * usual)
-    result[dense] = np.where((others[:, -1] >= _OTHERS) & (ratio > least), np.log(np.maximum(ratio, 1.0)), 0.0)
-    return result
+    found = (others[:, -1] >= _OTHERS) & (ratio > least) & (hits >= _NEEDED[before])
+    result[dense] = np.where(found, np.log(np.maximum(ratio, 1.0)), 0.0)
+    used[dense] = votes[near].sum(axis=1) >= 0.0
+    return np.where(used, result, 0.0), result

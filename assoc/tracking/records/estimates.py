@@ -26,6 +26,8 @@ KEEP = 0.98
 _RESIDUALS, _MANOEUVRES, _DWELLS, _SCANS = 50.0, 10.0, 20.0, 5.0
 # log odds of detection differ by so much from band to band of range, and from the sensor's
 _FROM_BAND, _FROM_SENSOR, _NEWTON = 0.7, 2.0, 2
+# beyond these log odds a probability is no other number than 0 or 1
+_ODDS = 12.0
 _WALK = np.diff(np.eye(BANDS), axis=0) / _FROM_BAND
 _BY_RANGE = _WALK.T @ _WALK + np.eye(BANDS) / _FROM_SENSOR**2
 # an estimate is used where it is this many standard deviations from what was declared, until it is closer than these
@@ -101,7 +103,7 @@ class Estimates(NamedTuple):
             P = 1.0 / (1.0 + np.exp(-odds))
             weights = _BY_RANGE + (self.dwells * P * (1.0 - P))[:, :, None] * np.eye(BANDS)
             slope = self.hits - self.dwells * P - (odds - middle) @ _BY_RANGE
-            odds = odds + np.linalg.solve(weights, slope[..., None])[..., 0]
+            odds = np.clip(odds + np.linalg.solve(weights, slope[..., None])[..., 0], -_ODDS, _ODDS)
         spreads = np.sqrt(np.diagonal(np.linalg.inv(weights), axis1=1, axis2=2))
         return 1.0 / (1.0 + np.exp(-odds)), spreads
 
