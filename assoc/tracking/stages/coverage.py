@@ -12,6 +12,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.views import log_missed, places_of
+from assoc.filters import FreeFlight
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.track_batch import TrackBatch
@@ -132,9 +133,9 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
         if len(left):
             seen = settings.views.at_means(tracks.states[left])[:, settings.ranging].any(axis=1)
             gone[left] |= ~seen & ~_inside(settings, tracks.states[left], 2)
-    # missed and surely below the region: it has come down
-    axes, floor = settings.filter.motion.position, settings.scene.region[2, 0]
-    if len(axes) == 3 and settings.height is None:
+    # what falls freely, is missed and surely below the region has come down
+    floor = settings.scene.region[2, 0]
+    if isinstance(settings.filter.motion, FreeFlight) and settings.height is None:
         missed = np.flatnonzero(tracks.last_detection < time)
         where, spread = places_of(settings.filter, tracks.states[missed])
         gone[missed] |= where[:, 2] + _SURELY * np.sqrt(spread[:, 2, 2]) < floor
