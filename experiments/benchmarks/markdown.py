@@ -1,4 +1,4 @@
-"""The Markdown report: goals first, then one table for each family."""
+"""The Markdown report: goals met and missed, then a line for each size of each family."""
 
 import math
 import os
@@ -12,6 +12,7 @@ from statistics import median
 from experiments.benchmarks.families import cases
 from experiments.benchmarks.goals import Results, judge
 from experiments.benchmarks.rows import Row
+from experiments.common.contestants import HEURISTICS
 from experiments.common.results import as_percent, as_time, plain_table
 
 ABOUT = {
@@ -30,24 +31,18 @@ ABOUT = {
 }
 
 HOW = """\
-Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, were not used
-for tuning. Times are wall times, from the tuples to the Solution, after warm-up; beside them the processor's, all
-threads together. A run of less than 0.1 s is made five times, ours and theirs, and the median time counts. Our
-solvers have one core. Peers (other solvers) get the same tuples in the same process: CP-SAT (`cp_sat`; costs times
-1e6, rounded) and `scip` on both cores, `cp_sat_1`, `scip_1` and HiGHS (scipy, gap 1e-9) on one. With `--processes`
-in the command above everybody had one core, several seeds at a time. `sequential` assigns one sensor at a time with
-scipy, as most trackers do; `nrl_tracker` needs a dense tensor and takes part if that has at most 8 million elements.
-`chils`, `branch_reduce` and `mmwis` search for the heaviest independent set of the conflict graph, on all cores
-that they have (the last two up to 40 targets: their graphs are too large beyond; none of the three proves anything, and
-at 20 targets they have 10 s); `kap` knows costs of pairs alone.
+Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, were not used for tuning.
+Times are medians, from the tuples to the Solution, after warm-up; that of the processor where it is shorter than the
+wall's: what else ran on the machine does not count. Our solvers have one core. Peers (other solvers) get the same
+tuples in the same process: CP-SAT (costs times 1e6, rounded), SCIP, HiGHS (gap 1e-9), independent sets (`chils`,
+`branch_reduce`, `mmwis`, which prove nothing), `kap` and `nrl_tracker` where their form allows it. With `--processes`
+in the command above everybody had one core. *One by one* assigns one sensor at a time with scipy, as most trackers do.
 Independent code checks the feasibility and cost of every answer.
 
-*Found*: runs whose cost is the reference: the optimum (by construction, or proven by any solver) or else,
-marked ~, the best cost that any solver found. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
-known optimum, so their time is the time to it; `lagrangian@0.1%` stops at that gap. *Speed* is the median
-over instances of the fastest peer's time to a proven optimum divided by this solver's time; it is given if this
-solver found the reference in every run. For it, and for the goals, a time is that of the processor where this is the
-shorter one, ours and theirs: what else ran on the machine does not count."""
+Every run of every solver, with cost, bound, wall and processor time, is a row of the CSV (`docs/benchmarks.csv`); here
+they are summed up by family and size. The reference is the optimum (by construction, or proven by any solver) or else
+the best cost that any solver found; an excess is relative to it. aco, genetic and tabu stop when they reach a known
+optimum."""
 
 
 def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> str:
@@ -61,9 +56,14 @@ def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> 
     parts += [f"**These rows**: {remark}"] if remark else []
     missing = _missing(rows)
     parts += [f"**Not in these rows** (not run): {missing}."] if missing else []
-    parts += ["## Goals", _goals(rows)]
-    for family in dict.fromkeys(row.family for row in rows):
-        parts += [f"## {family}", ABOUT.get(family, ""), _table(results, family)]
+    parts += ["## Goals", _goals(rows), "## Families"]
+    families = [family for family in dict.fromkeys(row.family for row in rows) if family != "kbest"]
+    parts += ["\n".join(f"- **{family}**: {ABOUT[family]}" for family in families)]
+    parts += [
+        plain_table(HEAD, [_line(results, family, size) for family in families for size in results.sizes(family)])
+    ]
+    if ranked := results.of("kbest"):
+        parts += ["## The k best", ABOUT["kbest"], _rankings(ranked)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -110,46 +110,83 @@ def _processor() -> str:
 
 
 def _goals(rows: Sequence[Row]) -> str:
+    """How many goals of each family are met, and those that are not."""
     verdicts = judge(rows)
-    firm, stretch = ([v.met for v in verdicts if v.stretch == kind] for kind in (False, True))
-    said = [
-        [v.family, v.size, f"* {v.goal}" if v.stretch else v.goal, v.measured, "yes" if v.met else "**no**"]
-        for v in verdicts
+
+    def count(family: str | None, *, stretch: bool) -> str:
+        met = [v.met for v in verdicts if v.stretch == stretch and family in (None, v.family)]
+        return f"{sum(met)} of {len(met)}"
+
+    families = dict.fromkeys(verdict.family for verdict in verdicts)
+    counts = [[family, *(count(family, stretch=stretch) for stretch in (False, True))] for family in families]
+    missed = [
+        [v.family, v.size, f"* {v.goal}" if v.stretch else v.goal, v.measured]
+        for v in sorted(verdicts, key=lambda verdict: verdict.stretch)
+        if not v.met
     ]
-    return (
-        f"{sum(firm)} of {len(firm)} goals met, and {sum(stretch)} of {len(stretch)} stretch goals (marked *).\n\n"
-        + plain_table(["family", "size", "goal", "measured", "met"], said)
-    )
+    return "\n\n".join([
+        f"{count(None, stretch=False)} goals met, and {count(None, stretch=True)} stretch goals (marked *).",
+        plain_table(["family", "goals met", "stretch goals met"], counts),
+        "Not met:" if missed else "All are met.",
+        *([plain_table(["family", "size", "goal", "measured"], missed)] if missed else []),
+    ])  # fmt: skip
 
 
-def _table(results: Results, family: str) -> str:
-    head = ["size", "tuples", "solver", "limit s", "runs", "found", "excess median %", "excess worst %",
-            "gap median %", "median time", "median CPU", "speed"]  # fmt: skip
-    head += ["ranked"] if family == "kbest" else []
-    lines = []
-    for size in results.sizes(family):
-        rows = results.of(family, size)
-        tuples = median(row.tuples for row in rows)
-        # ours first
-        for solver, limit in dict.fromkeys((row.solver, row.limit) for row in sorted(rows, key=lambda row: row.peer)):
-            mine = [row for row in rows if (row.solver, row.limit) == (solver, limit)]
-            cells = [size, f"{tuples:,.0f}", solver, f"{limit:g}" if limit else "", str(len(mine))]
-            ranked = [f"{median(row.extra for row in mine):.0f}"] if family == "kbest" else []
-            lines.append([*cells, *_figures(results, mine), *ranked])
-    return plain_table(head, lines)
-
-
-def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
-    excess = [row.excess if math.isfinite(row.cost) else math.inf for row in rows]
-    found = f"{sum(row.hit for row in rows)}" + ("" if all(row.proven for row in rows) else "~")
-    speeds = [results.fastest_peer(row) / row.taken for row in rows]
-    speed = median(speeds)
+def _line(results: Results, family: str, size: str) -> list[str]:
+    """One size of a family: what `exact`, the metaheuristics, the bound of `lagrangian` and the others reach."""
+    rows = results.of(family, size)
+    exact = results.of(family, size, "exact")
+    ants = [row for name in HEURISTICS for row in results.of(family, size, name)]
+    duals = [row for row in rows if row.solver.startswith("lagrangian")]
     return [
-        found,
-        as_percent(median(excess)),
-        as_percent(max(excess)),
-        as_percent(median(row.gap for row in rows)),
-        as_time(median(row.seconds for row in rows)),
-        as_time(cpu) if (cpu := median(row.cpu for row in rows)) else "-",
-        f"{speed:.3g}" if math.isfinite(speed) and all(row.hit for row in rows) else "-",
-    ]
+        family, size, f"{median(row.tuples for row in rows):,.0f}",
+        _proofs(exact), _speed(results, exact), _excess(ants), as_percent(max(r.gap for r in duals)) if duals else "-",
+        _fastest(results, family, size), _excess(results.of(family, size, "sequential")),
+    ]  # fmt: skip
+
+
+HEAD = [
+    "family", "size", "tuples", "`exact`", "times as fast as the fastest peer",
+    "`aco`, `genetic`, `tabu`: worst excess %", "`lagrangian`: worst gap %",
+    "fastest peer, or its proofs", "one by one: worst excess %",
+]  # fmt: skip
+
+
+def _proofs(rows: Sequence[Row]) -> str:
+    """Median time, and how many were proved where not all were."""
+    if not rows:
+        return "-"
+    proved = sum(row.status == "optimal" for row in rows)
+    time = as_time(median(row.taken for row in rows))
+    if proved == len(rows):
+        return time
+    return f"{time}, {proved} of {len(rows)} proved, worst gap {as_percent(max(row.gap for row in rows))} %"
+
+
+def _speed(results: Results, rows: Sequence[Row]) -> str:
+    ratios = [results.fastest_peer(row) / row.taken for row in rows]
+    return f"{median(ratios):.3g}" if ratios and math.isfinite(median(ratios)) else "-"
+
+
+def _fastest(results: Results, family: str, size: str) -> str:
+    """Median time of the fastest peer that proved all, else the instances that any of them proved."""
+    if fastest := results.fastest_proof(family, size):
+        return f"{as_time(fastest[0])} ({fastest[1]})"
+    peers = [row for row in results.of(family, size) if row.peer]
+    proved = {(row.seed, row.item) for row in peers if row.status == "optimal"}
+    return f"{len(proved)} of {len({(row.seed, row.item) for row in peers})} proved" if peers else "-"
+
+
+def _excess(rows: Sequence[Row]) -> str:
+    return as_percent(max(row.excess if math.isfinite(row.cost) else math.inf for row in rows)) if rows else "-"
+
+
+def _rankings(rows: Sequence[Row]) -> str:
+    """Times of the rankings, and how many solutions each has."""
+    kinds = dict.fromkeys((row.size, row.solver) for row in rows)
+    lines = []
+    for size, solver in kinds:
+        mine = [row for row in rows if (row.size, row.solver) == (size, solver)]
+        cells = as_time(median(row.taken for row in mine)), f"{median(row.extra for row in mine):.0f}"
+        lines.append([size, f"`{solver}`", *cells])
+    return plain_table(["problem", "solver", "median time", "ranked"], lines)

@@ -52,7 +52,7 @@ def render(rows: Sequence[Row]) -> str:
     parts = [
         table(head, [_timed(results, *key, name) for key, name in TIMED.items() if results.of(*key)], tight=True),
         _ghosts(results),
-        f"{sum(met)} of {len(met)} goals are met; [benchmarks](docs/benchmarks.md) lists each.",
+        f"{sum(met)} of {len(met)} goals are met; [benchmarks](docs/benchmarks.md) lists those that are not.",
     ]
     return "\n\n".join(parts)
 

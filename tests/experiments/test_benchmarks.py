@@ -206,11 +206,15 @@ def test_rankings_are_run_and_compared() -> None:
     assert all(row.hit and row.cpu > 0 for row in found)
 
 
-def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
+def test_report_has_a_line_for_each_family_and_the_goals_missed() -> None:
     text = markdown.render([ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], None)
-    assert "## gated" in text
-    assert "## planted" in text
-    assert "| 3x300 | 9,000 | exact | 60 | 1 | 1 | 0 | 0 | 0 | 10 ms | - | 30 |" in text
+    assert "- **planted**: " in text
+    assert "| gated | 3x300 | 9,000 | 10 ms | 30 | - | - | 300 ms (highs) | - |" in text
+    assert "| planted | S=3 | 9,000 | - | - | 0 | - | - | - |" in text
+    assert "| gated | 3x300 | * exact: 100 times (median) | median 30 times, least 30 |" in text
+    assert "| gated | 2 of 2 | 0 of 1 |" in text
+    open_gap = markdown.render([replace(ROW, status="feasible", bound=-101.0), replace(PEER, status="feasible")], None)
+    assert "| 10 ms, 0 of 1 proved, worst gap 1 % | - | - | - | 0 of 1 proved | - |" in open_gap
 
 
 def test_run_case_checks_and_compares() -> None:
@@ -275,7 +279,7 @@ def test_program_refuses_and_reports(
         main(["--report-only", "--csv", str(path)])
     rows.save(path, [ROW, PEER])
     assert main(["--report-only", "--csv", str(path)]) == 0
-    assert "## gated" in (tmp_path / "b.md").read_text()
+    assert "**gated**" in (tmp_path / "b.md").read_text()
 
 
 def test_a_run_goes_on_where_it_was_interrupted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
