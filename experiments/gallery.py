@@ -1,6 +1,6 @@
 """All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds, or of published results (surfaces-*, reliability). They have two pixels for each
+Pictures are of fixed scenes and seeds, or of published results (surfaces-*). They have two pixels for each
 of a plain screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
 """
 
@@ -11,11 +11,8 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 import assoc
 from assoc._files.output import write_atomically
@@ -203,33 +200,11 @@ def surfaces(kind: str) -> Callable[[Any], None]:
     return draw
 
 
-def stonesoup_fusion(figure: Any) -> None:
-    """Draw three ways to track in Stone Soup, on the ten scenes of the experiment's full run; takes minutes."""
-    from experiments.trackers import fusion_in_stone_soup as fusion
-
-    figure.set_size_inches(11, 4.6)
-    seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()
-    fusion.draw(figure, (fusion.compare(seeds)[0][:, :, :, 0], fusion.simulate(seeds[0])))
-
-
-def reliability(figure: Any) -> None:
-    """Share of tuples that are true, over the probability that they are given."""
-    claims = [c for c in Results("probabilities").claims if c.quantity.startswith("reliability")]
-    said, true = (np.array([c.ours for c in claims[k::2]]) for k in range(2))
-    low, high = np.array([c.interval for c in claims[1::2]], dtype=float).T
-    axes = figure.subplots()
-    axes.plot([0, 1], [0, 1], color="0.7", linewidth=1.0)
-    axes.errorbar(said, true, yerr=[true - low, high - true], fmt="o", color="tab:blue", capsize=3)
-    axes.set(xlabel="probability given", ylabel="share that is true", xlim=(0, 1), ylim=(0, 1.02))
-
-
 _DRAWN = (
     first_sight, scene, solution, ghosts, gates, costs, convergence, pheromone, heat_map, tracks, metric, overview,
-    stonesoup_fusion, reliability,
 )  # fmt: skip
 PICTURES: dict[str, Callable[[Any], None]] = {draw.__name__.replace("_", "-"): draw for draw in _DRAWN}
-PICTURES |= {f"surfaces-{kind}": surfaces(f"surfaces-{kind}") for kind in ("ghosts-20", "ghosts-40", "poor-radars")}
-_NEEDS = {"report": "chromium and chromedriver are", "stonesoup-fusion": "stonesoup is"}
+PICTURES["surfaces-ghosts-20"] = surfaces("surfaces-ghosts-20")
 
 
 def drawn(draw: Callable[[Any], None]) -> bytes:
@@ -291,12 +266,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f"no picture is called {name!r}")
     given.output.mkdir(parents=True, exist_ok=True)
     for name in names:
-        if name == "stonesoup-fusion" and find_spec("stonesoup") is None:
-            picture = None
-        else:
-            picture = screenshot() if name == "report" else drawn(PICTURES[name])
+        picture = screenshot() if name == "report" else drawn(PICTURES[name])
         if picture is None:
-            print(f"{name:<20} left out: {_NEEDS[name]} not installed")
+            print(f"{name:<20} left out: chromium and chromedriver are not installed")
             continue
         if len(picture) > LARGEST:
             raise SystemExit(f"{name}: {len(picture)} bytes, more than {LARGEST}")

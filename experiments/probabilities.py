@@ -3,9 +3,8 @@
 Widths and processor time of one thread of ``assoc.marginals``: two lists of points whose ten nearest of the other list
 are candidates (distances of a unit, cost 2 d^2 - 2, one point per 0.01), position sensors and bearings of the
 benchmarks. Estimates are compared with longer runs: sweeps with eight times as many states, or, where too many matter,
-chains three times as long; `experiments.probabilities_beside` compares them with exact sums. Reliability: crowds with
-truth, tuples grouped by the probability they are given, and the share of each group that is one target's detections and
-all of them.
+chains three times as long. Reliability: crowds with truth, tuples grouped by the probability they are given, and the
+share of each group that is one target's detections and all of them.
 """
 
 from argparse import Namespace

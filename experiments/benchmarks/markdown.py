@@ -59,9 +59,7 @@ def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> 
     parts += ["## Goals", _goals(rows), "## Families"]
     families = [family for family in dict.fromkeys(row.family for row in rows) if family != "kbest"]
     parts += ["\n".join(f"- **{family}**: {ABOUT[family]}" for family in families)]
-    parts += [
-        plain_table(HEAD, [_line(results, family, size) for family in families for size in results.sizes(family)])
-    ]
+    parts += [plain_table(HEAD, [_line(results, one, size) for one in families for size in _shown(results, one)])]
     if ranked := results.of("kbest"):
         parts += ["## The k best", ABOUT["kbest"], _rankings(ranked)]
     return "\n\n".join(parts) + "\n"
@@ -119,17 +117,19 @@ def _goals(rows: Sequence[Row]) -> str:
 
     families = dict.fromkeys(verdict.family for verdict in verdicts)
     counts = [[family, *(count(family, stretch=stretch) for stretch in (False, True))] for family in families]
-    missed = [
-        [v.family, v.size, f"* {v.goal}" if v.stretch else v.goal, v.measured]
-        for v in sorted(verdicts, key=lambda verdict: verdict.stretch)
-        if not v.met
-    ]
+    missed = [[v.family, v.size, v.goal, v.measured] for v in verdicts if not v.met and not v.stretch]
     return "\n\n".join([
-        f"{count(None, stretch=False)} goals met, and {count(None, stretch=True)} stretch goals (marked *).",
+        f"{count(None, stretch=False)} goals met, and {count(None, stretch=True)} stretch goals.",
         plain_table(["family", "goals met", "stretch goals met"], counts),
-        "Not met:" if missed else "All are met.",
+        "Goals not met:" if missed else "All are met.",
         *([plain_table(["family", "size", "goal", "measured"], missed)] if missed else []),
     ])  # fmt: skip
+
+
+def _shown(results: Results, family: str) -> list[str]:
+    """Sizes of a family, of those at which metaheuristics ran where there are some."""
+    sizes = results.sizes(family)
+    return [size for size in sizes if any(results.of(family, size, name) for name in HEURISTICS)] or sizes
 
 
 def _line(results: Results, family: str, size: str) -> list[str]:

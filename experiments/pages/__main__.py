@@ -1,4 +1,4 @@
-"""Write the tables of the pages (docs/_tables), and the pages of experiments/pages/prose, from the published results.
+"""Write the tables of the pages (docs/_tables) from the published results.
 
 The results are the files of experiments/results, which the experiments write with --publish, the rows of the benchmarks
 and those of the benchmark set; a test fails where a table and they differ.
@@ -9,12 +9,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.pages import benchmark_set, benchmarks, coverage, measured, metaheuristics, real_sensors, trackers
-from experiments.pages.prose import PAGES
+from experiments.pages import coverage, tables
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "_tables"
-MODULES = (benchmark_set, benchmarks, coverage, measured, metaheuristics, real_sensors, trackers)
-TABLES: dict[str, Callable[[], str]] = {name: make for module in MODULES for name, make in module.TABLES.items()}
+TABLES: dict[str, Callable[[], str]] = tables.TABLES | coverage.TABLES
 """Name of the file -> what makes it."""
 
 
@@ -26,7 +24,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a table is out of date")
     chosen = parser.parse_args(arguments)
     files = {FOLDER / f"{name}.md": make for name, make in TABLES.items()}
-    files |= {FOLDER.parent / f"{name}.md": make for name, make in PAGES.items()}
     stale = refresh(files, check=chosen.check)
     return int(chosen.check and stale > 0)
 

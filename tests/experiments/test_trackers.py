@@ -6,14 +6,13 @@ import pytest
 from assoc import simulation
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import Claim, load_json, save_json
-from experiments.pages import trackers as pages
+from experiments.pages import tables as pages
 from experiments.trackers import (
     as_they_are,
     asynchronous,
     bearings,
     benchmark,
     biases,
-    capacity,
     close_scenes,
     comparison,
     judging,
@@ -21,7 +20,6 @@ from experiments.trackers import (
     live,
     plane,
 )
-from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
 from tests.sizes import sample
 
@@ -70,13 +68,6 @@ def test_the_labelled_filter_on_the_same_detections():
 def test_a_peer_stops_when_its_time_is_over():
     one = plane.simulate(3, 0.2, 5, 1)
     assert len(benchmark.judged(iter([(0.1, np.zeros((0, 2)))] * 5), one, 0.0).seconds) == 1
-
-
-def test_goals_of_the_three_radar_scene():
-    found = three_radar(1, 8, single=True)
-    assert found.late == found.lost == found.false == 0
-    assert found.instants == 21
-    assert found.best > 2 * found.multi
 
 
 def test_close_targets_and_the_oracle():
@@ -169,7 +160,7 @@ def test_plots_as_they_come_are_timed():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("one", [asynchronous, benchmark, biases, capacity], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("one", [asynchronous, benchmark, biases], ids=lambda one: one.__name__)
 def test_other_experiments_as_programs(one, tmp_path, capsys):
     if one is benchmark:
         pytest.importorskip("stonesoup")

@@ -1,7 +1,8 @@
 """The licences of what pyproject.toml requires, from the packages' own metadata.
 
     python -m tests.release.licences           compare docs/dependencies.md with what is installed
-    python -m tests.release.licences --write   write the tables anew
+    python -m tests.release.licences --write   write the table anew
+    python -m tests.release.licences --all     print what the packages install in turn
 
 Packages word their licences in many ways, and in other words from one version to the next, so that the table
 names the family ("BSD"), which is what a user has to know.
@@ -104,26 +105,31 @@ def _installed(name: str) -> metadata.Distribution | None:
         return None
 
 
-def tables() -> str:
-    """Both tables as they stand in the page."""
+def direct_table() -> str:
+    """The table as it stands in the page."""
     lines = ["| package | at least | for | licence |", "|---|---|---|---|"]
-    needed = direct(read())
-    for name, (oldest, groups) in needed.items():
-        found = _installed(name)
-        licence = "?" if found is None else " and ".join(families(found)) or "?"
-        lines.append(f"| {name} | {oldest} | {', '.join(_PURPOSES[group] for group in groups)} | {licence} |")
-    lines += ["", "What these packages install in turn (without those for tests, pages and checks):", ""]
-    lines += ["| package | through | licence |", "|---|---|---|"]
-    used = [name for name, (_, groups) in needed.items() if {*groups} - {"docs", "test", "lint", "release", "build"}]
-    for name, roots in behind(used).items():
-        found = _installed(name)
-        lines.append(f"| {name} | {', '.join(sorted(roots))} | {found and ' and '.join(families(found)) or '?'} |")
+    for name, (oldest, groups) in direct(read()).items():
+        lines.append(f"| {name} | {oldest} | {', '.join(_PURPOSES[group] for group in groups)} | {_licence(name)} |")
     return "\n".join(lines)
 
 
+def in_turn() -> str:
+    """What these packages install in turn (without those for tests, pages and checks)."""
+    needed = direct(read())
+    used = [name for name, (_, groups) in needed.items() if {*groups} - {"docs", "test", "lint", "release", "build"}]
+    lines = ["| package | through | licence |", "|---|---|---|"]
+    lines += [f"| {name} | {', '.join(sorted(roots))} | {_licence(name)} |" for name, roots in behind(used).items()]
+    return "\n".join(lines)
+
+
+def _licence(name: str) -> str:
+    found = _installed(name)
+    return "?" if found is None else " and ".join(families(found)) or "?"
+
+
 def listed(page: str) -> dict[str, tuple[str, str]]:
-    """Oldest version and licence of each package in the first table of the page's text."""
-    text = page.split(MARK)[1].split("\n\nWhat")[0]
+    """Oldest version and licence of each package in the table of the page's text."""
+    text = page.split(MARK)[1]
     lines = [line for line in text.splitlines() if line.startswith("| ")]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return {name: (oldest, licence) for name, oldest, _, licence in rows[1:]}
@@ -150,9 +156,13 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the program; exit code 1 if the page is wrong."""
     parser = argparse.ArgumentParser(description="The licences of what is required.")
     parser.add_argument("--write", action="store_true")
-    if parser.parse_args(arguments).write:
+    parser.add_argument("--all", action="store_true", help="print what the packages install in turn, too")
+    chosen = parser.parse_args(arguments)
+    if chosen.all:
+        print(in_turn())
+    if chosen.write:
         before = PAGE.read_text().split(MARK)[0]
-        PAGE.write_text(f"{before}{MARK}\n\n{tables()}\n")
+        PAGE.write_text(f"{before}{MARK}\n\n{direct_table()}\n")
     found = complaints(PAGE.read_text())
     print("\n".join(found) or f"{PAGE.name}: as required and installed")
     return 1 if found else 0
