@@ -89,6 +89,7 @@ IDENTITY = Option(
 _LIFE_CYCLE = {
     "m": {"confirmation": ("m-of-n",)},
     "n": {"confirmation": ("m-of-n",)},
+    "false_tracks_per_hour": {"confirmation": ("score",)},
     "false_probability": {"confirmation": ("score",)},
     "deletion_time": {"deletion": ("time",)},
     "deletion_count": {"deletion": ("count",)},
@@ -168,7 +169,7 @@ _MORE = "\n".join(
         *(f"  {name:<19}  {purpose}" for name, purpose in TRACKERS.items()),
         "",
         "further options (docs/tracking_reference.md):",
-        "  track life cycle   --confirmation --false-probability --missed-probability --m --n "
+        "  track life cycle   --confirmation --false-tracks-per-hour --false-probability --missed-probability --m --n "
         "--deletion --deletion-time --deletion-count --deletion-drop --lifetime",
         "  track initiation   --speed --rest --birth-rate --widest",
         "  --identity use     --code-garbled --code-shared --address-garbled --address-shared",

@@ -19,6 +19,9 @@ Deletion = Literal["time", "count", "score"]
 HISTORY = 62
 """Scans whose detections are remembered, one a bit."""
 
+# share of false tracks that may be confirmed while nobody knows how many false alarms there are, and at the most
+_UNKNOWN, _MOST = 1e-6, 1e-2
+
 OVERLOOKED = 1e-4
 """A track is deleted when an existing target would be missed for as long only with this probability."""
 # and not before this many scans
@@ -32,11 +35,18 @@ class LifeCycle:
     Parameters
     ----------
     confirmation : "score" or "m-of-n"
-        "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test.
+        "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test. alpha is the
+        share of false tracks confirmed: each false alarm may begin one, so that it is `false_tracks_per_hour` over the
+        false alarms of all sensors in an hour (S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems,
+        1999, section 6.2), at most 0.01.
         "m-of-n": detected in `m` of the last `n` scans.
-    false_probability, missed_probability : float
-        alpha and beta of the test: the share of false tracks confirmed, of true ones deleted. A tentative
-        track is deleted when its score has fallen by -ln(missed_probability) since its best.
+    false_tracks_per_hour : float
+        False tracks that may be confirmed in an hour. There are fewer: few false alarms begin a track.
+    false_probability : float, optional
+        alpha itself.
+    missed_probability : float
+        beta of the test, the share of true tracks deleted. A tentative track is deleted when its score has fallen by
+        -ln(missed_probability) since its best.
     m, n : int
     deletion : "time", "count" or "score"
         What ends a track, tentative or confirmed: `deletion_time` seconds without a detection (however the
@@ -52,7 +62,12 @@ class LifeCycle:
     """
 
     confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})
-    false_probability: float = field(default=1e-6, metadata={"help": "share of false tracks confirmed by score"})
+    false_tracks_per_hour: float = field(
+        default=1.0, metadata={"help": "false tracks that may be confirmed in an hour"}
+    )
+    false_probability: float | None = field(
+        default=None, metadata={"help": "share of false tracks confirmed by score (default: from those per hour)"}
+    )
     missed_probability: float = field(default=2e-3, metadata={"help": "share of true tracks given up too early"})
     m: int = field(default=3, metadata={"help": "m-of-n: scans with a detection"})
     n: int = field(default=4, metadata={"help": "m-of-n: of the last n scans"})
@@ -74,17 +89,28 @@ class LifeCycle:
             if isinstance(setting.default, int):
                 if not is_whole(value, 1):
                     raise InvalidInputError(f"{setting.name} must be a whole number above 0, got {value!r}")
-            elif not isinstance(setting.default, str) and (setting.name, value) != ("deletion_time", None):
+            elif not isinstance(setting.default, str) and not (value is None and setting.default is None):
                 positive(value, setting.name)
                 if setting.name.endswith("probability") and value >= 1:
                     raise InvalidInputError(f"{setting.name} must be below 1, got {value!r}")
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 
-    def confirms(self, score: Array, detections: Array) -> Array:
-        """Which tracks are to be confirmed; `detections` has one bit for each scan, the last scan lowest."""
+    def false_share(self, alarms: float) -> float:
+        """Share of false tracks that may be confirmed, with so many false alarms in an hour (inf: not known)."""
+        if self.false_probability is not None:
+            return self.false_probability
+        if math.isinf(alarms):
+            return _UNKNOWN
+        return min(_MOST, self.false_tracks_per_hour / max(alarms, 1e-300))
+
+    def confirms(self, score: Array, detections: Array, alarms: float) -> Array:
+        """Which tracks are to be confirmed.
+
+        `detections` has one bit for each scan, the last scan lowest; `alarms` are the false alarms in an hour.
+        """
         if self.confirmation == "score":
-            reached: Array = score >= sequential_threshold(self.false_probability, self.missed_probability)
+            reached: Array = score >= sequential_threshold(self.false_share(alarms), self.missed_probability)
             return reached
         window = (detections & np.int64((1 << self.n) - 1)).astype(np.uint64)
         return np.asarray(count_bits(window) >= self.m)

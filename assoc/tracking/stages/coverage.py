@@ -6,6 +6,7 @@ predicted density in its view (`assoc.costs.views`).
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ _FORGETTING = 0.05
 _LEAST_TURN = 1e-3
 # a scan counts for a track if this share of it is in view of a sensor
 _COVERED = 0.5
+_HOUR = 3600.0
 # standard deviations below the region's floor
 _SURELY = 3.0
 
@@ -101,6 +103,15 @@ def covered(progress: Progress, misses: Array) -> Array:
     terms = progress.settings.terms
     least = _COVERED * (np.array(1.0) if terms.by_range is None else terms.by_range.min(axis=1))
     return np.asarray((misses <= log_missed(terms.miss, least)).any(axis=1))
+
+
+def false_alarms(progress: Progress) -> float:
+    """False alarms of all sensors that are expected in an hour; inf while the pace of the scans is not known."""
+    state = progress.state
+    if state.pace <= 0.0:
+        return math.inf
+    rates = np.array([sensor.false_alarm_rate for sensor in progress.settings.sensors])
+    return float(rates @ state.turns) * _HOUR / state.pace
 
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
