@@ -67,7 +67,7 @@ def test_pairs_near_each_other_are_those_of_all(seed):
     off = np.abs(z - h[:, None])
     off = np.where(turning, np.minimum(off % (2 * np.pi), 2 * np.pi - off % (2 * np.pi)), off)
     near = np.argwhere((off <= 3.0 * widths[:, None]).all(axis=2))
-    tracks, found, _ = gating._sweep(h, covariance, z, turning, 9.0, 10**6)
+    tracks, found, _ = gating._sweep(h, covariance, z, np.where(turning, 2 * np.pi, 0.0), 9.0, 10**6)
     np.testing.assert_array_equal(np.column_stack([tracks, found]), near)
 
 
