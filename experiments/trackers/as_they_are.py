@@ -27,11 +27,8 @@ from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.estimates import Estimates
 from experiments.common.claims import Claim
 from experiments.common.command import main, whole
-from experiments.trackers.judging import CUTOFF, goal, mean_claim
-from experiments.trackers.oracle import OracleTracker
+from experiments.trackers.judging import CUTOFF, OracleTracker, Sites, goal, mean_claim, through
 from experiments.trackers.real_scenes import ADAPTING, ROWS, SCANS, SITES, Case, Row, flat_states, untold_views
-from experiments.trackers.running import through
-from experiments.trackers.sites import Sites
 
 USUAL = ("oracle", "multi-sensor", ADAPTING, "mht, adapting")
 

@@ -22,8 +22,7 @@ from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
 from experiments.common.command import add_recording, main
 from experiments.common.measuring import processor_time
-from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
-from experiments.trackers.running import through
+from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means, through
 
 TURNS, INTERVAL = "4,5,5.5", 4.0
 INSTANT = "multi-sensor, as one instant"

@@ -17,8 +17,7 @@ from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
 from experiments.common.command import main
-from experiments.trackers.judging import goal, make, mean_claim
-from experiments.trackers.running import through
+from experiments.trackers.judging import goal, make, mean_claim, through
 
 TARGETS, SCANS, SEEDS, FIRST = 4, 40, 20, 200
 NEAR = 2_000.0

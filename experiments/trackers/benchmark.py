@@ -21,9 +21,7 @@ from assoc.metrics import gospa
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import GOAL, Claim, with_goal
 from experiments.common.command import above_zero, main, mean_interval
-from experiments.trackers import labelled
-from experiments.trackers.plane import Plane, simulate
-from experiments.trackers.running import in_plane
+from experiments.trackers.plane import AVAILABLE, Plane, in_plane, labelled, simulate
 
 WINDOW, GATE = 3, 0.999
 CUTOFF = 50.0
@@ -32,7 +30,7 @@ TARGETS, CLUTTER = (3, 30), (0.2, 2.0)
 SCANS, SEEDS, BUDGET = 20, {3: 10, 30: 3}, 30.0
 """The budget is that of one peer for all seeds of a setting, CPU seconds."""
 TIMES_FASTER = 50.0
-PEERS = {"mfa": "mht", "gnn": "nearest", "jpda": "joint", **({"lmb": "joint"} if labelled.AVAILABLE else {})}
+PEERS = {"mfa": "mht", "gnn": "nearest", "jpda": "joint", **({"lmb": "joint"} if AVAILABLE else {})}
 """A peer, and ours of the same kind."""
 ROUNDING = 1e-6
 """Metres of mean GOSPA that are no difference."""
@@ -73,8 +71,8 @@ def against_peers(targets: int, clutter: float, scans: int, seeds: Sequence[int]
             "gnn": stone_soup.nearest(plane, GATE),
             "jpda": stone_soup.probabilistic(plane, GATE),
         }
-        if labelled.AVAILABLE:
-            runs["lmb"] = labelled.labelled(plane)
+        if AVAILABLE:
+            runs["lmb"] = labelled(plane)
         for name, run in runs.items():
             found[name].append(judged(run, plane, share))
     label = f"{targets} targets, clutter {clutter:g} a target"

@@ -22,8 +22,7 @@ from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
 from experiments.common.command import add_recording, main
-from experiments.trackers.judging import distances, goal, mean_claim
-from experiments.trackers.running import through
+from experiments.trackers.judging import distances, goal, mean_claim, through
 
 SIZES = ((0.0, 0.0), (100.0, 0.1), (200.0, 0.2), (300.0, 0.3))
 """Biases of range and azimuth, metres and degrees."""

@@ -1,19 +1,134 @@
-"""How the trackers of all experiments are judged: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
+"""Running trackers and judging them, beside an oracle: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, hota, identity, mean_gospa, ospa2
 from assoc.scene import Scene
-from assoc.tracking import TRACKERS, Tracker
+from assoc.tracking import TRACKERS, MultiSensorTracker, Track, Tracker, TrackTable
+from assoc.tracking.associate.all_sensors import whole_scan
+from assoc.tracking.associate.mht import TrackTrees
+from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
+from assoc.tracking.fusion import SystemTracks, TrackFusion
+from assoc.tracking.method import Method
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.settings import TrackerSettings
 from experiments.common.claims import GOAL, Claim
 from experiments.common.command import mean_interval
-from experiments.trackers.oracle import OracleTracker
-from experiments.trackers.running import through
+from experiments.common.measuring import processor_time
+
+
+@dataclass(frozen=True)
+class Run:
+    """A tracker's way through a scene.
+
+    tracks: The confirmed tracks.
+    confirmed: list over scans of (ids (n,), positions (n, 3)).
+    seconds: array (K,). CPU time of each scan.
+    """
+
+    tracks: Trajectories
+    confirmed: list[tuple[Array, Array]]
+    seconds: Array
+
+
+def through(tracker: Tracker, scene: Scene) -> Run:
+    """Take a scene in, scan by scan."""
+    table, confirmed, seconds = TrackTable(), [], []
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        # CPU time: what else the machine does is not the tracker's
+        seconds.append(processor_time(tracker.step, scan.time, scan.measurements, scan.times, scan.sectors)[1])
+        tracks = [track for track in tracker.tracks if track.reported]
+        table.add(tracks, tracker.filter.motion.position)
+        places = np.array([track.position for track in tracks]).reshape(-1, 3)
+        confirmed.append((np.array([track.track_id for track in tracks], dtype=np.int64), places))
+    return Run(Trajectories(*table.arrays()), confirmed, np.array(seconds))
+
+
+@dataclass(frozen=True)
+class Oracle(Method):
+    """The targets of all measurements, scan by scan; its own part of a state is the target of each track."""
+
+    starter = TrackTrees()
+
+    sources: Any
+
+    def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> dict[int, int]:
+        """No track has a target."""
+        return {}
+
+    def associate(self, progress: Progress) -> Association:
+        """Correct each track by its target's measurements."""
+        rows, fresh = self._true_rows(progress)
+        scan = whole_scan(progress)
+        return self._noted(progress, scan.associated(scan.follow(np.arange(len(rows)), rows), rows, fresh))
+
+    def _true_rows(self, progress: Progress) -> tuple[Array, Array]:
+        """Measurements of each track, and of the targets without one."""
+        sources = self.sources[progress.scan.index]
+        known = [progress.state.method_state[i] for i in progress.state.tracks.track_id.tolist()]
+        fresh = sorted({t for source in sources for t in source.tolist() if t >= 0} - set(known))
+        return _rows(sources, known), _rows(sources, fresh)
+
+    def _noted(self, progress: Progress, found: Association) -> Association:
+        """Take note of which target each track has."""
+        target_of = dict(progress.state.method_state)
+        for source, ids in zip(self.sources[progress.scan.index], found.assigned, strict=True):
+            target_of |= {i: t for i, t in zip(ids.tolist(), source.tolist(), strict=True) if i}
+        return found._replace(method_state=target_of)
+
+
+class OracleTracker(Tracker):
+    """Tracks by the sources of the measurements, with the filter and the life of tracks of any other tracker.
+
+    scene: With truth.
+    **options: As for `Tracker`.
+    """
+
+    name = "oracle"
+    method = Oracle
+
+    def __init__(self, scene: Scene, **options: Any) -> None:
+        noise = manoeuvre_noise(pace_of(scene.times))
+        filter = two_speeds(noise, unscented=open_heights(scene.sensors))
+        options = {"filter": filter, "region": scene.region} | options
+        super().__init__(scene.sensors, sources=scene.truth.sources, **options)
+
+
+def _rows(sources: Any, targets: list[int]) -> Array:
+    """1-based measurements (T, S) of these targets, 0 where missed."""
+    rows = np.zeros((len(targets), len(sources)), dtype=np.int32)
+    for s, source in enumerate(sources):
+        number = {t: m + 1 for m, t in enumerate(source.tolist()) if t >= 0}
+        rows[:, s] = [number.get(t, 0) for t in targets]
+    return rows
+
+
+class Sites:
+    """Takes measurements as a tracker does, and hands out fused tracks."""
+
+    def __init__(self, scene: Scene, **options: Any) -> None:
+        noise = manoeuvre_noise(pace_of(scene.times))
+        options = {"filter": two_speeds(noise, unscented=open_heights(scene.sensors))} | options
+        self.sites = [MultiSensorTracker([sensor], region=scene.region, **options) for sensor in scene.sensors]
+        self.fusion, self.filter = TrackFusion(len(self.sites)), options["filter"]
+        self.tracks: list[Track] = []
+
+    def step(self, time: float, measurements: Any, times: Any = None, sectors: Array | None = None) -> None:
+        """Step each site, and fuse the tracks that they report."""
+        found = []
+        for s, site in enumerate(self.sites):
+            own = None if times is None else [times[s]]
+            site.step(time, [measurements[s]], own, None if sectors is None else sectors[s : s + 1])
+            found.append(SystemTracks.of([track for track in site.tracks if track.reported], site.filter.motion))
+        self.tracks = self.fusion.step(time, found).tracks
+
 
 CUTOFF = 500.0
 """Of GOSPA (order 2), OSPA(2) and HOTA, metres."""

@@ -19,7 +19,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import Initiation
 from assoc.tracking.filter_choice import make_filter, manoeuvre_noise, two_speeds
-from experiments.trackers.close_scenes import REGION, SETTINGS, Setting, level, radars, simulate
+from experiments.trackers.close_targets import REGION, SETTINGS, Setting, level, radars, simulate
 
 TARGETS, SCANS, INTERVAL = 12, 40, 4.0
 TIMES = INTERVAL * np.arange(SCANS)
@@ -359,7 +359,7 @@ ADAPTING = "multi-sensor, adapting"
 """What the programs run."""
 JOINT = "joint-probabilistic"
 SITES = "sites"
-"""A tracker at each sensor, which sends tracks alone; see `experiments.trackers.sites`."""
+"""A tracker at each sensor, which sends tracks alone; see `experiments.trackers.judging`."""
 
 
 class Row(NamedTuple):

@@ -13,14 +13,13 @@ from experiments.trackers import (
     bearings,
     benchmark,
     biases,
-    close_scenes,
+    close_targets,
     comparison,
     judging,
-    labelled,
     live,
     plane,
 )
-from experiments.trackers.running import in_plane
+from experiments.trackers.plane import in_plane
 from tests.sizes import sample
 
 
@@ -57,9 +56,9 @@ def test_stone_soup_and_ours_on_the_same_detections():
 
 
 def test_the_labelled_filter_on_the_same_detections():
-    pytest.importorskip(labelled.PACKAGE)
+    pytest.importorskip(plane.PACKAGE)
     one = plane.simulate(3, 0.2, 4, 1)
-    theirs = benchmark.judged(labelled.labelled(one), one, 60.0)
+    theirs = benchmark.judged(plane.labelled(one), one, 60.0)
     ours = benchmark.judged(in_plane(JointProbabilisticTracker, one), one, 60.0)
     assert len(theirs.gospa) == 4 and (theirs.seconds > 0).all()
     np.testing.assert_allclose(theirs.gospa, ours.gospa, atol=4.0)
@@ -71,7 +70,7 @@ def test_a_peer_stops_when_its_time_is_over():
 
 
 def test_close_targets_and_the_oracle():
-    scene = close_scenes.simulate(close_scenes.SETTINGS["formations"], 100, 6)
+    scene = close_targets.simulate(close_targets.SETTINGS["formations"], 100, 6)
     oracle, mht = (judging.judge(name, scene) for name in ("oracle", "mht"))
     assert oracle.switches == 0 and mht.switches <= 2
     assert mht.distances.mean() == pytest.approx(oracle.distances.mean(), rel=0.3)

@@ -10,7 +10,7 @@ from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.sensors import BearingSensor, Radar3D
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation, LifeCycle, track_scene
-from experiments.trackers.oracle import OracleTracker
+from experiments.trackers.judging import OracleTracker
 from tests.sizes import sample
 from tests.tracking import plain
 
