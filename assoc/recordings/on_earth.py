@@ -47,5 +47,7 @@ def placed(
             radar,
             noise=np.sqrt([*np.diagonal(radar.covariance), height_noise**2]),
             field_of_view=np.vstack([radar.field_of_view, heights]),
+            # heights are what transponders say, of echoes that are two already
+            resolution=None if radar.resolution is None else np.append(radar.resolution, np.inf),
         )
     return replace(recording, azimuths=np.arctan2(away[:, 1], away[:, 0])), radar

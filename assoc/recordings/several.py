@@ -136,6 +136,7 @@ def parts_of_radars(recordings: Sequence[Recording], radars: Sequence[Radar2D]) 
                 radar,
                 noise=radar.covariance[:2, :2],
                 field_of_view=radar.field_of_view[:2],
+                resolution=None if radar.resolution is None else radar.resolution[:2],
                 detection_probability=radar.detection_probability * (1.0 - share),
                 name=f"{radar.name}{NO_HEIGHT}" if share else radar.name,
             )

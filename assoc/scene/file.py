@@ -17,11 +17,14 @@ from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_part
 from assoc.sensors import KINDS, Platform, Sensor
 
 FORMAT = "assoc.scene"
-VERSION = 4
+VERSION = 5
 # bytes, a quarter of its memory: its content counts as well
 _OF_A_SCAN = 120
+# a resolution that was not said; components that part no targets
+_UNSAID, _NEVER = -1.0, -2.0
 # fields of later versions, latest first; a scene without them is written as version 1
-_LATER = {"sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3, "measurement_times": 2, "sectors": 2}
+_LATER = {"sensor_resolution": 5, "sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3, "measurement_times": 2,
+          "sectors": 2}  # fmt: skip
 
 _FIELDS = {
     "name": Field("str", 0, required=False),
@@ -37,6 +40,7 @@ _FIELDS = {
     "sensor_false_alarm_rate": Field("float", 1),
     "sensor_folding": Field("float", 1, required=False),
     "sensor_notch": Field("float", 1, required=False),
+    "sensor_resolution": Field("float", 1, required=False),
     "measurement_values": Field("float", 1),
     "measurement_offsets": Field("int", 2),
     "measurement_sources": Field("int", 1, required=False),
@@ -96,6 +100,10 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         values = [value if math.isfinite(value) else -1.0 for value in values]
         if any(values):
             arrays[f"sensor_{name}"] = np.array(values)
+    if any(sensor.resolution is not None for sensor in sensors):
+        parted = [np.full(s.dim, _UNSAID) if s.resolution is None else s.resolution for s in sensors]
+        flat = np.concatenate(parted)
+        arrays["sensor_resolution"] = np.where(np.isinf(flat), _NEVER, flat)
     arrays |= _platform_arrays(sensors)
     if parts["sectors"] is not None:
         arrays["sectors"] = parts["sectors"]
@@ -192,6 +200,8 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         raise InvalidInputError(f"the field 'sensor_dim' must hold 1 to 4, got {dims.min()} to {dims.max()}")
     _check_shape(arrays, "sensor_covariance", (int((dims**2).sum()),))
     _check_shape(arrays, "sensor_field_of_view", (int(dims.sum()), 2))
+    parted = arrays.get("sensor_resolution", np.full(int(dims.sum()), _UNSAID))
+    _check_shape({"sensor_resolution": parted}, "sensor_resolution", (int(dims.sum()),))
     sensors = []
     platforms = _platforms(arrays, count)
     square, row = 0, 0
@@ -205,6 +215,8 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         rates = {name: float(arrays[f"sensor_{name}"][s]) for name in known if arrays[f"sensor_{name}"][s] != 0.0}
         if rates.get("folding") == -1.0:
             rates["folding"] = math.inf
+        own = parted[row : row + dim]
+        resolution = None if (own == _UNSAID).all() else np.where(own == _NEVER, math.inf, own)
         covariance = arrays["sensor_covariance"][square : square + dim * dim].reshape(dim, dim)
         try:
             sensors.append(
@@ -216,6 +228,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
                     false_alarm_rate=float(arrays["sensor_false_alarm_rate"][s]),
                     field_of_view=arrays["sensor_field_of_view"][row : row + dim],
                     platform=platforms[s],
+                    resolution=resolution,
                     **rates,
                 )
             )

@@ -12,7 +12,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
-from assoc.sensors.arrays import finite_array
+from assoc.sensors.arrays import finite_array, numbers
 from assoc.sensors.platform import Platform
 
 ANGLES = ("azimuth", "elevation")
@@ -48,6 +48,10 @@ class Sensor(ABC):
     platform : Platform, optional
         What carries the sensor. Its position is then that on the carrier, forward, left and up, and measurements and
         the field of view are relative to the carrier's position and heading; see `at`.
+    resolution : array_like (d,), optional
+        Two targets give two measurements where they differ by at least this in some component; closer in all of them,
+        one. inf: the component parts no targets; 0: any difference does. Not said: none in simulations, and trackers
+        that adapt learn it.
 
     Raises
     ------
@@ -67,6 +71,7 @@ class Sensor(ABC):
     field_of_view: Array = None  # type: ignore[assignment]  # only sensors with a natural default leave it out
     name: str = ""
     platform: Platform | None = None
+    resolution: Array | None = None
 
     kind: ClassVar[str]
     components: ClassVar[tuple[str, ...]]
@@ -106,6 +111,8 @@ class Sensor(ABC):
         if self.platform is not None:
             if not isinstance(self.platform, Platform):
                 raise InvalidInputError(f"{label}: platform must be a Platform, got {type(self.platform).__name__}")
+        if self.resolution is not None:
+            put(self, "resolution", self._checked_resolution())
         for line in self.warnings:
             warn(line)
 
@@ -153,6 +160,20 @@ class Sensor(ABC):
         if np.sqrt(variances.min()) < 1e-12:
             raise InvalidInputError(f"{label}: noise below 1e-12 is too small to compute with")
         return noise
+
+    @property
+    def _said(self) -> list[float] | None:
+        return None if self.resolution is None else self.resolution.tolist()
+
+    def _checked_resolution(self) -> Array:
+        found = numbers(self.resolution, f"{self._label}: resolution")
+        if found.shape != (self.dim,) or not (found >= 0.0).all():
+            raise InvalidInputError(
+                f"{self._label}: resolution must be {self.dim} numbers of at least 0, one for each of "
+                f"{', '.join(self.components[: self.dim])}, got {found.tolist()}"
+            )
+        found.setflags(write=False)
+        return found
 
     @classmethod
     def _allowed_dims(cls) -> tuple[int, ...]:
@@ -331,6 +352,7 @@ class Sensor(ABC):
             and np.array_equal(self.covariance, other.covariance)
             and np.array_equal(self.field_of_view, other.field_of_view)
             and self.platform == other.platform
+            and self._said == other._said
         )
 
     def __hash__(self) -> int:

@@ -82,7 +82,9 @@ class Radar3D(Sensor):
     @cached_property
     def _without_range_rate(self) -> Radar3D:
         view = self.field_of_view[:3]
-        return replace(self, noise=self.covariance[:3, :3], field_of_view=view, folding=None, notch=0.0)
+        apart = None if self.resolution is None else self.resolution[:3]
+        noise = self.covariance[:3, :3]
+        return replace(self, noise=noise, field_of_view=view, resolution=apart, folding=None, notch=0.0)
 
     @property
     def position_part(self) -> Sensor:

@@ -128,6 +128,31 @@ def _on_board(sensor: Sensor, time: float, values: Array, source: Array) -> tupl
     return values[kept], source[kept]
 
 
+def resolved(sensor: Sensor, exact: Array, when: Array, turn: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Which of n detected targets give a measurement, and what it is moved by: of those not resolved, the strongest.
+
+    Targets closer than the sensor's resolution to one of them in all components of `exact` (n, d), and seen less than
+    half a `turn` apart, give one measurement, at their mean weighted by echoes of exponential strength.
+    """
+    shift, kept = np.zeros(exact.shape), np.ones(len(exact), dtype=np.bool_)
+    if sensor.resolution is None:
+        return kept, shift
+    free = kept.copy()
+    for i in range(len(exact)):
+        if not free[i]:
+            continue
+        off = sensor.residual(exact, np.broadcast_to(exact[i], exact.shape))
+        close = free & (np.abs(off) < sensor.resolution).all(axis=1) & (np.abs(when - when[i]) < 0.5 * turn)
+        group = np.flatnonzero(close)
+        if len(group) < 2:
+            continue
+        strength = rng.exponential(size=len(group))
+        first = group[int(strength.argmax())]
+        free[group], kept[group], kept[first] = False, False, True
+        shift[first] = strength @ off[group] / strength.sum() - off[first]
+    return kept, shift
+
+
 def _report(
     sensor: Sensor, ids: Array, positions: Array, velocities: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
@@ -137,12 +162,14 @@ def _report(
     detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.sees(exact)
     factor = np.linalg.cholesky(sensor.covariance)
     hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T
+    kept, shift = resolved(sensor, exact[detected], np.zeros(int(detected.sum())), 1.0, rng)
+    hits, ids = (hits + shift)[kept], ids[detected][kept]
     low, high = sensor.field_of_view[:, 0], sensor.field_of_view[:, 1]
     clutter = rng.uniform(low, high, size=(int(rng.poisson(sensor.false_alarm_rate)), sensor.dim))
     values = np.concatenate([hits, clutter])
     for axis in range(sensor.dim):
         if sensor.angular[axis]:
             values[:, axis] = wrap_angle(values[:, axis])
-    source = np.concatenate([ids[detected], np.full(len(clutter), -1)]).astype(np.int64)
+    source = np.concatenate([ids, np.full(len(clutter), -1)]).astype(np.int64)
     order = rng.permutation(len(values))
     return sensor.folded(values)[order], source[order]

@@ -15,6 +15,7 @@ from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
 from assoc.sensors.base import Sensor, wrap_angle
 from assoc.simulation.antenna import dwells
+from assoc.simulation.observation import resolved
 
 FULL_TURN = 2.0 * math.pi
 
@@ -85,7 +86,7 @@ def observe_in_turns(
     for s, (sensor, turn) in enumerate(zip(sensors, turns, strict=True)):
         # the antenna pointed north so many seconds before time 0
         ahead = rng.uniform(0.0, turn)
-        hits = [_hits(sensor, turn, ahead, path, edges, rng) for path in paths]
+        hits = _resolved(sensor, turn, [_hits(sensor, turn, ahead, path, edges, rng) for path in paths], rng)
         hits.append(_clutter(sensor, turn, ahead, edges, rng))
         when, values, source = (np.concatenate(part) for part in zip(*hits, strict=True))
         for axis in range(sensor.dim):
@@ -108,15 +109,26 @@ def observe_in_turns(
 
 def _hits(
     sensor: Sensor, turn: float, ahead: float, path: Path, edges: Array, rng: np.random.Generator
-) -> tuple[Array, Array, Array]:
-    """Times, measurements and sources of the detections of one target."""
+) -> tuple[Array, Array, Array, Array]:
+    """Times, measurements and sources of the detections of one target, and the measurements without noise."""
     when = dwells(path.times + ahead, path.positions - sensor.position, turn) - ahead
     when = when[(when > edges[0]) & (when <= edges[-1])]
     positions, velocities = path.at(when)
     exact = sensor.measure(positions, velocities) if sensor.measures_velocity else sensor.measure(positions)
     seen = (rng.random(len(when)) < sensor.detection_probability) & sensor.sees(exact)
     noise = rng.standard_normal((int(seen.sum()), sensor.dim)) @ np.linalg.cholesky(sensor.covariance).T
-    return when[seen], exact[seen] + noise, np.full(int(seen.sum()), path.target)
+    return when[seen], exact[seen] + noise, np.full(int(seen.sum()), path.target), exact[seen]
+
+
+def _resolved(
+    sensor: Sensor, turn: float, hits: list[tuple[Array, Array, Array, Array]], rng: np.random.Generator
+) -> list[tuple[Array, Array, Array]]:
+    """Detections of all targets with one in place of those that the sensor does not resolve."""
+    if sensor.resolution is None or not hits:
+        return [found[:3] for found in hits]
+    when, values, source, exact = (np.concatenate(part) for part in zip(*hits, strict=True))
+    kept, shift = resolved(sensor, exact, when, turn, rng)
+    return [(when[kept], (values + shift)[kept], source[kept])]
 
 
 def _clutter(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 ASTERIX = (".ast", ".asterix", ".pcap")
 KEYS = (
     "name", "file", "radar", "columns", "units", "place", "noise", "detection_probability", "false_alarms", "reach_km",
-    "turn",
+    "resolution",    "turn",
 )  # fmt: skip
 """Keys of a table [[radar]]."""
 _TOP = ("name", "origin", "interval", "closed", "radar")
@@ -157,6 +157,12 @@ def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...
             raise InvalidInputError(f"{where}: turn: {error}") from None
         what = str(error).removeprefix("range_noise: ").removeprefix("azimuth_noise: ")
         raise InvalidInputError(f"{where}: noise: {what} ([100, 0.1], metres and degrees, is usual)") from None
+    if "resolution" in table:
+        apart = table["resolution"]
+        if not isinstance(apart, list) or len(apart) != 2:
+            raise InvalidInputError(f"{where}: resolution: expected [metres, degrees], got {apart!r}")
+        length, angle = (_number(value, f"{where}: resolution") for value in apart)
+        radar = replace(radar, resolution=np.array([length, math.radians(angle)]))
     if "reach_km" in table:
         view = radar.field_of_view.copy()
         view[0, 1] = 1e3 * _number(table["reach_km"], f"{where}: reach_km")
