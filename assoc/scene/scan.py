@@ -36,6 +36,8 @@ class Scan:
     clutter : tuple over sensors of arrays (n_s,), or None
         Logarithm of the density of false alarms over the detection probability at each measurement, relative to those
         of its sensor; None: the same everywhere. Trackers that adapt find it.
+    copies : int array (S,), or None
+        How many of the last measurements of each sensor are others once more, as plots of two targets are to trackers.
     """
 
     index: int
@@ -49,6 +51,7 @@ class Scan:
     identities: tuple[Array, ...] | None = None
     paths: tuple[Platform | None, ...] = ()
     clutter: tuple[Array, ...] | None = None
+    copies: Array | None = None
 
     @property
     def sizes(self) -> Array:
@@ -93,6 +96,18 @@ class Scan:
     def crowd(self, s: int, numbers: Array) -> Array:
         """The `clutter` of measurements of sensor s (numbers from 0), (K,)."""
         return np.zeros(len(numbers)) if self.clutter is None else self.clutter[s][numbers]
+
+    def with_copies(self, measurements: Sequence[Array], numbers: Sequence[Sequence[int]]) -> Scan:
+        """The scan with these measurements, for each sensor the last of them copies of its `numbers` (from 0)."""
+
+        def longer(parts: tuple[Array, ...] | None) -> tuple[Array, ...] | None:
+            both = () if parts is None else zip(parts, numbers, strict=True)
+            return None if parts is None else tuple(np.concatenate([part, part[list(rows)]]) for part, rows in both)
+
+        return replace(
+            self, measurements=tuple(measurements), times=longer(self.times), identities=longer(self.identities),
+            clutter=longer(self.clutter), copies=np.array([len(rows) for rows in numbers]),
+        )  # fmt: skip
 
     def true_tuples(self) -> NDArray[np.int32] | None:
         """The tuples of the targets that at least two sensors detected.

@@ -23,11 +23,12 @@ from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.track_batch import one_state
+from assoc.tracking.records.unresolved import Unresolved
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import Starter, TrackerState
 
 FORMAT = "assoc.tracker"
-VERSION = 5
+VERSION = 6
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
@@ -98,6 +99,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
         **{f"lost.{name}": value for name, value in state.lost.arrays().items()},
         **{f"doubles.{name}": value for name, value in state.doubles._asdict().items()},
+        **{f"unresolved.{name}": value for name, value in state.unresolved._asdict().items()},
         **settings.method.arrays(state.method_state),
     }
     if state.registration is not None:
@@ -133,6 +135,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     saved.require(good, "turns", f"{len(model.turns)} shares of a turn")
     state = model._replace(
         tracks=tracks, lost=lost, doubles=_doubles(model.doubles, saved.part("doubles.")), turns=turns,
+        unresolved=_unresolved(model.unresolved, saved.part("unresolved.")),
         time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
@@ -160,6 +163,17 @@ def _doubles(model: Doubles, saved: Saved) -> Doubles:
     good = counts.shape == (len(ids), *model.counts.shape[1:]) and np.isfinite(counts).all() and (counts >= 0).all()
     saved.require(good, "counts", f"numbers >= 0 of the shape {(len(ids), *model.counts.shape[1:])}")
     return Doubles(ids, counts)
+
+
+def _unresolved(model: Unresolved, saved: Saved) -> Unresolved:
+    """Pairs of tracks and what was learnt of resolutions in these arrays, checked."""
+    found = Unresolved(**saved)
+    saved.require(found.ids.shape == (len(found.ids), 2) and (found.ids >= 1).all(), "ids", "two track ids in each row")
+    saved.require(found.apart.shape == (len(found.ids),), "apart", "a number for each pair")
+    saved.require((np.diff(found.confirmed) > 0).all(), "confirmed", "ids that ascend")
+    good = found.evidence.shape == model.evidence.shape and np.isfinite(found.evidence).all()
+    saved.require(good, "evidence", f"finite numbers of the shape {model.evidence.shape}")
+    return found
 
 
 def _estimates(model: Estimates, saved: Saved) -> Estimates:

@@ -15,6 +15,7 @@ from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.tracking.records.track import Step
 from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.records.unresolved import Shared
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
 
@@ -92,6 +93,8 @@ class Progress(NamedTuple):
     """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
     crowds: tuple[Array, ...] = ()
     """Logarithms of the densities there, whether they are in use or not."""
+    shared: Shared | None = None
+    """Tracks that may be unresolved in this scan; see `assoc.tracking.stages.unresolved`."""
     association: Association | None = None
     step: Step | None = None
 

@@ -17,6 +17,7 @@ from assoc.tracking.records.estimates import Estimates
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.identity_evidence import Identities
 from assoc.tracking.records.track_batch import TrackBatch, empty_batch
+from assoc.tracking.records.unresolved import Unresolved
 from assoc.tracking.settings import TrackerSettings
 
 
@@ -33,6 +34,8 @@ class TrackerState(NamedTuple):
     """Confirmed tracks that ended not long ago; see `assoc.tracking.stages.taking_up`."""
     doubles: Doubles
     """Pairs of tracks that may have one target; see `assoc.tracking.stages.merging`."""
+    unresolved: Unresolved
+    """Pairs of tracks that a sensor may not resolve; see `assoc.tracking.stages.unresolved`."""
     time: float | None = None
     """Time of the last scan, seconds; None before the first."""
     scan: int = 0
@@ -75,6 +78,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         settings.method.begun(settings, tracks),
         empty_batch(settings.filter),
         Doubles.none(count),
+        Unresolved.none(count),
         registration=settings.registration,
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,

@@ -35,6 +35,7 @@ from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.starter import current, end_ghosts, step_starter, take_over
 from assoc.tracking.stages.taking_up import take_up
+from assoc.tracking.stages.unresolved import share, tell_apart, without_copies
 from assoc.tracking.state import TrackerState, rng_of
 
 Stage = Callable[[Progress], Progress]
@@ -47,7 +48,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([register] if settings.registration is not None else []),
         *([use_estimates, use_speeds] if settings.adapt else []),
         keep_pace,
-        *([take_over] if starting else []),
+        *([take_over] if starting else [share]),
         predict,
         *([remember_tracks] if settings.adapt else []),
         count_out_of_view,
@@ -57,7 +58,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([end_ghosts, grow_starter] if starting else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
-        *([] if starting else [take_up, merge, name_parents]),
+        *([] if starting else [take_up, merge, name_parents, tell_apart]),
         report,
     ]
 
@@ -190,7 +191,11 @@ def associate(progress: Progress) -> Progress:
     method = progress.settings.method
     if progress.timed is not None and not method.own_times:
         raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
-    return progress._replace(association=method.associate(progress))
+    first_new, shared = progress.work.next_id, progress.shared
+    done = method.associate(progress)
+    if shared is None or shared.measured is None:
+        return progress._replace(association=done)
+    return progress._replace(association=without_copies(progress, done, first_new), scan=shared.measured)
 
 
 def live(progress: Progress) -> Progress:

@@ -99,5 +99,5 @@ def test_numbers_of_numpys_are_the_same_settings(tmp_path):
 def test_a_file_of_version_1_is_refused(tmp_path):
     tracker, path = TRACKERS["mht"].for_scene(scene("three-radar")), tmp_path / "state.npz"
     np.savez(path, format=np.array(FORMAT), version=np.array(1), settings=np.array("{}"))
-    with pytest.raises(InvalidInputError, match=r"state\.npz: has version 1 of 'assoc\.tracker', .* version 5 only"):
+    with pytest.raises(InvalidInputError, match=r"state\.npz: has version 1 of 'assoc\.tracker', .* version 6 only"):
         tracker.restore(path)

@@ -63,6 +63,9 @@ def learn(progress: Progress) -> Progress:
     rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
     if len(tracks):
         _seek(progress, late, rows, dwelled)
+    if progress.shared is not None:
+        hidden = progress.shared.hidden(tracks.track_id)
+        rows[hidden], dwelled[hidden] = 0, False
     # tracks in dense clutter say little about sensors
     plain = ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
     hits = (rows > 0) & plain[:, None]

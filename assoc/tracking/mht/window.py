@@ -33,21 +33,24 @@ class Window(NamedTuple):
     """Seconds, (W,)."""
     sizes: Array
     """Measurements of each sensor, int64 (W, S)."""
+    copies: Array
+    """How many of them, the last, are others once more (`assoc.scene.scan.Scan.copies`), int64 (W, S)."""
 
     @staticmethod
     def empty(branches: int, depth: int, sensors: int) -> Window:
         """The window before the first scan."""
         history = np.zeros((branches, depth * sensors), dtype=np.int32)
-        return Window(history, np.zeros(0), np.zeros((0, sensors), dtype=np.int64))
+        return Window(history, np.zeros(0), *np.zeros((2, 0, sensors), dtype=np.int64))
 
     def opened(self, scan: Scan, history: Array) -> Window:
         """The window with this scan added, and the new history."""
         times, sizes = np.append(scan.time, self.times), np.concatenate([scan.sizes[None].astype(np.int64), self.sizes])
-        return Window(history, times, sizes)
+        copies = np.zeros_like(scan.sizes) if scan.copies is None else scan.copies
+        return Window(history, times, sizes, np.concatenate([copies[None].astype(np.int64), self.copies]))
 
     def closed(self) -> Window:
         """The window without its oldest scan."""
-        return self._replace(times=self.times[:-1], sizes=self.sizes[:-1])
+        return self._replace(times=self.times[:-1], sizes=self.sizes[:-1], copies=self.copies[:-1])
 
     def of(self, rows: Array) -> Window:
         """The window of these branches alone."""
@@ -58,8 +61,10 @@ class Window(NamedTuple):
         sizes, confirmed = self.sizes[age], tracks.confirmed[rows].astype(np.int64)
         history = self.history[rows, age * sizes.size : (age + 1) * sizes.size]
         assigned, sure = owners(history, tracks.track_id[rows], sizes), owners(history, confirmed, sizes)
-        known = tuple(flags.astype(np.bool_) for flags in sure)
-        return Decision(scan - age, float(self.times[age]), tuple(assigned), known)
+        own = (sizes - self.copies[age]).tolist()
+        ids = tuple(taken[:size] for taken, size in zip(assigned, own, strict=True))
+        known = tuple(flags[:size].astype(np.bool_) for flags, size in zip(sure, own, strict=True))
+        return Decision(scan - age, float(self.times[age]), ids, known)
 
     def decisions(self, scan: int, tracks: TrackBatch, rows: Array) -> tuple[Decision, ...]:
         """Decisions of these rows about all open scans, oldest first."""
@@ -67,7 +72,8 @@ class Window(NamedTuple):
 
     def arrays(self) -> Mapping[str, Array]:
         """The window for a file."""
-        return {"history": self.history, "window_times": self.times, "window_sizes": self.sizes}
+        return {"history": self.history, "window_times": self.times, "window_sizes": self.sizes,
+                "window_copies": self.copies}  # fmt: skip
 
     @staticmethod
     def restored(saved: Saved, branches: int, depth: int, sensors: int) -> Window:
@@ -77,13 +83,16 @@ class Window(NamedTuple):
         saved.require(np.isfinite(times).all(), "window_times", "finite numbers")
         saved.require(sizes.shape == (len(times), sensors), "window_sizes", f"the shape {(len(times), sensors)}")
         saved.require(((sizes >= 0) & (sizes <= MOST_MEASUREMENTS)).all(), "window_sizes", "numbers of measurements")
+        copies = saved["window_copies"]
+        good = copies.shape == sizes.shape and ((copies >= 0) & (copies <= sizes)).all()
+        saved.require(good, "window_copies", "numbers of measurements, no more than there are")
         shape = branches, depth * sensors
         saved.require(history.shape == shape, "history", f"the shape {shape}")
         most = np.full(depth * sensors, MOST_MEASUREMENTS)
         most[: sizes.size] = sizes.ravel()
         known = ((history >= 0) & (history <= most)).all()
         saved.require(known, "history", "numbers of measurements of the scans in the window")
-        return Window(history.astype(np.int32), times, sizes)
+        return Window(history.astype(np.int32), times, sizes, copies)
 
 
 @dataclass(frozen=True)

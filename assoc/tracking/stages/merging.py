@@ -49,6 +49,11 @@ def merge(progress: Progress) -> Progress:
     new = np.stack([a / total, b / total, 1.0 - (a + b) / total], axis=2)
     # where no sensor detects either, both may be out of sight
     new *= (covered & (a + b > 0.5).any(axis=1)[:, None])[..., None]
+    if progress.shared is not None:
+        # what a sensor did not resolve says nothing
+        apart = 1.0 - progress.shared.of(tracks.track_id[first], tracks.track_id[second])
+        new *= apart[..., None]
+        a, b = a * (apart > 0.0), b * (apart > 0.0)
     doubles = state.doubles.of(np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1))
     counts = np.where((a + b > _BOTH).any(axis=1)[:, None, None], 0.0, doubles.counts + new)
     doubles = doubles._replace(counts=counts)
