@@ -6,7 +6,6 @@ import math
 import secrets
 import sys
 import types
-from collections.abc import Iterable, Mapping
 from dataclasses import Field, fields
 from functools import cache
 from numbers import Integral, Real
@@ -116,13 +115,6 @@ def whole_seed(seed: object) -> int:
     if not is_whole(seed, 0):
         raise InvalidInputError(f"seed: expected a whole number >= 0, or None for a random one, got {seed!r}")
     return int(seed)  # type: ignore[call-overload]
-
-
-def refuse_gone(given: Iterable[str], gone: Mapping[str, str]) -> None:
-    """Refuse arguments that there were once: `gone` says for each what to use instead."""
-    for name in given:
-        if name in gone:
-            raise InvalidInputError(f"{name} is gone: {gone[name]}")
 
 
 def checked_time_limit(time_limit: object, name: str = "time_limit") -> float | None:

@@ -148,8 +148,6 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=HelpFormatter, allow_abbrev=False, **rest)
         self.declared: dict[str, Option] = {}
         self.elsewhere: Callable[[], Mapping[str, str]] = dict
-        # flags that there were once, and what to use instead
-        self.gone: Mapping[str, str] = {}
         """Returns flags that do not apply to this program here, each with what it belongs to."""
 
     def declare(self, *options: Option, group: str = "") -> None:
@@ -187,8 +185,6 @@ class Parser(argparse.ArgumentParser):
         flag = word.partition("=")[0]
         if not flag.startswith("-"):
             return ""
-        if flag in self.gone:
-            return f"; {flag} is gone: {self.gone[flag]}"
         elsewhere = self.elsewhere()
         if flag in elsewhere:
             return f"; {flag} belongs to {elsewhere[flag]}"

@@ -17,6 +17,8 @@ _ONE_PROCESS = "a recording is tracked by one process, which takes about 0.3 hou
 _NOT_TOLD = "identities are evidence (identity=IdentityParameters()); those that do not fit are not told by name"
 _LOSS = "associate twice, with gate_probability 0.999 and 1, and compare costs"
 
+_STANDARD = "Marginals.error is the standard error, 0 where Marginals.exact"
+
 REMOVED: dict[str, str] = {
     "assoc.integrations.stonesoup.AssocTracker": "make a scene by scene_from_detections, track it by assoc.tracking",
     "assoc.integrations.stonesoup.TrackFusionTracker": "use assoc.tracking.fusion.TrackFusion on the tracks' states",
@@ -31,6 +33,14 @@ REMOVED: dict[str, str] = {
     "--slice": _ONE_PROCESS,
     "assoc.track --jobs": _ONE_PROCESS,
     "assoc.track --scheduler": _ONE_PROCESS,
+    "assoc.sweep --plot": "write --heatmap FILE.png --convergence FILE.png",
+    "--all-sensors": "joint-probabilistic takes one sensor after the other; multi-sensor takes all at once",
+    "marginals(k)": "nothing is listed; probabilities are exact sums or sampled, and say their error",
+    "marginals(method)": "sums where these are short, else samples; see Marginals.exact and Marginals.error",
+    "Marginals.lower": _STANDARD,
+    "Marginals.upper": _STANDARD,
+    "Marginals.unseen": _STANDARD,
+    "Marginals.listed": "nothing is listed; Marginals.exact says what is summed",
 }
 """By old spelling, the sentence that says what to use instead."""
 

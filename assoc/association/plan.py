@@ -106,7 +106,8 @@ class Plan:
         if not self.marginals:
             return scans
         found = marginals(problem, time_limit=self.time_limit)
-        values = np.stack([found.lower, found.probability, found.upper], axis=1)
+        around = 2.0 * found.error
+        values = np.clip(found.probability + np.multiply.outer([-1.0, 0.0, 1.0], around), 0.0, 1.0).T
         row = {key: number for number, key in enumerate(map(tuple, found.tuples.tolist()))}
         return [
             replace(scan, probabilities=values[[row[key] for key in map(tuple, scan.targets.tolist())]].reshape(-1, 3))

@@ -51,8 +51,8 @@ class ScanAssociation(Shown):
         Seconds of compiling or loading kernels for this scan, costs and positions included; not part of
         ``solution.runtime``.
     probabilities : array (T, 3) or None
-        Probability of each target among all associations of the scan, if requested: lower bound, estimate, upper bound
-        (``assoc.marginals``).
+        Probability of each target among all associations of the scan, if requested (``assoc.marginals``), between
+        itself less and plus two standard errors, which are 0 where it is exact.
     """
 
     scan: int

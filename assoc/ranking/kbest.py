@@ -15,7 +15,7 @@ import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from assoc._parameters import checked_time_limit
 from assoc._system import memory
@@ -24,7 +24,7 @@ from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.prepare import Prepared, prepare, with_capped_costs
 from assoc.packing.run import Outcome, Run, infeasible
-from assoc.problem import AssignmentProblem, check_problem
+from assoc.problem import AssignmentProblem, taken_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.component_ranking import FIRST_BUDGET
 from assoc.ranking.head_start import HeadStart
@@ -42,13 +42,13 @@ _SOLUTION, _MEASUREMENT = 2_000, 130
 
 
 @door
-def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None) -> list[Solution]:
+def kbest(problem: AssignmentProblem | ArrayLike, k: int, *, time_limit: float | None = None) -> list[Solution]:
     """Return the k best solutions, truly ranked.
 
     Parameters
     ----------
-    problem : AssignmentProblem
-        What to solve; any number of sensors, with or without dummies.
+    problem : AssignmentProblem or array_like
+        What to solve; any number of sensors, with or without dummies. An array of costs is taken as by `assign`.
     k : int
         Number of solutions; if the problem has fewer, all of them are returned. Where memory suffices only for fewer
         (about 2 kB each, and 150 bytes for each measurement of the problem), fewer are returned, and ``stopped_by`` is
@@ -82,7 +82,7 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     K. G. Murty, "An algorithm for ranking all the assignments in order of increasing cost", Operations
     Research 16, 682-687 (1968).
     """
-    check_problem(problem)
+    problem = taken_problem(problem)
     k, clock = checked_k(k), Run(0, time_limit=checked_time_limit(time_limit), methods=EXACT_METHODS)
     known: list[Solution] = []
     with interruptible():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from assoc._parameters import checked_time_limit, refuse_gone, whole_seed
+from assoc._parameters import checked_time_limit, whole_seed
 from assoc._system.door import doors
 from assoc._system.imports import removed_attribute
 from assoc._text.times import moment
@@ -122,9 +122,6 @@ class Tracker:
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         scene = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
-        refuse_gone(
-            options, {"all_sensors": "sensors are taken one after the other; MultiSensorTracker takes all at once"}
-        )
         online: Any = registration
         if registration == "online":
             online = OnlineRegistration(tuple(scene.sensors), scene.region)

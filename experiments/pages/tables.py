@@ -379,8 +379,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "recordings-speed": partial(_plain, "scale.recordings", "tracker, recording", ("memory", "plots a second")),
     "probabilities": partial(
         _plain, "probabilities", "",
-        ("mean width", "seconds", "estimate, seconds", "estimate, mean off longer runs",
-         "estimate, furthest off longer runs"),
+        ("mean error", "largest error", "within four errors", "seconds"),
     ),
     "prior": partial(
         _plain, "ambiguous_bearings", "scene, cost",

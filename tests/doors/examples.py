@@ -92,7 +92,7 @@ def examples() -> dict[str, dict[str, Any]]:
         },
         "assoc.kbest": {"problem": problem(), "k": 2, "time_limit": 5.0},
         "assoc.load": {"path": "missing.npz"},
-        "assoc.marginals": {"problem": problem(), "k": 2, "time_limit": 5.0},
+        "assoc.marginals": {"problem": problem(), "time_limit": 5.0},
         "assoc.scene.Scene": {"sensors": one.sensors, "times": one.times, "measurements": one.measurements},
         "assoc.scene.Truth": {
             "target_ids": one.truth.target_ids,

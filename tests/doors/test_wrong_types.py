@@ -113,7 +113,7 @@ def test_the_line_names_the_argument():
         ),
         "sensors: expected a list of Sensor, got None": (assoc.Scene, None, one.times, one.measurements),
         "scene: expected a Scene, got 0": (assoc.build_problem, 0, one),
-        "problem: expected an AssignmentProblem, got None": (assoc.marginals, None),
+        "problem: expected an AssignmentProblem, got NoneType": (assoc.marginals, None),
         "path: expected text or a path, got None": (assoc.load, None),
         "tracker: expected a Tracker, got a Scene": (tracking.track_scene, one, tracker),
         "space: expected a mapping or None, got 3": (assoc.sweeps.grid, "aco", 3),

@@ -276,7 +276,7 @@ def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeyp
 
 def test_nothing_and_help(run, tmp_path):
     done = run("assoc.sweep", "s.npz", "--plot")
-    assert done.returncode == 2 and "--plot is gone: write --heatmap FILE.png --convergence FILE.png" in done.stderr
+    assert done.returncode == 2 and "--plot exists no longer: write --heatmap FILE" in done.stderr
     done = run("assoc.sweep", "--help")
     assert (done.returncode, done.stderr) == (0, "") and "--tune" in done.stdout
     for words, message in (([], "no scene.npz"), (["--summary", tmp_path], "holds no study")):

@@ -45,7 +45,7 @@ def rankings() -> list[Any]:
     for number, problem in enumerate(small_problems(3, seed=22, dummy=True)):
         found.append([[one.indices.tolist(), one.cost, one.lower_bound] for one in kbest(problem, 3)])
         if number == 0:
-            found.append(marginals(problem, 3).probability.tolist())
+            found.append(marginals(problem).probability.tolist())
     return found
 
 

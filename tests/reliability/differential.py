@@ -29,8 +29,7 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
-from assoc.ranking.marginals import bounded
-from assoc.ranking.tuple_sums import WIDEST
+from assoc.ranking.marginals import WIDEST, weighed
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
@@ -171,8 +170,8 @@ WAYS: dict[str, Way] = {
     "liar": _by_a_liar,
     "after a liar": _after_a_liar,
 }
-LISTED = {"marginals 1": (1, WIDEST), "marginals 2": (2, 0), "marginals left out": (1, 3)}
-"""Ways to probabilities: from how many solutions, and with how many measurements open in sums over clusters."""
+LISTED = {"marginals": (WIDEST, 1.0), "marginals sampled": (0, 0.05)}
+"""Ways to probabilities: measurements open in sums, and how long chains are."""
 PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start", "after a liar")
 """Ways that promise the optimum on problems of this size."""
 
@@ -235,24 +234,24 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
         yield "lists a solution twice"
 
 
-def interval_faults(
-    problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, k: int, widest: int
+def probability_faults(
+    problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, widest: int, length: float
 ) -> Iterator[str]:
-    """What is wrong with the probabilities from k solutions; ``truth`` None: there is no solution."""
+    """What is wrong with the probabilities; ``truth`` None: there is no solution."""
     results: list[Any] = []
-    yield from answered(lambda: bounded(problem, k, Run(0), "auto", widest), truth is not None, results)
+    yield from answered(lambda: weighed(problem, None, widest, length), truth is not None, results)
     if not results or truth is None:
         return
     found = results[0]
-    for row, p, low, high in zip(
-        found.tuples.tolist(), found.probability.tolist(), found.lower.tolist(), found.upper.tolist(), strict=True
-    ):
+    if not np.isfinite([found.probability, found.error]).all() or ((found.error == 0.0) != found.exact).any():
+        yield "says no numbers, or an error that is not that of its kind"
+    for row, p, error in zip(found.tuples.tolist(), found.probability.tolist(), found.error.tolist(), strict=True):
         # singletons that are not listed are in the result, not in the problem
         true = truth.get(tuple(row))
-        if true is not None and not low - 1e-9 <= true <= high + 1e-9:
-            yield f"says [{low:.12g}, {high:.12g}] of {row}, true is {true:.12g}"
-        if not 0.0 <= low <= high <= 1.0 or not low - 1e-9 <= p <= high + 1e-9:
-            yield f"says {p!r} in [{low!r}, {high!r}] of {row}"
+        if true is not None and not abs(p - true) <= 10.0 * error + 2e-8:
+            yield f"says {p:.12g} +- {error:.3g} of {row}, true is {true:.12g}"
+        if not 0.0 <= p <= 1.0 or not 0.0 <= error <= 1.0:
+            yield f"says {p!r} +- {error!r} of {row}"
 
 
 def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) -> Iterator[str]:
@@ -293,7 +292,7 @@ def judge(case: Case, names: list[str]) -> list[str]:
     lines = []
     for name in names:
         if name in LISTED:
-            found = interval_faults(case.problem, truth, *LISTED[name])
+            found = probability_faults(case.problem, truth, *LISTED[name])
         else:
             found = faults(case.problem, ranks, name, WAYS[name])
         lines += [f"{name} {text}" for text in found]

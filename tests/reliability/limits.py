@@ -37,7 +37,7 @@ WAYS: dict[str, Way] = {
     "milp cp_sat": lambda problem, limit: assign(problem, "milp", backend="cp_sat", time_limit=limit),
     "milp highs": lambda problem, limit: assign(problem, "milp", backend="highs", time_limit=limit),
     "kbest": lambda problem, limit: kbest(problem, 10, time_limit=limit),
-    "marginals": lambda problem, limit: marginals(problem, 10, time_limit=limit),
+    "marginals": lambda problem, limit: marginals(problem, time_limit=limit),
 }
 
 

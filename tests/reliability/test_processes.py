@@ -74,13 +74,13 @@ def test_threads_rank_track_and_weigh_alone():
     def work(number):
         scene = simulate("three-radar", number, scans=4)
         problem = assoc.build_problem(scene, 0)
-        weighed = marginals(problem, 5)
+        weighed = marginals(problem)
         tracker = MultiSensorTracker.for_scene(scene)
         scans = [scene.scan(k) for k in range(scene.num_scans)]
         steps = [tracker.step(scan.time, scan.measurements) for scan in scans]
         return (
             [(one.cost, one.tuples.tobytes()) for one in kbest(problem, 5)],
-            (weighed.lower.tobytes(), weighed.upper.tobytes()),
+            (weighed.probability.tobytes(), weighed.error.tobytes()),
             [[assigned.tobytes() for assigned in step.assigned] for step in steps],
             [(track.track_id, track.mean.tobytes()) for track in tracker.tracks],
         )

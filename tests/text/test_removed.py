@@ -10,10 +10,11 @@ from assoc import solve, track
 from assoc.__main__ import PROGRAMS
 from assoc._text.removed import REMOVED, removed
 from assoc.errors import InvalidInputError, RemovedError
+from assoc.ranking.marginals import Marginals
 from assoc.tracking import TRACKERS, LatePlots, Tracker
 from assoc.tracking.adapting.health import Health
 
-OWNERS = (Tracker, LatePlots, Health)
+OWNERS = (Tracker, LatePlots, Health, Marginals)
 """Classes whose attributes went."""
 OLD = {
     "--warp": "use --solver",

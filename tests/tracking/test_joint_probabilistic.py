@@ -237,8 +237,3 @@ def test_states_that_cannot_be_merged_are_refused():
     for option in ({"max_events": 0}, {"permutations": "most"}):
         with pytest.raises(InvalidInputError, match=next(iter(option))):
             tracker_of(plain.sensor(), **option)
-
-
-def test_all_sensors_at_once_is_refused_with_what_to_use():
-    with pytest.raises(InvalidInputError, match="all_sensors is gone: .* MultiSensorTracker"):
-        tracker_of(plain.sensor(0.8, 2e4, 10.0), all_sensors=True)

@@ -82,7 +82,6 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
 
     made = parser()
     made.elsewhere = lambda: _of_grid(words)
-    made.gone = {"--plot": "write --heatmap FILE.png --convergence FILE.png"}
     given = made.read(words)
     if given["tune"] is not None:
         check_extra("optuna", "tune")

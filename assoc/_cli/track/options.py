@@ -193,9 +193,6 @@ def track_parser() -> Parser:
     parser.declare(*OF_SCENES, group="options for scenes")
     parser.declare(*OF_PLOTS, group="options for plots")
     parser.elsewhere = lambda: {flag_of(option.name): "assoc live" for option in LIVE[1:]}
-    parser.gone = {
-        "--all-sensors": "joint-probabilistic takes one sensor after the other; multi-sensor takes all at once"
-    }
     return parser
 
 

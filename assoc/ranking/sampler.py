@@ -4,7 +4,7 @@ A move chooses up to three measurements near each other, takes the tuples that c
 them anew, from all combinations that the rest of the solution allows, each with its conditional probability.
 Insertions, ejections and exchanges between two or three tuples are such moves. Which measurements are chosen does not
 depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). Some chains start
-from the best solution, others from another; how far apart their frequencies are says how far the estimates can be
+from a good solution, others from random ones; how far apart their frequencies are says how far the estimates can be
 trusted.
 
 References
@@ -26,9 +26,9 @@ from assoc._types import Array, Floats, Ints
 from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
 
-_CHAINS = 4
+_CHAINS = 8
 # moves of a chain: a few, some more for each measurement, and at most; those between two checks of the time
-_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 66, 100_000, 5_000
+_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 400, 400_000, 5_000
 # share of the moves that a chain forgets
 _FORGOTTEN = 0.2
 # combinations of a move; where there are more, the solution stays
@@ -37,6 +37,8 @@ _ROOM = 1024
 _TAKEN = 3
 # a tuple is followed to the next measurement with its weight, relative to the best solution's, to this power
 _FLATNESS = 0.3
+# mean of what is added to reduced costs where a chain begins with columns drawn, and how many of them are tried
+_SPREAD, _DRAWN = 3.0, 50_000
 
 
 class _Problem(NamedTuple):
@@ -62,20 +64,29 @@ class _Chain(NamedTuple):
     """Moves for which each column was chosen before."""
 
 
-def estimates(columns: AllColumns, starts: list[Array], run: Run, length: float = 1.0) -> Floats | None:
-    """Frequency of each of the N columns in several chains (C, N), which begin with these solutions in turn.
+def estimates(
+    columns: AllColumns, which: NDArray[np.bool_], rows: NDArray[np.bool_], best: Array, run: Run, length: float = 1.0
+) -> Floats | None:
+    """Probabilities of the chosen n columns, and of the chosen m rows to be in none, and standard errors, (2, n + m).
 
-    ``length`` multiplies the number of moves. None without time.
+    ``which`` (N,) and ``rows`` (R,) choose whole clusters. Of the chains, every other one begins with the solution
+    ``best`` (columns), the others, where rows may stay alone, with columns drawn at random. ``length`` multiplies the
+    number of moves. None without time.
     """
-    problem = _problem(columns)
-    rows, num = columns.slack.size, len(columns.weights)
-    moves = int(length * min(_LEAST + _MOVES * rows, _MOST))
+    number = np.cumsum(rows) - 1
+    cols = np.where(columns.rows >= 0, number[columns.rows], -1)[which].astype(np.int32)
+    problem = _problem(cols, columns.weights[which], columns.reduced[which], ~columns.slack[rows])
+    size, own = int(rows.sum()), np.cumsum(which) - 1
+    moves = int(length * min(max(_LEAST, _MOVES * size), _MOST))
     chains = []
     for c in range(_CHAINS):
-        owner = np.full(rows, -1, dtype=np.int32)
-        for j in starts[c % len(starts)]:
-            owner[columns.rows[j][columns.rows[j] >= 0]] = j
-        chains.append(_Chain(owner, np.array([c], dtype=np.uint64), np.zeros(num), np.zeros(num)))
+        owner = np.full(size, -1, dtype=np.int32)
+        start: Array | list[int] = own[best[which[best]]]
+        if c % 2 and not problem.must.any():
+            start = _drawn(cols, columns.reduced[which], np.random.default_rng(c))
+        for j in start:
+            owner[cols[j][cols[j] >= 0]] = j
+        chains.append(_Chain(owner, np.array([c << 32], dtype=np.uint64), np.zeros(len(cols)), np.zeros(len(cols))))
     made = forgotten = 0
     while made < moves and not run.should_stop():
         ahead = min(_AT_ONCE, moves - made)
@@ -91,21 +102,49 @@ def estimates(columns: AllColumns, starts: list[Array], run: Run, length: float 
     for chain in chains:
         there = np.unique(chain.owner[chain.owner >= 0])
         chain.spent[there] += made - chain.since[there]
-    frequency: Floats = np.array([chain.spent for chain in chains]) / (made - forgotten)
-    return frequency
+    share = np.array([chain.spent for chain in chains]) / (made - forgotten)
+    column, sensor = np.nonzero(cols >= 0)
+    alone = np.ones((size, _CHAINS))
+    np.subtract.at(alone, cols[column, sensor], share.T[column])
+    return np.array(_with_errors(np.concatenate([share, np.clip(alone.T, 0.0, 1.0)], axis=1)))
 
 
-def _problem(columns: AllColumns) -> _Problem:
-    column, sensor = np.nonzero(columns.rows >= 0)
-    of = columns.rows[column, sensor]
+def _with_errors(share: Floats) -> tuple[Floats, Floats]:
+    """Mean and standard error of frequencies in C chains, (C, n).
+
+    The spread of few chains may be small by chance, and that of a rare tuple is 0: errors are at least those of as many
+    independent solutions as the spread of all tuples together says the chains are worth.
+    """
+    chains = len(share)
+    mean, square = share.mean(axis=0), share.var(axis=0, ddof=1) / chains
+    worth = chains if not square.any() else max(float((mean * (1.0 - mean)).sum() / square.sum()), 1.0)
+    near = (mean * worth + 1.0) / (worth + 2.0)
+    return mean, np.sqrt(np.maximum(square, near * (1.0 - near) / worth))
+
+
+def _drawn(cols: Ints, reduced: Floats, rng: np.random.Generator) -> list[int]:
+    """Columns without common rows, cheap ones more likely."""
+    key = reduced + rng.exponential(_SPREAD, len(reduced))
+    used, chosen = np.zeros(int(cols.max(initial=-1)) + 2, dtype=np.bool_), []
+    for j in np.argsort(key, kind="stable")[:_DRAWN].tolist():
+        at = cols[j][cols[j] >= 0]
+        if not used[at].any():
+            used[at] = True
+            chosen.append(j)
+    return chosen
+
+
+def _problem(cols: NDArray[np.int32], weights: Floats, reduced: Floats, must: NDArray[np.bool_]) -> _Problem:
+    column, sensor = np.nonzero(cols >= 0)
+    of = cols[column, sensor]
     order = np.argsort(of, kind="stable")
     row, row_cols = of[order], column[order]
-    row_ptr = np.append(0, np.cumsum(np.bincount(row, minlength=columns.slack.size)))
-    chance = np.exp(-_FLATNESS * columns.reduced[row_cols]) + 1e-12
+    row_ptr = np.append(0, np.cumsum(np.bincount(row, minlength=must.size)))
+    chance = np.exp(-_FLATNESS * reduced[row_cols]) + 1e-12
     sums = np.append(0.0, np.cumsum(chance))
     begin = sums[row_ptr[row]]
     chance = (sums[1:] - begin) / (sums[row_ptr[row + 1]] - begin)
-    return _Problem(columns.rows, -columns.weights, ~columns.slack, row_ptr, row_cols, chance)
+    return _Problem(cols, -weights, must, row_ptr, row_cols, chance)
 
 
 @njit
