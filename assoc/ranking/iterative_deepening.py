@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -129,7 +130,10 @@ class Deepening:
             self._known, self._known_weight = _origins(packing, lists, choice[0]), float(total[0])
         # a full list excludes what is lighter than its last solution by more than a tie; if all tie, than its first
         ties = float(np.minimum([weights[0] for weights in lists.weights] - lower, self._tolerance).sum())
-        proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance + ties, side="right")), self._k)
+        # solutions far above the bound may weigh more than all that the tolerance is a share of: their sums are rounded
+        sums = float(np.abs(lower).sum()) + (abs(rest) if math.isfinite(rest) else 0.0)
+        ties += 4.0 * self._tolerance + 4.0 * sys.float_info.epsilon * (lower.size + 1) * sums
+        proved = min(int(np.searchsorted(total, rest + ties, side="right")), self._k)
         if proved < total.size:
             rest = min(rest, float(total[proved]))
         return Found([_origins(packing, lists, pick) for pick in choice[:proved]], rest)

@@ -66,6 +66,23 @@ def check(problem, k, **options):
     return len(found)
 
 
+def test_sums_that_differ_by_rounding_are_all_listed():
+    """Solutions far above a bound of nearly nothing: each is one or two halves, and a billionth of a thousandth."""
+    tuples = [
+        [0, 0, 1], [0, 0, 2], [0, 1, 0], [0, 1, 1], [0, 1, 2], [0, 2, 0], [0, 2, 1], [1, 0, 0], [1, 0, 1], [1, 0, 2],
+        [1, 1, 1], [1, 1, 2], [1, 2, 0], [1, 2, 1], [2, 0, 0], [2, 0, 1], [2, 1, 0], [2, 1, 2], [2, 2, 2],
+    ]  # fmt: skip
+    half = [(0, 1, 2), (0, 2, 1), (1, 1, 1), (1, 1, 2), (2, 0, 1), (2, 1, 0), (2, 1, 2), (2, 2, 2)]
+    tiny = [(0, 1, 1), (1, 0, 1), (1, 0, 2), (1, 2, 0), (1, 2, 1)]
+    costs = [0.5 if tuple(row) in half else -1e-12 if tuple(row) in tiny else 0.0 for row in tuples]
+    problem = AssignmentProblem(tuples, costs, (2, 2, 2))
+    expected = all_solutions(problem)
+    assert len(expected) == 40
+    for k in (1, 9, 24, 30, 39, 40, 100):
+        found = [solution.cost for solution in kbest(problem, k)]
+        np.testing.assert_allclose(found, [solution.cost for solution in expected[:k]], rtol=0.0, atol=1e-15)
+
+
 @pytest.mark.slow
 def test_small_problems():
     """Two to six sensors, ties, duplicates, empty sensors, clusters, infeasible ones; k beyond their number."""

@@ -70,6 +70,21 @@ def test_small_problems_are_those_of_all_joint_events(count):
             assert (low <= expected + 1e-12).all() and (expected <= high + 1e-12).all()
 
 
+def test_huge_weights_give_numbers():
+    """Where rounding of sums is above all that events differ by, probabilities are numbers, and bounds say nothing."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        first, second, _, sizes = drawn(rng, largest=8)
+        log_weight = rng.choice([-1.0, 1.0, 0.3, 0.0, rng.normal()], len(first)) * 10.0 ** rng.integers(13, 300)
+        for states in (1, 8, WIDE):
+            found = pair_probabilities(first, second, log_weight, sizes, states)
+            assert (found.lower <= found.probability).all() and (found.probability <= found.upper).all()
+            assert (found.lower >= 0.0).all() and (found.upper <= 1.0).all()
+            assert (np.bincount(first, found.probability, sizes[0]) <= 1.0 + 1e-9).all()
+            share = without_permutations(first, second, log_weight, sizes, found.probability, states)
+            assert np.isfinite(share).all()
+
+
 def test_pairs_left_out_are_missed_by_little():
     """With four states hardly anything is summed exactly: belief propagation estimates the rest."""
     wrong, alone, widest = [], [], 0.0

@@ -19,6 +19,7 @@ IEEE J. Oceanic Engineering 8, 1983.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,8 @@ FAINT = 1e-10
 _NARROWEST = 2
 """Open vertices needed for a star, a vertex and its neighbours."""
 _ROUNDING = 1e-12
+_LOSSY, _GRID = 42, 50
+"""Binary exponent of sums that lose a thousandth, and the digits that are left to them."""
 
 
 class PairIntervals(NamedTuple):
@@ -119,7 +122,10 @@ def _without_some(graph: PairGraph, weight: Floats, bounds: Floats, rows: int, m
     first = graph.ends[out, 0]
     index = np.empty(count, dtype=np.int64)
     index[graph.edge[: graph.ptr[rows]]] = np.arange(graph.ptr[rows])
-    probability[out] = unpaired[first] * np.exp(log_part[index[out]] - log_free[first])
+    share = np.exp(log_part[index[out]] - log_free[first])
+    # beside huge logarithms the sum of alike ones is each of them
+    share /= np.maximum(np.bincount(first, share, vertices), 1.0)[first]
+    probability[out] = unpaired[first] * share
     width = np.asarray(np.bincount(plan.label, -unpaired * np.expm1(-log_free)), dtype=np.float64)
     width += _touching(plan.label, graph.ends[out], bounds[1, out], len(width))
     return _Parted(probability, unpaired * np.exp(-log_free), plan.kept, plan.label, width)
@@ -137,8 +143,14 @@ def _touching(label: Array, ends: Array, upper: Floats, clusters: int) -> Floats
 def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:
     """Weights of edges and of unmatched vertices, reduced by the multipliers of the best event.
 
-    The first ``rows`` vertices are those of the first list.
+    The first ``rows`` vertices are those of the first list. Where rounding of their sums would change weights by a
+    thousandth and more, numbers are first rounded to a grid on which all sums of the matching are exact: the best event
+    weighs 1 then, and none more.
     """
+    largest = float(np.abs(np.concatenate([log_weight, log_free])).max())
+    if (exponent := math.frexp(largest * len(log_free))[1]) > _LOSSY:
+        grid = math.ldexp(1.0, exponent - _GRID)
+        log_weight, log_free = np.rint(log_weight / grid) * grid, np.rint(log_free / grid) * grid
     edge = graph.edge[: graph.ptr[rows]]
     costs = np.where(kept, -log_weight, np.inf)
     best = match(graph.ptr[: rows + 1], graph.ends[edge, 1] - rows, costs[edge], -log_free[:rows], -log_free[rows:])
