@@ -92,9 +92,8 @@ def _plain(name: str, corner: str, what: Sequence[str], digits: int = 3) -> str:
 
 def _sizes(r: Results, kind: str) -> list[str]:
     """Sizes of a row of experiments.scale that have been measured."""
-    return [
-        c.quantity.split(": ")[0].rpartition(", ")[2] for c in r.starting(f"{kind}, ") if c.quantity.endswith("peak")
-    ]
+    names = (claim.quantity for claim in r.starting(f"{kind}, "))
+    return [name.split(": ")[0].rpartition(", ")[2] for name in names if name.endswith("peak")]
 
 
 def scale_scans() -> str:
@@ -338,15 +337,14 @@ def benchmark_set() -> str:
     for name, row in rows.items():
         families[row["family"]].append(name)
     proved = {name: row["status"] == "optimal" for name, row in rows.items()}
-    share = 100 * sum(proved.values()) / max(len(rows), 1)
     few = []
     for family, names in sorted(families.items()):
         counts = [rows[name]["tuples"] for name in names]
         few.append([family, str(len(names)), f"{min(counts):,} to {max(counts):,}", str(sum(map(proved.get, names)))])
     head = ["instance", "sizes", "tuples", "components", "root bound", "value", "best bound", "status", "found by"]
     return "\n\n".join((
-        f"{len(rows)} instances, {sum(proved.values())} proved optimal ({share:.0f} %), each with a proof in the "
-        "repository.",
+        f"{len(rows)} instances, {sum(proved.values())} proved optimal "
+        f"({100 * sum(proved.values()) / len(rows):.0f} %), each with a proof in the repository.",
         plain_table(["family", "instances", "tuples", "proved"], few),
         plain_table([*head, "seconds"], [_line(name, rows[name]) for names in families.values() for name in names]),
     ))  # fmt: skip
