@@ -25,7 +25,7 @@ from assoc.tracking.filter_choice import make_filter, pace_of
 from assoc.tracking.target_kinds import TARGETS
 from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
-from experiments.trackers.oracle import OracleTracker
+from experiments.trackers.judging import OracleTracker
 from experiments.trackers.plain_gnn import PlainGNN
 
 SEEDS = 5
