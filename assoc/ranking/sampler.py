@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
+from assoc.packing.packing import assemble
 from assoc.packing.run import Run
 from assoc.ranking.columns import AllColumns
+from assoc.solvers.greedy.solve import greedy_choice
 
 _CHAINS = 8
 # moves of a chain: a few, some more for each measurement, and at most; those between two checks of the time
@@ -82,8 +84,13 @@ def estimates(
     for c in range(_CHAINS):
         owner = np.full(size, -1, dtype=np.int32)
         start: Array | list[int] = own[best[which[best]]]
-        if c % 2 and not problem.must.any():
-            start = _drawn(cols, columns.reduced[which], np.random.default_rng(c))
+        if c % 2:
+            rng = np.random.default_rng(c)
+            other = _completed(columns, run, rng) if problem.must.any() else None
+            if other is not None:
+                start = own[other[which[other]]]
+            elif not problem.must.any():
+                start = _drawn(cols, columns.reduced[which], rng)
         for j in start:
             owner[cols[j][cols[j] >= 0]] = j
         chains.append(_Chain(owner, np.array([c << 32], dtype=np.uint64), np.zeros(len(cols)), np.zeros(len(cols))))
@@ -132,6 +139,17 @@ def _drawn(cols: Ints, reduced: Floats, rng: np.random.Generator) -> list[int]:
             used[at] = True
             chosen.append(j)
     return chosen
+
+
+def _completed(columns: AllColumns, run: Run, rng: np.random.Generator) -> Array | None:
+    """Columns of a solution where rows must be covered, cheap ones more likely; None if none is found in the time.
+
+    Chains may not pass from one solution to all others there: their spread shows it if they begin apart.
+    """
+    prices = columns.reduced + rng.exponential(_SPREAD, len(columns.reduced))
+    packing = assemble(columns.rows, prices, columns.slack, np.arange(len(prices), dtype=np.int32))
+    chosen = greedy_choice(packing, run.part(0, run.time_limit))
+    return None if chosen is None else packing.origin[chosen].astype(np.int64)
 
 
 def _problem(cols: NDArray[np.int32], weights: Floats, reduced: Floats, must: NDArray[np.bool_]) -> _Problem:

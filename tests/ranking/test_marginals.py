@@ -47,6 +47,23 @@ def test_sums_are_exact_and_samples_as_far_off_as_they_say(count):
     assert np.mean(errors) < 0.005 and np.mean(held) > 0.99
 
 
+def test_where_chains_cannot_pass_between_solutions_they_say_so():
+    """Few tuples that must cover all: no move leads from some solutions to others."""
+    held = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        tuples = np.argwhere(rng.random((5, 5, 5)) < 0.3) + 1
+        problem = AssignmentProblem(tuples, rng.normal(0.0, 1.0, len(tuples)), (5, 5, 5), dummy=False)
+        try:
+            true = exact_marginals(problem)
+        except InfeasibleError:
+            continue
+        found = weighed(problem, None, 0, 0.05)
+        truth = np.array([true[tuple(row)] for row in found.tuples.tolist()])
+        held += (np.abs(found.probability - truth) <= 4.0 * found.error + 1e-8).tolist()
+    assert len(held) > 300 and np.mean(held) > 0.99
+
+
 def test_wide_problems_are_sampled_alike_each_time():
     rng = np.random.default_rng(3)
     pairs = np.stack(np.nonzero(rng.random((40, 40)) < 0.5), axis=1) + 1
