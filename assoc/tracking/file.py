@@ -20,6 +20,7 @@ from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
+from assoc.tracking.records.echoes import Echoes
 from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.track_batch import one_state
@@ -110,6 +111,8 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= {f"estimates.{name}": np.array(value) for name, value in state.estimates._asdict().items()}
     if state.clutter is not None:
         found |= {f"clutter.{name}": value for name, value in state.clutter.arrays().items()}
+    if state.echoes is not None:
+        found |= {f"echoes.{name}": np.array(value) for name, value in state.echoes._asdict().items()}
     if settings.starter is not None and state.starter is not None:
         inner, unseen = state.starter
         found |= {f"nursery.{name}": value for name, value in _arrays(settings.starter, inner).items()}
@@ -143,6 +146,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
         clutter=None if model.clutter is None else _clutter(model.clutter, saved.part("clutter.")),
+        echoes=None if model.echoes is None else _echoes(model.echoes, saved.part("echoes.")),
     )  # fmt: skip
     state = state._replace(method_state=settings.method.restored(settings, saved, state))
     if settings.starter is None or model.starter is None:
@@ -210,6 +214,20 @@ def _clutter(model: ClutterMap, saved: Saved) -> ClutterMap:
         good = votes.shape == (count,) and bool((np.abs(votes) <= 1.0).all())
         saved.require(good, f"votes.{s}", f"{count} numbers from -1 to 1")
     return model.restored(saved)
+
+
+def _echoes(model: Echoes, saved: Saved) -> Echoes:
+    """Tracks that may be echoes in these arrays, checked."""
+    pairs = len(saved["ids"])
+    for name, value in model._asdict().items():
+        shape = np.shape(value)
+        shape = (pairs, *shape[1:]) if name in ("ids", "kinds", "counts") else shape
+        shape = (len(saved[name]),) if name == "hidden" else shape
+        good = saved[name].shape == shape and np.isfinite(saved[name]).all() and (saved[name] >= 0).all()
+        saved.require(good, name, f"numbers >= 0 of the shape {shape}")
+    saved.require((np.diff(saved["hidden"]) > 0).all(), "hidden", "ids that ascend")
+    saved.require((saved["kinds"] < np.shape(model.found)).all(), "kinds", "a sensor, and 0 or 1")
+    return Echoes(**{**saved, "targets": float(saved["targets"])})  # type: ignore[arg-type]
 
 
 def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:

@@ -13,6 +13,7 @@ from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
+from assoc.tracking.records.echoes import Echoes
 from assoc.tracking.records.estimates import Estimates
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.identity_evidence import Identities
@@ -51,6 +52,8 @@ class TrackerState(NamedTuple):
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None
     """Where false alarms come from; None where the tracker does not adapt."""
+    echoes: Echoes | None = None
+    """Tracks that may be echoes of others; None where the tracker does not adapt."""
     starter: Starter | None = None
     rng: Any = None
     """State of the filter's random generator, if it has one."""
@@ -83,6 +86,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,
         clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
+        echoes=Echoes.none(count) if settings.adapt else None,
         starter=starter,
         rng=rng_of(settings),
     )

@@ -31,6 +31,7 @@ from assoc.tracking.records.track import Step
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
 from assoc.tracking.stages.coverage import count_out_of_view, keep_pace
+from assoc.tracking.stages.echoes import hide_echoes
 from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.starter import current, end_ghosts, step_starter, take_over
@@ -56,6 +57,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         live,
         *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_starter] if starting else []),
+        *([hide_echoes] if settings.adapt and not starting else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
         *([] if starting else [take_up, merge, name_parents, tell_apart]),

@@ -193,11 +193,11 @@ class Tracker:
     @property
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
-        found = self.state.estimates
-        if found is None:
+        found, echoes = self.state.estimates, self.state.echoes
+        if found is None or echoes is None:
             return None
         flown = speed_of_tracks(self.settings, self.state.tracks)
-        return health(self.sensors, found, self.settings.initiation.speed, flown)
+        return health(self.sensors, found, self.settings.initiation.speed, echoes.found, flown)
 
     @property
     def solver_calls(self) -> int:

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assoc._system.imports import removed_attribute
+from assoc._types import Array
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.folding import assumed_folding
+from assoc.tracking.records.echoes import AZIMUTH, RANGE
 from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
 
 _WIDTH = 1.96
@@ -66,6 +68,9 @@ class SensorHealth:
         at all ranges.
     folding : float or None
         Interval, m/s, at which range rates are taken to fold though nobody said so.
+    ghosts : tuple of int
+        Tracks so far that were echoes of others rather than targets, and were not shown: at another one's range (side
+        lobes), at its azimuth behind it (multipath).
     verdict : str
     """
 
@@ -75,6 +80,7 @@ class SensorHealth:
     false_alarm_rate: Quantity
     by_range: tuple[tuple[float, Quantity], ...] = ()
     folding: float | None = None
+    ghosts: tuple[int, int] = (0, 0)
 
     @property
     def verdict(self) -> str:
@@ -86,6 +92,8 @@ class SensorHealth:
             *([self._ranges] if any(band.differs for _, band in self.by_range) else []),
             *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
         ]
+        if any(self.ghosts):
+            found.append(f"ghosts: {self.ghosts[0]} tracks by side lobes, {self.ghosts[1]} by multipath, not shown")
         if self.folding is not None:
             found.append(f"range rates taken to fold at {self.folding:g} m/s (folding= says, inf: they do not)")
         return "; ".join(found) or "as declared"
@@ -146,11 +154,12 @@ def _times(factor: float) -> str:
 
 
 def health(
-    sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float], flown: float = 0.0
+    sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float], ghosts: Array, flown: float = 0.0
 ) -> Health:
     """Compare estimates with what was declared of these sensors.
 
-    `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known.
+    `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known;
+    `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`).
     """
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
@@ -163,11 +172,8 @@ def health(
             ((b + 1) * reach(sensor) / BANDS, _quantity(values[s, DETECTION], seen[b], unsure[b], DETECTION))
             for b in (np.flatnonzero(estimates.dwells[s] >= 1.0).tolist() if reach(sensor) else ())
         ]
-        rows.append(
-            SensorHealth(
-                sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands), assumed_folding(sensor, speed)
-            )
-        )
+        folding, hidden = assumed_folding(sensor, speed), (int(ghosts[s, RANGE]), int(ghosts[s, AZIMUTH]))
+        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands), folding, hidden))
     manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
     prior = max(speed) if isinstance(speed, Sequence) else speed
     text = ""

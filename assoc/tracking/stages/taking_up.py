@@ -54,7 +54,8 @@ def take_up(progress: Progress) -> Progress:
             state = method.renamed(progress.state, ids, names)
             tracks = state.tracks.with_parents(names, old.parent[end])
             tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, names))
-            progress = progress._replace(state=state._replace(tracks=tracks))
+            echoes = None if state.echoes is None else state.echoes.renamed(ids, names)
+            progress = progress._replace(state=state._replace(tracks=tracks, echoes=echoes))
             lost, step = lost[~np.isin(lost.track_id, names)], renamed(step, ids, names)
             step = replace(step, ended=np.setdiff1d(step.ended, names[np.isin(names, left.track_id)]))
     if len(step.ended):

@@ -1,0 +1,203 @@
+"""Stage: tracks that are echoes of other tracks are not confirmed; they are kept, for they may turn out to be targets.
+
+Pairs are formed while a track is young: each of its plots must lie at the range or azimuth of the target's. Evidence
+(`assoc.tracking.records.echoes`) is weighed after each scan. What is confirmed and rather an echo than a target goes on
+as a tentative track: it keeps its plots, so that they begin no other, but is not shown, and nothing is learnt of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.sensors import Radar2D, Radar3D
+from assoc.tracking.progress import Progress
+from assoc.tracking.records.echoes import AZIMUTH, CHANCE, FRESH, HITS, MISSES, RANGE, SQUARE, STRAYS, Echoes
+from assoc.tracking.records.track import Step
+from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.stages.coverage import dwells
+
+# odds above which a track is hidden, and below which it is a target for good
+_HIDDEN, _TARGET = math.log(9.0), -8.0
+# a track is young up to so many detections
+_YOUNG = 12
+# standard deviations within which plots share a component, and beyond which they differ
+_APART = 3.0
+# standard deviations within which other tracks are counted, for how often targets share a component by chance
+_ROUND = 30.0
+
+
+def hide_echoes(progress: Progress) -> Progress:
+    """Stage: weigh which tracks are echoes, and take their confirmation back."""
+    state, step, settings = progress.state, progress.step, progress.settings
+    assert state.echoes is not None and step is not None and progress.association is not None
+    radars = [s for s, sensor in enumerate(settings.sensors) if isinstance(sensor, (Radar2D, Radar3D))]
+    if not radars:
+        return progress
+    tracks, before = settings.method.current(state), state.echoes
+    known = progress.association.tracks
+    echoes = _living(before, state.tracks.track_id, known.track_id[known.confirmed])
+    plots, seen = _plots(step, tracks.track_id), dwells(progress, tracks.states)
+    if len(echoes.ids):
+        echoes = _counted(progress, echoes, tracks, plots, seen)
+    for s in radars:
+        echoes = _begun(progress, echoes, tracks, plots, s)
+    echoes = _weighed(progress, echoes, tracks)
+    hidden = np.isin(state.tracks.track_id, echoes.hidden)
+    kept = state.tracks.with_confirmed(state.tracks.confirmed & ~hidden)
+    return progress.with_state(echoes=echoes, tracks=kept)._replace(step=_without(step, echoes.hidden))
+
+
+def _living(echoes: Echoes, ids: Array, shown: Array) -> Echoes:
+    """The pairs of tracks that are left; those that ended without being shown are counted."""
+    left, short = np.isin(echoes.ids, ids), echoes.short.copy()
+    ended = ~left[:, 0] & (echoes.counts[:, FRESH] > 0.0) & ~np.isin(echoes.ids[:, 0], shown)
+    once = np.unique(np.column_stack([echoes.ids[ended, 0], echoes.kinds[ended]]), axis=0)
+    np.add.at(short, tuple(once[:, 1:].T), 1.0)
+    return echoes.of(np.asarray(left.all(axis=1)))._replace(short=short)
+
+
+def _plots(step: Step, ids: Array) -> Array:
+    """1-based measurements of tracks by their ascending ids, 0: none, int64 (T + 1, S); the last row is nobody's."""
+    plots = np.zeros((len(ids) + 1, len(step.assigned)), dtype=np.int64)
+    for s, taken in enumerate(step.assigned):
+        plots[_at(ids, taken), s] = np.arange(len(taken)) + 1
+    plots[-1] = 0
+    return plots
+
+
+def _at(ids: Array, wanted: Array) -> Array:
+    """Rows of ids in the ascending ones; their number where there is none."""
+    at = np.searchsorted(ids, wanted)
+    return np.where(np.append(ids, -1)[at] == wanted, at, len(ids))
+
+
+def _apart(progress: Progress, s: int, first: Array, second: Array) -> tuple[Array, Array]:
+    """Differences of ranges and azimuths of plots of one sensor (K, 2), and their standard deviations (2,)."""
+    sensor, z = progress.settings.sensors[s], progress.scan.measurements[s]
+    return sensor.residual(z[first], z[second])[:, :2], np.sqrt(2.0 * np.diagonal(sensor.covariance)[:2])
+
+
+def _counted(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, seen: Array) -> Echoes:
+    """Count the scan's detections of pairs."""
+    counts, (s, axis) = echoes.counts.copy(), echoes.kinds.T
+    echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
+    covered = np.append(seen, np.zeros((1, seen.shape[1]), dtype=np.bool_), axis=0)
+    ours, theirs = plots[echo, s], plots[target, s]
+    tied = np.zeros(len(s), dtype=np.bool_)
+    for sensor in np.unique(s).tolist():
+        both = np.flatnonzero((s == sensor) & (ours > 0) & (theirs > 0))
+        off, spread = _apart(progress, sensor, ours[both] - 1, theirs[both] - 1)
+        square = (off[np.arange(len(both)), axis[both]] / spread[axis[both]]) ** 2
+        tied[both] = square < _APART**2
+        counts[both, SQUARE] += np.where(tied[both], square, 0.0)
+    counts[:, HITS] += tied
+    counts[:, MISSES] += (ours == 0) & (theirs > 0) & covered[echo, s]
+    elsewhere = np.count_nonzero(plots[echo] > 0, axis=1) - (ours > 0)
+    counts[:, STRAYS] += elsewhere + ((ours > 0) & ~tied & ((theirs > 0) | covered[target, s]))
+    return echoes._replace(counts=counts)
+
+
+def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, s: int) -> Echoes:
+    """Add pairs of young tracks and those at whose range or azimuth a plot of sensor s lies."""
+    here = np.flatnonzero(plots[:-1, s])
+    young, here = here[tracks.hits[here] <= _YOUNG], here[tracks.hits[here] > 1]
+    if not len(young) or not len(here):
+        return echoes
+    assert progress.before is not None
+    fresh = ~np.isin(tracks.track_id, progress.before.track_id)
+    z, sensor = progress.scan.measurements[s], progress.settings.sensors[s]
+    low, width = sensor.field_of_view[:2, 0], np.diff(sensor.field_of_view[:2], axis=1)[:, 0]
+    expected = echoes.expected.copy()
+    for axis in (RANGE, AZIMUTH):
+        values, ours, theirs = z[:, axis], plots[young, s] - 1, plots[here, s] - 1
+        spread = np.sqrt(2.0 * np.diagonal(sensor.covariance)[:2])
+        first, second = _near(values, ours, theirs, _APART * spread[axis], sensor.angular[axis])
+        density = len(here) * spread[axis] / width[axis]
+        # where other tracks are dense around, as in a swarm, nothing can be told
+        around = _near(values, ours, theirs[tracks.confirmed[here]], _ROUND * spread[axis], sensor.angular[axis])[0]
+        crowd = np.maximum((np.bincount(around, minlength=len(young)) - 1.0) / (2.0 * _ROUND), density)
+        crowded = math.sqrt(2.0 * math.pi) * crowd >= 1.0
+        often = np.count_nonzero(fresh[young] & ~crowded) * 2.0 * _APART * density
+        chance, crowded = np.full(len(first), math.sqrt(2.0 * math.pi) * density), crowded[first]
+        first, second = young[first], here[second]
+        off = _apart(progress, s, plots[first, s] - 1, plots[second, s] - 1)[0]
+        away, square = off[:, 1 - axis] / spread[1 - axis], (off[:, axis] / spread[axis]) ** 2
+        if axis == AZIMUTH:
+            # an echo is a little farther, at any scale: its detour is as likely between 1 and 2 km as between 2 and 4
+            chance *= np.maximum(off[:, RANGE], 0.0) / width[RANGE] * math.log(width[RANGE] / spread[RANGE])
+            often *= 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
+        else:
+            away = np.abs(away)
+        expected[s, axis] += often
+        ids = np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1)
+        new = (away > _APART) & (square < _APART**2) & ~crowded & (first != second) & ~_known(echoes, ids, s, axis)
+        counts = np.zeros((np.count_nonzero(new), 6))
+        counts[:, HITS] = 1.0
+        counts[:, SQUARE], counts[:, CHANCE], counts[:, FRESH] = square[new], chance[new], fresh[first[new]]
+        echoes = echoes._replace(
+            ids=np.concatenate([echoes.ids, ids[new]]),
+            kinds=np.concatenate([echoes.kinds, np.tile([s, axis], (len(counts), 1))]),
+            counts=np.concatenate([echoes.counts, counts]),
+        )
+    return echoes._replace(expected=expected)
+
+
+def _near(values: Array, first: Array, second: Array, reach: float, angle: bool) -> tuple[Array, Array]:
+    """Pairs of plots, given by their numbers, that are near in one component."""
+    order = np.argsort(values[second], kind="stable")
+    ordered, turns = values[second][order], (-2.0 * math.pi, 0.0, 2.0 * math.pi) if angle else (0.0,)
+    pairs: list[tuple[Array, Array]] = []
+    for turn in turns:
+        low = np.searchsorted(ordered, values[first] + turn - reach)
+        count = np.searchsorted(ordered, values[first] + turn + reach) - low
+        row = np.repeat(np.arange(len(first)), count)
+        at = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + low[row]
+        pairs.append((row, order[at]))
+    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return rows, columns
+
+
+def _known(echoes: Echoes, ids: Array, s: int, axis: int) -> Array:
+    """Which of these pairs are there already, bool (K,)."""
+    ours = echoes.ids[(echoes.kinds == [s, axis]).all(axis=1)]
+    most = 1 + max(ids.max(initial=0), ours.max(initial=0))
+    return np.isin(ids @ [most, 1], ours @ [most, 1])
+
+
+def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
+    """Decide which tracks are hidden, and forget pairs that are decided."""
+    settings = progress.settings
+    echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
+    P = np.array([sensor.detection_probability for sensor in settings.sensors])[echoes.kinds[:, 0]]
+    share: Any = np.append(settings.views.at_means(tracks.states), np.ones((1, len(settings.sensors))), axis=0)
+    odds = echoes.log_odds(P * share[echo, echoes.kinds[:, 0]])
+    confirmed = np.append(tracks.confirmed, False)
+    above = (odds > _HIDDEN) & confirmed[target]
+    # echoes have no echoes of their own
+    above &= ~np.isin(echoes.ids[:, 1], echoes.ids[above, 0])
+    rows = np.flatnonzero(above & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden)))
+    hidden, first = np.unique(echoes.ids[rows, 0], return_index=True)
+    found, new = echoes.found.copy(), ~np.isin(hidden, echoes.hidden)
+    np.add.at(found, tuple(echoes.kinds[rows[first[new]]].T), 1.0)
+    # tracks are taken for targets when they are young no more
+    grown = tracks.confirmed & (tracks.hits == _YOUNG + 1) & (tracks.missed == 0)
+    targets = echoes.targets + np.count_nonzero(~np.isin(tracks.track_id[grown], hidden))
+    echoes = echoes._replace(hidden=hidden, found=found, targets=float(targets))
+    return echoes.of((odds > _TARGET) | (np.append(tracks.hits, 0)[echo] <= _YOUNG))
+
+
+def _without(step: Step, hidden: Array) -> Step:
+    """The step with these tracks not confirmed."""
+
+    def flags(confirmed: tuple[Array, ...], assigned: tuple[Array, ...]) -> tuple[Array, ...]:
+        return tuple(sure & ~np.isin(ids, hidden) for sure, ids in zip(confirmed, assigned, strict=True))
+
+    final = tuple(replace(old, confirmed=flags(old.confirmed, old.assigned)) for old in step.final)
+    return replace(
+        step, confirmed=flags(step.confirmed, step.assigned), final=final, ended=np.setdiff1d(step.ended, hidden)
+    )
