@@ -4,8 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
-from assoc.costs.tracks.unresolved import Looks, explained, narrowed, resolutions, unresolved_probability
+from assoc.costs.tracks.unresolved import (
+    Looks,
+    explained,
+    narrowed,
+    offers,
+    resolutions,
+    unresolved_probability,
+)  # fmt: skip
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.filters.base import Expected
@@ -128,8 +136,7 @@ def test_offsets_are_those_of_the_joint_update():
     apart = np.array([0.5, -0.2])
     looks = Looks(Expected(a[None], (C + R)[None]), Expected(b[None], (C + R)[None]), (a - b)[None], 2.0 * C[None])
     pull = precision * (apart - (a - b))
-    one, two, plot, at = explained(sensor, z[None], np.array([-20.0]), looks, 0, precision, pull)
-    assert plot == 0 and np.isfinite([one, two]).all()
+    at = offers(sensor, z, looks, precision, pull)
     gain = C @ np.linalg.inv(C + R)
     found = [a + gain @ (at[0] - a), b + gain @ (at[1] - b)]
     # stacked: the mean of both, with the spread of its place between them, and of their difference
@@ -140,6 +147,22 @@ def test_offsets_are_those_of_the_joint_update():
     x = np.concatenate([a, b])
     x = x + P @ H.T @ np.linalg.solve(H @ P @ H.T + noise, np.concatenate([z, apart]) - H @ x)
     np.testing.assert_allclose(np.concatenate(found), x, atol=1e-9)
+
+
+def test_plots_are_explained_as_a_sum_over_events():
+    """Both likelihoods against a sum over all events, written out, beside false alarms alone."""
+    z, P, R = np.array([[2.0, 1.0], [9.0, -3.0]]), SENSOR.detection_probability, 100.0 * np.eye(2)
+    a, b, C = np.array([3.0, 4.0]), np.array([-8.0, 1.0]), 40.0 * np.eye(2)
+    clutter = np.array([-12.0, -11.0])
+    looks = Looks(Expected(a[None], (C + R)[None]), Expected(b[None], (C + R)[None]), (a - b)[None], 2.0 * C[None])
+    told = explained(SENSOR, z, clutter, looks)
+    f = lambda at, S: np.array([multivariate_normal(at, S).pdf(one) for one in z]) / np.exp(clutter)  # noqa: E731
+    of_a, of_b = f(a, C + R), f(b, C + R)
+    two = (1 - P) ** 2 + P * (1 - P) * (of_a.sum() + of_b.sum()) + P**2 * (of_a[0] * of_b[1] + of_a[1] * of_b[0])
+    middle = f((a + b) / 2, R + C / 2 + (np.outer(a - b, a - b) + 2.0 * C) / 12.0)
+    one = (1 - P) ** 2 + (1 - (1 - P) ** 2) * middle.sum()
+    np.testing.assert_allclose([told.one[0], told.two[0]], np.log([one, two]), rtol=1e-9)
+    assert told.plot.tolist() == [int(middle.argmax())]
 
 
 def test_only_pairs_that_were_seen_apart_are_two():

@@ -9,14 +9,14 @@ and Electronic Systems 33, 1997.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from assoc._types import Array
-from assoc.filters.base import Expected, Filter, predict_each
+from assoc.filters.base import Expected, Filter
 from assoc.sensors import Sensor
 
 # what nobody said is one of these numbers of the noise's deviations, for lengths and for angles; first: no limit
@@ -24,6 +24,7 @@ _STEPS = 2.0 ** np.arange(1.0, 4.5, 0.5)
 GRID = np.concatenate([np.zeros((1, 2)), np.stack(np.meshgrid(_STEPS, _STEPS, indexing="ij"), axis=-1).reshape(-1, 2)])
 
 
+@lru_cache(maxsize=64)
 def resolutions(sensor: Sensor) -> Array:
     """What the resolution of a sensor may be, (G, d): what was said alone, or the grid."""
     if sensor.resolution is not None:
@@ -76,74 +77,78 @@ class Looks(NamedTuple):
     covariance: Array
     """Of the difference."""
 
+    def of(self, rows: Array) -> Looks:
+        """Select pairs."""
+        first, second = (Expected(e.mean[rows], e.covariance[rows]) for e in (self.first, self.second))
+        return Looks(first, second, self.difference[rows], self.covariance[rows])
 
-def looks_of(filter: Filter[Any], sensor: Sensor, one: Any, other: Any) -> Looks:
-    """What a sensor is expected to measure of pairs in these states."""
-    a, b = filter.expected(one, sensor), filter.expected(other, sensor)
+
+def looks_of(filter: Filter[Any], sensor: Sensor, states: Any, first: Array, second: Array) -> Looks:
+    """What a sensor is expected to measure of pairs in these rows (N,), (N,) of states."""
+    every = filter.expected(states, sensor)
+    a, b = (Expected(every.mean[rows], every.covariance[rows]) for rows in (first, second))
     return Looks(a, b, sensor.residual(a.mean, b.mean), a.covariance + b.covariance - 2.0 * sensor.covariance)
 
 
-def timed_looks(
-    filter: Filter[Any], sensor: Sensor, plots: Array, later: Array, looks: Looks, pairs: Sequence[Any]
-) -> Looks:
-    """`looks_of` at the time of the plot (n, d) nearest to each midpoint, `later` (n,) than two states of `pairs`."""
+def nearest_plots(sensor: Sensor, plots: Array, looks: Looks) -> Array:
+    """The plot (n, d) nearest to the midpoint of each pair, (N,)."""
     middle = looks.second.mean + 0.5 * looks.difference
-    inverse, off = np.linalg.inv(sensor.covariance), np.stack([sensor.residual(plots, _like(m, plots)) for m in middle])
-    nearest = np.einsum("kni,ij,knj->kn", off, inverse, off).argmin(axis=1)
-    return looks_of(filter, sensor, *(predict_each(filter, states, later[nearest]) for states in pairs))
+    off = sensor.residual(plots[None], middle[:, None])
+    return np.asarray(np.einsum("kni,ij,knj->kn", off, np.linalg.inv(sensor.covariance), off).argmin(axis=1))
 
 
 class Explained(NamedTuple):
-    """The plots of a sensor explained by a pair of tracks and false alarms."""
+    """The plots of a sensor explained by each of N pairs of tracks and false alarms."""
 
-    one: float
-    """Logarithm of their likelihood if the pair is unresolved, relative to false alarms alone."""
-    two: float
-    """If it is not."""
-    plot: int
-    """The plot (from 0) that is likeliest to be of both, -1: there is none."""
-    offers: Array
-    """The two plots that it is worth, one of each track, (2, d)."""
+    one: Array
+    """Logarithm of their likelihood if the pair is unresolved, relative to false alarms alone, (N,)."""
+    two: Array
+    """If it is not, (N,)."""
+    plot: Array
+    """The plot (from 0) that is likeliest to be of both, (N,); nothing where there are none."""
 
 
-def explained(
-    sensor: Sensor, z: Array, clutter: Array, looks: Looks, k: int, precision: Array, pull: Array
-) -> Explained:
-    """How pair k explains plots z (n, d); `clutter` (n,) is the logarithm of the density of false alarms.
-
-    `precision` and `pull` (d,): see `narrowed`. The offers move both tracks as the joint update by a measurement of
-    their midpoint, and of their difference, does.
-    """
+def explained(sensor: Sensor, z: Array, clutter: Array, looks: Looks) -> Explained:
+    """How pairs explain plots z (n, d); `clutter` (n,) is the logarithm of the density of false alarms."""
     P = sensor.detection_probability
-    difference, covariance = looks.difference[k], looks.covariance[k]
-    middle = looks.second.mean[k] + 0.5 * difference
-    spread = spread_of(sensor.covariance, covariance, difference)
-    off = sensor.residual(z, _like(middle, z))
-    at_middle = _density(off, spread) - clutter
-    a, b = (_density(sensor.residual(z, _like(e.mean[k], z)), e.covariance[k]) - clutter
-            for e in (looks.first, looks.second))  # fmt: skip
-    one = float(
-        np.logaddexp(2.0 * math.log1p(-P), math.log1p(-((1.0 - P) ** 2)) + logsumexp(np.append(at_middle, -745.0)))
-    )
+    middle = looks.second.mean + 0.5 * looks.difference
+    spread = spread_of(sensor.covariance, looks.covariance, looks.difference)
+    at_middle = _density(sensor, z, middle, spread) - clutter
+    nothing = np.full((len(middle), 1), -745.0)
+    seen = math.log1p(-((1.0 - P) ** 2)) + logsumexp(np.hstack([at_middle, nothing]), axis=1)
     # each by a plot of its own or by none: no plot serves both
     odds = math.log(P) - math.log1p(-P)
-    free = np.exp(np.clip(a + odds, -700.0, 300.0)), np.exp(np.clip(b + odds, -700.0, 300.0))
-    both = (1.0 + free[0].sum()) * (1.0 + free[1].sum()) - (free[0] * free[1]).sum()
-    two = 2.0 * math.log1p(-P) + math.log(max(float(both), 1.0))
-    plot = int(at_middle.argmax()) if len(z) else -1
-    if plot < 0:
-        return Explained(one, two, plot, off[:0])
-    step = 0.5 * np.linalg.solve(spread, off[plot])
+    a, b = (
+        np.exp(np.clip(_density(sensor, z, e.mean, e.covariance) - clutter + odds, -700.0, 300.0))
+        for e in (looks.first, looks.second)
+    )
+    both = (1.0 + a.sum(axis=1)) * (1.0 + b.sum(axis=1)) - (a * b).sum(axis=1)
+    two = 2.0 * math.log1p(-P) + np.log(np.maximum(both, 1.0))
+    return Explained(np.logaddexp(2.0 * math.log1p(-P), seen), two, at_middle.argmax(axis=1) if len(z) else seen[:0])
+
+
+def offers(sensor: Sensor, plot: Array, looks: Looks, precision: Array, pull: Array) -> Array:
+    """The two plots that a plot (d,) of one pair, the only one of `looks`, is worth, one of each track, (2, d).
+
+    They move both tracks as the joint update by a measurement of their midpoint, and of their difference, does;
+    `precision` and `pull` (d,): see `narrowed`.
+    """
+    covariance, difference = looks.covariance[0], looks.difference[0]
+    off = sensor.residual(plot, looks.second.mean[0] + 0.5 * difference)
+    step = 0.5 * np.linalg.solve(spread_of(sensor.covariance, covariance, difference), off)
     closer = np.linalg.solve(np.eye(len(pull)) + precision[:, None] * covariance, pull)
-    steps = step + closer, step - closer
-    both_looks = zip((looks.first, looks.second), steps, strict=True)
-    return Explained(one, two, plot, np.stack([e.mean[k] + e.covariance[k] @ way for e, way in both_looks]))
+    ways = zip((looks.first, looks.second), (step + closer, step - closer), strict=True)
+    return np.stack([e.mean[0] + e.covariance[0] @ way for e, way in ways])
 
 
 def spread_of(noise: Array, covariance: Array, difference: Array) -> Array:
-    """Covariance of a plot of two around the midpoint of their predictions; covariance is that of their difference."""
+    """Covariance of a plot of two around the midpoint of their predictions, (..., d, d).
+
+    `covariance` (..., d, d) is that of the `difference` (..., d) of the two.
+    """
     # echoes of random strength: the centre is anywhere between the two
-    return np.asarray(noise + 0.25 * covariance + (np.outer(difference, difference) + covariance) / 12.0)
+    outer = difference[..., :, None] * difference[..., None, :]
+    return np.asarray(noise + 0.25 * covariance + (outer + covariance) / 12.0)
 
 
 def information(noise: Array, covariance: Array, difference: Array, precision: Array) -> Array:
@@ -171,11 +176,8 @@ def slopes(filter: Filter[Any], sensor: Sensor, mean: Array) -> Array:
     return found
 
 
-def _like(one: Array, plots: Array) -> Array:
-    return np.broadcast_to(one, plots.shape)
-
-
-def _density(off: Array, covariance: Array) -> Array:
-    """Logarithm of the normal density, (n,)."""
-    square = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
-    return np.asarray(-0.5 * (square + np.linalg.slogdet(2.0 * math.pi * covariance)[1]))
+def _density(sensor: Sensor, z: Array, mean: Array, covariance: Array) -> Array:
+    """Logarithm of normal densities (N,) at plots (n, d), (N, n)."""
+    off = sensor.residual(z[None], mean[:, None])
+    square = np.einsum("kni,kij,knj->kn", off, np.linalg.inv(covariance), off)
+    return np.asarray(-0.5 * (square + np.linalg.slogdet(2.0 * math.pi * covariance)[1][:, None]))

@@ -24,9 +24,10 @@ from assoc.costs.tracks.unresolved import (
     information,
     looks_of,
     narrowed,
+    nearest_plots,
+    offers,
     resolutions,
     slopes,
-    timed_looks,
     unresolved_probability,
 )
 from assoc.costs.views import places_of
@@ -45,6 +46,8 @@ from assoc.tracking.stages.coverage import dwells
 _REACH = 1.5
 # tracks confirmed before they met are two if both were detected in so many of the last scans
 _RECENT, _TOGETHER = 10, 5
+# pairs that are unresolved with less probability are not looked at, but for so many by which to learn
+_LEAST, _LEARNT = 1e-3, 4
 # tracks missed more often in a row may have ended
 _MISSED = 1
 
@@ -57,6 +60,8 @@ def share(progress: Progress) -> Progress:
     sure = sure[np.isin(sure, tracks.track_id).all(axis=1)]
     if not len(sure):
         return progress
+    # the tracks of pairs alone, and their rows
+    tracks = tracks[np.isin(tracks.track_id, sure)]
     order = np.argsort(tracks.track_id, kind="stable")
     first, second = order[np.searchsorted(tracks.track_id, sure, sorter=order)].T
     steady = (tracks.missed[first] <= _MISSED) & (tracks.missed[second] <= _MISSED)
@@ -66,33 +71,45 @@ def share(progress: Progress) -> Progress:
     precision = np.zeros((*covered.shape, max(sensor.dim for sensor in progress.settings.sensors)))
     probability, found = np.zeros(covered.shape), list[tuple[float, int, int, int, Array]]()
     for s in _candidates(progress):
-        pairs = np.flatnonzero(covered[:, s])
+        pairs, declared = np.flatnonzero(covered[:, s]), progress.work.settings.sensors[s]
         if not len(pairs):
             continue
-        limits = resolutions(progress.work.settings.sensors[s])
+        limits, weights = resolutions(declared), known.weights(s)
         looks = _looks(progress, s, states, tracks.states, (first[pairs], second[pairs]))
         by_limit = unresolved_probability(looks.difference, looks.covariance, limits)
-        close = known.weights(s) * by_limit
-        closeness = narrowed(looks.difference, looks.covariance, limits, close)
-        precision[pairs, s, : limits.shape[1]] = closeness[0]
-        probability[pairs, s] = P = by_limit @ known.weights(s)
-        near = np.flatnonzero(by_limit.max(axis=1) > 1e-3)
+        probability[pairs, s] = P = by_limit @ weights
+        near = _told(by_limit, P, declared)
+        if not len(near):
+            continue
         sensor, z = progress.settings.sensors[s], progress.scan.measurements[s]
         clutter = math.log(sensor.false_alarm_rate / sensor.volume) + progress.scan.crowd(s, np.arange(len(z)))
-        told = [explained(sensor, z, clutter, looks, k, *(part[k] for part in closeness)) for k in near.tolist()]
-        learns = np.flatnonzero(steady[pairs[near]])
-        if progress.work.settings.sensors[s].resolution is None and len(learns):
-            one, two = (np.array([told[k][part] for k in learns.tolist()]) for part in (0, 1))
-            known = known.learnt(s, by_limit[near[learns]], one, two)
-        for k, way in zip(near.tolist(), told, strict=True):
-            gain = np.log(max(P[k], 1e-300)) + way.one - np.log1p(-P[k]) - way.two
-            if way.plot >= 0 and gain > 0.0:
-                found.append((float(gain), s, int(pairs[k]), way.plot, way.offers))
+        told = explained(sensor, z, clutter, looks.of(near))
+        learns = steady[pairs[near]]
+        if declared.resolution is None and learns.any():
+            known = known.learnt(s, by_limit[near[learns]], told.one[learns], told.two[learns])
+        gain = np.log(np.maximum(P[near], 1e-300)) + told.one - np.log1p(-P[near]) - told.two
+        for n in np.flatnonzero(gain > 0.0).tolist() if len(z) else ():
+            one = looks.of(near[[n]])
+            narrow, pull = narrowed(one.difference, one.covariance, limits, weights * by_limit[near[[n]]])
+            precision[pairs[near[n]], s, : limits.shape[1]] = narrow[0]
+            plot = int(told.plot[n])
+            offered = offers(sensor, z[plot], one, narrow[0], pull[0])
+            found.append((float(gain[n]), s, int(pairs[near[n]]), plot, offered))
     progress = progress.with_state(unresolved=known)._replace(shared=Shared(sure, probability))
     progress = _doubled(progress, sure, probability, found)
     if progress.scan.copies is None:
         return progress
     return _with_widths(progress, states, np.stack([first, second], axis=1), dwelled, precision)
+
+
+def _told(by_limit: Array, probability: Array, sensor: Sensor) -> Array:
+    """Pairs whose plots are to be explained: those that may be unresolved, and a few more if that is to be learnt."""
+    near = probability > _LEAST
+    if sensor.resolution is None:
+        may = by_limit.max(axis=1)
+        best = np.argsort(-may * ~near, kind="stable")[:_LEARNT]
+        near[best[may[best] > _LEAST]] = True
+    return np.flatnonzero(near)
 
 
 def _candidates(progress: Progress) -> list[int]:
@@ -107,11 +124,15 @@ def _candidates(progress: Progress) -> list[int]:
 def _looks(progress: Progress, s: int, states: Any, before: Any, rows: tuple[Array, Array]) -> Looks:
     """What sensor s is expected to measure of pairs in these rows of the states."""
     filter, scan, sensor = progress.settings.filter, progress.scan, progress.settings.sensors[s]
-    looks = looks_of(filter, sensor, *(states[part] for part in rows))
+    looks = looks_of(filter, sensor, states, *rows)
     if scan.times is None or not len(scan.times[s]):
         return looks
-    later = np.maximum(scan.times[s] - (progress.state.time or 0.0), 0.0)
-    return timed_looks(filter, sensor, scan.measurements[s], later, looks, [before[part] for part in rows])
+    later = np.maximum(scan.times[s] - (progress.state.time or 0.0), 0.0)[
+        nearest_plots(sensor, scan.measurements[s], looks)
+    ]
+    count, both = len(later), np.concatenate(rows)
+    there = predict_each(filter, before[both], np.concatenate([later, later]))
+    return looks_of(filter, sensor, there, np.arange(count), np.arange(count, 2 * count))
 
 
 def _with_widths(progress: Progress, states: Any, rows: Array, dwelled: Array, precision: Array) -> Progress:
@@ -156,12 +177,12 @@ def _doubled(
     scan, taken, plots = progress.scan, set[tuple[int, str, int]](), list[tuple[int, int]]()
     values = [np.array(z) for z in scan.measurements]
     copies: list[list[int]] = [[] for _ in values]
-    for _, s, pair, plot, offers in sorted(found, key=lambda one: -one[0]):
+    for _, s, pair, plot, offered in sorted(found, key=lambda one: -one[0]):
         keys = {(s, "plot", plot), *((s, "track", int(i)) for i in ids[pair])}
         if not keys & taken:
             taken |= keys
             sensor = progress.settings.sensors[s]
-            values[s][plot], copy = sensor.residual(offers, np.zeros(offers.shape))
+            values[s][plot], copy = sensor.residual(offered, np.zeros(offered.shape))
             values[s] = np.concatenate([values[s], copy[None]])
             copies[s].append(plot)
             plots.append((s, plot))
