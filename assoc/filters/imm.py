@@ -36,7 +36,7 @@ from assoc.filters.kernels.gates import distances, matched
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, periods_of
-from assoc.filters.state import Gaussian, finite, gaussian
+from assoc.filters.state import Gaussian, finite, gaussian, symmetric
 from assoc.filters.unscented import UnscentedKalmanFilter
 
 
@@ -58,7 +58,7 @@ class Mixture(Batch):
         """Covariances of the mixtures, (B, n, n)."""
         spread = self.means - self.mean[:, None]
         covariance: Array = np.einsum("bm,bmij->bij", self.weights, self.covariances)
-        return covariance + np.einsum("bm,bmi,bmj->bij", self.weights, spread, spread)
+        return symmetric(covariance + np.einsum("bm,bmi,bmj->bij", self.weights, spread, spread))
 
     def component(self, j: int) -> Gaussian:
         """Return the Gaussians of one model."""
@@ -369,4 +369,4 @@ def _mixed(state: Mixture, transition: Array) -> Mixture:
     B, m, n = means.shape
     P = (share.transpose(0, 2, 1) @ state.covariances.reshape(B, m, n * n)).reshape(B, m, n, n)
     P += (share[..., None] * away).transpose(0, 2, 3, 1) @ away.transpose(0, 2, 1, 3)
-    return Mixture(means, P, weights)
+    return Mixture(means, symmetric(P), weights)

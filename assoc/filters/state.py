@@ -94,3 +94,8 @@ def gaussian(mean: Array, covariance: Array) -> Gaussian:
     made.__dict__["mean"] = mean
     made.__dict__["covariance"] = covariance
     return made
+
+
+def symmetric(covariance: Array) -> Array:
+    """Covariances (..., n, n) symmetric to the last bit: products of matrices round the two halves differently."""
+    return np.asarray(0.5 * (covariance + covariance.swapaxes(-1, -2)))

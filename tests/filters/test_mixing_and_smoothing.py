@@ -35,6 +35,7 @@ from assoc.filters import (
 )
 from assoc.filters.base import predict_each
 from assoc.filters.batches import arrays_of, placed
+from assoc.filters.imm import Mixture, _mixed
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
 
@@ -509,3 +510,17 @@ def test_parts_are_placed_where_they_belong():
                 width = tuple(slice(size) for size in value.shape[1:])
                 assert np.array_equal(whole[name][rows][:, *width], value), name
                 assert whole[name][rows].sum() == pytest.approx(value.sum())
+
+
+@pytest.mark.parametrize("models", [2, 3])
+def test_covariances_of_mixtures_are_symmetric_to_the_last_bit(models):
+    rng = np.random.default_rng(4)
+    modes = [ExtendedKalmanFilter(ConstantVelocity(noise, kind="continuous")) for noise in (1.0, 10.0, 50.0)[:models]]
+    model = InteractingMultipleModel(modes, np.full((models, models), 0.1) + np.eye(models) * (1 - 0.1 * models))
+    roots = rng.normal(size=(20, models, 6, 6))
+    P = roots @ roots.transpose(0, 1, 3, 2)
+    P = 0.5 * (P + P.transpose(0, 1, 3, 2))
+    state = Mixture(1e3 * rng.normal(size=(20, models, 6)), P, rng.dirichlet(np.ones(models), 20))
+    mixed = _mixed(state, model.transition)
+    for covariance in (state.covariance, mixed.covariances, model.predict(state, 2.0).covariance):
+        np.testing.assert_array_equal(covariance, covariance.swapaxes(-1, -2))
