@@ -16,6 +16,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_pairs
+from assoc.errors import LimitExceededError
 from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
@@ -167,6 +168,12 @@ class AtOnce(Growth):
         sensor, terms = settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
         pairs = track_pairs(self._filter, self._states, scan.measurements[s], sensor, gate)
+        count, most = len(pairs.track) + len(self._states), settings.max_tuples
+        if count > most:
+            raise LimitExceededError(
+                f"scan {scan.index}: {count} candidate tuples of tracks and measurements, more than "
+                f"max_tuples = {most}; lower gate_probability or raise max_tuples"
+            )
         self._corrected = pairs.correct
         missed = misses_of(self._progress, self._states, s, self._partly)
         gain = pairs.log_likelihood + terms.detection[s] - scan.crowd(s, pairs.measurement)
@@ -268,7 +275,7 @@ class InOrder(Growth):
         """Pairs by the measurements of sensor s, filtered in time order with those of earlier sensors."""
         timed, terms, past = self._timed, self._progress.settings.terms, self._past
         past[:, s] = self._misses[:, s]
-        grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows)
+        grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows, self._progress.settings.max_tuples)
         self._total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
         missed = self._misses[self._anchor, s]
         gain = self._total - self._gained[grown.parent]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assoc import simulation
+from assoc.errors import LimitExceededError
 from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
 from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.progress import solver_options
@@ -82,3 +83,18 @@ def test_two_speeds_believes_in_manoeuvres_when_there_is_one():
         state = filter_.update(filter_.predict(state, 1.0), place, sensor).state
         weights.append(state.weights[0, 1])
     assert weights[14] < 0.1 and min(weights[17:]) > 0.6
+
+
+@pytest.mark.parametrize("own_times", [False, True])
+def test_candidates_of_a_step_are_limited_before_they_take_memory(own_times):
+    """Thirty copies of each measurement belong to each track thirty times over, at each of three radars."""
+    scene = simulation.simulate("three-radar", 3, scans=5)
+    tracker = TRACKERS["joint-probabilistic"].for_scene(scene, max_tuples=1000)
+    for k in range(4):
+        tracker.step(float(scene.times[k]), scene.scan(k).measurements)
+    crowd = [np.asarray(z).repeat(60, axis=0) for z in scene.scan(4).measurements]
+    stamps = [np.linspace(scene.times[3] + 0.5, scene.times[4], len(z)) if own_times else None for z in crowd]
+    before = tracker.state
+    with pytest.raises(LimitExceededError, match="more than max_tuples = 1000; lower gate_probability"):
+        tracker.step(float(scene.times[4]), crowd, stamps if own_times else None)
+    assert tracker.state is before

@@ -30,6 +30,8 @@ from assoc.sensors import Sensor
 
 # a gate moves on a curve, the box on a straight line: it is longer by this factor
 _CURVED = 1.3
+# pairs that are filtered at a time
+_BLOCK = 50_000
 
 
 PairEvidence = Callable[[Array, int, Array], tuple[Array, Array]]
@@ -219,8 +221,10 @@ class TimedScan:
         """The measurement, as anchor, with which each new target began, (M,)."""
         return self.offsets[lead] + np.take_along_axis(rows, lead[:, None], axis=1)[:, 0] - 1
 
-    def grown(self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array) -> Grown:
+    def grown(self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array, max_tuples: int) -> Grown:
         """Partial tuples with one more measurement, of sensor s, that passes all gates.
+
+        LimitExceededError where these and the ones before are more than `max_tuples`.
 
         Measurements of the sensors in `done` may have begun new targets. Of the partial tuples: `anchor` (M,), the
         track, or the measurement that began a new target; `track` (M,), the row of the track or -1; `rows` (M, S).
@@ -231,12 +235,24 @@ class TimedScan:
             near_anchor, near_found = np.append(near_anchor, self.offsets[r] + first), np.append(near_found, second)
         order = np.lexsort((near_found, near_anchor))
         parent, found = _join(anchor, near_anchor[order], near_found[order], int(self.offsets[-1]))
-        new = rows[parent]
-        new[:, s] = found + 1
-        followed = self.follow(track[parent], new)
-        good = np.flatnonzero(followed.inside)
-        chosen = Followed(followed.states[good], *(part[good] for part in followed[1:]))
-        return Grown(parent[good], found[good], new[good], chosen)
+        blocks, count = [], len(rows)
+        # as many at a time as may be kept: boxes may hold any number that fails its gates
+        for block in np.split(np.arange(len(parent)), range(_BLOCK, len(parent), _BLOCK)):
+            new = rows[parent[block]]
+            new[:, s] = found[block] + 1
+            followed = self.follow(track[parent[block]], new)
+            good = np.flatnonzero(followed.inside)
+            count += len(good)
+            if count > max_tuples:
+                raise LimitExceededError(
+                    f"{count} or more candidate tuples of tracks and measurements, more than max_tuples = "
+                    f"{max_tuples}; lower gate_probability or raise max_tuples"
+                )
+            blocks.append((block[good], new[good], followed.states[good], [part[good] for part in followed[1:]]))
+        kept, new_rows, states, others = zip(*blocks, strict=True)
+        chosen = Followed(concatenate(states), *map(np.concatenate, zip(*others, strict=True)))
+        every = np.concatenate(kept)
+        return Grown(parent[every], found[every], np.concatenate(new_rows), chosen)
 
     def near(self, s: int) -> tuple[Array, Array]:
         """Tracks and measurements of sensor s that may pass the gate, ordered by track."""
@@ -337,12 +353,7 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tup
     alone = costs.copy()
     done: list[int] = []
     for s in scan.order:
-        new = scan.grown(s, done, anchor, track, rows)
-        if len(new.parent) + len(track) > max_tuples:
-            raise LimitExceededError(
-                f"{len(new.parent) + len(track)} candidate tuples of tracks and measurements, "
-                f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
-            )
+        new = scan.grown(s, done, anchor, track, rows, max_tuples)
         value = score_costs(scan, new.followed, new.rows, terms, misses[anchor[new.parent]])
         starts = np.flatnonzero(scan.places.fit[s])
         single = np.zeros((len(starts), width), dtype=np.int32)
