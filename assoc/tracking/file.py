@@ -145,7 +145,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         registration=None if model.registration is None else model.registration.restored(saved),
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
-        clutter=None if model.clutter is None else _clutter(model.clutter, saved.part("clutter.")),
+        clutter=None if model.clutter is None else _clutter(settings, model.clutter, saved.part("clutter.")),
         echoes=None if model.echoes is None else _echoes(model.echoes, saved.part("echoes.")),
     )  # fmt: skip
     state = state._replace(method_state=settings.method.restored(settings, saved, state))
@@ -198,15 +198,21 @@ def _estimates(model: Estimates, saved: Saved) -> Estimates:
     return Estimates(**arrays)
 
 
-def _clutter(model: ClutterMap, saved: Saved) -> ClutterMap:
+def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> ClutterMap:
     """The clutter map in these arrays, checked."""
     for name, value in saved.items():
         saved.require(np.isfinite(value).all(), name, "finite numbers")
-    good = saved["clock"].shape == model.clock.shape
+    good = saved["clock"].shape == model.clock.shape and (saved["clock"] >= 0).all()
     saved.require(good, "clock", f"turns of {len(model.clock)} sensors")
     for s, places in enumerate(model.places):
         count, width = len(saved[f"places.{s}"]), places.shape[1]
         saved.require(saved[f"places.{s}"].shape[1] == width, f"places.{s}", f"rows of {width} components")
+        part = settings.sensors[s].position_part
+        # in units of the noise; what turns is searched for in a circle, the squares of the rest must be numbers
+        turns, unit = np.array(part.angular[:width]), np.sqrt(np.diagonal(part.covariance)[:width])
+        low, high = np.where(turns, 0.0, -1e100), np.where(turns, 2.0 * math.pi / unit * (1.0 + 1e-12), 1e100)
+        good = ((saved[f"places.{s}"] >= low) & (saved[f"places.{s}"] <= high)).all()
+        saved.require(good, f"places.{s}", "places in units of the noise, azimuths from 0 to a full turn")
         clocks = saved[f"clocks.{s}"]
         good = clocks.shape == (count,) and (np.diff(clocks) >= 0).all() and (clocks <= saved["clock"][s]).all()
         saved.require(good, f"clocks.{s}", f"{count} turns that do not descend")

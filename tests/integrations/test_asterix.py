@@ -1,5 +1,6 @@
 """ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
 
+import contextlib
 import io
 import math
 import struct
@@ -16,7 +17,7 @@ pytest.importorskip("asterix", reason="libasterix is not installed: pip install 
 from assoc import asterix2csv, track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
-from assoc.integrations.asterix.blocks import edition, library, value
+from assoc.integrations.asterix.blocks import EDITIONS, edition, library, value
 from assoc.integrations.asterix.parts import AsterixPlots
 from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
@@ -291,6 +292,26 @@ def test_hostile_files(file, tmp_path):
         read_asterix(tmp_path / "none.ast")
     with pytest.raises(InvalidInputError, match=r"origin: latitude must be within .* \(degrees\?\)"):
         read_asterix(file, origin=(52.0, 13.0, 40.0))
+
+
+def test_bits_of_items_that_no_edition_defines(tmp_path):
+    """Random records of all categories: the decoder fails in its own ways, the reader says what it left out."""
+    rng = np.random.default_rng([1, 7])
+    path, undecoded = tmp_path / "random.ast", 0
+    for _ in range(200):
+        bodies = [rng.bytes(int(rng.integers(2, 60))) for _ in range(8)]
+        kinds = rng.choice(list(EDITIONS), len(bodies)).tolist()
+        path.write_bytes(
+            b"".join(struct.pack(">BH", kind, len(body) + 3) + body for kind, body in zip(kinds, bodies, strict=True))
+        )
+        for read in (read_asterix, read_tracks):
+            with contextlib.suppress(InvalidInputError):
+                read(path)
+        notes = {}
+        with contextlib.suppress(InvalidInputError):
+            read_records(path, notes)
+        undecoded += sum(count for what, count in notes.items() if "cannot be decoded" in what)
+    assert undecoded > 100
 
 
 def packet(payload, port=8600):

@@ -126,6 +126,25 @@ def test_each_lie_is_named(name, lies, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("field", "lie"),
+    [("places.0", 1e9), ("places.0", -1.0), ("clock", -1.0)],
+    ids=["beyond a turn", "before zero", "time before the first"],
+)
+def test_a_clutter_map_outside_of_its_circle(field, lie, tmp_path):
+    kind, path = TRACKERS["nearest-neighbour"], tmp_path / "bad.npz"
+    tracker = kind.for_scene(SCENE, adapt=True)
+    stepped(tracker, SCENE, 0, SCANS)
+    arrays = {key: np.array(value) for key, value in arrays_of(tracker).items()}
+    save_npz(path, FORMAT, VERSION, arrays)
+    kind.for_scene(SCENE, adapt=True).restore(path)
+    # of places, the azimuth
+    arrays[f"clutter.{field}"][(0, 1) if field != "clock" else 0] = lie
+    save_npz(path, FORMAT, VERSION, arrays)
+    with pytest.raises(InvalidInputError, match=f"'clutter.(clocks.0|{field})'"):
+        kind.for_scene(SCENE, adapt=True).restore(path)
+
+
+@pytest.mark.parametrize(
     "make",
     [
         lambda: EnsembleKalmanFilter(ConstantVelocity(20.0, kind="continuous"), 20, 1),

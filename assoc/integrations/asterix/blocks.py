@@ -118,7 +118,12 @@ def records(block: Block, notes: dict[str, int]) -> list[Any]:
     """Decoded records of a data block; if they cannot be decoded, none, and a count in `notes`."""
     kind, base = edition(block.category).cv_uap, library()[0]
     content = base.Bits.from_bytes(block.content)
-    found = _mixed(kind, content) if issubclass(kind, base.UapMultiple) else kind.parse(content)
+    found: Any
+    try:
+        found = _mixed(kind, content) if issubclass(kind, base.UapMultiple) else kind.parse(content)
+    except (TypeError, ValueError, AttributeError, LookupError, AssertionError) as error:
+        # the package fails so on bits of items that its editions do not define
+        found = ValueError(str(error))
     if isinstance(found, ValueError):
         _count(notes, f"data blocks of category {block.category:03d} that cannot be decoded", 1)
         return []
