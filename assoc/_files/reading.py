@@ -78,11 +78,23 @@ def check_unpacked(path: FilePath, size: float, packed: int, floor: int = FLOOR)
         )
 
 
+def refuse_pipe(path: FilePath) -> None:
+    """Refuse a named pipe, or a link to one: nobody may ever write to it, and readers look at a file twice."""
+    mode = 0
+    # what a shell makes of a command, /dev/fd/63, has a writer
+    if not os.fspath(path).startswith(("/dev/", "/proc/")):
+        with suppress(OSError, ValueError):
+            mode = os.stat(path).st_mode
+    if stat.S_ISFIFO(mode):
+        raise InvalidInputError(f"{path}: is a named pipe, expected a file")
+
+
 class _Counted(io.RawIOBase):
     """The content of a file, up to a limit."""
 
     def __init__(self, path: FilePath, most: int) -> None:
         self._path, self._most, self._count = path, most, 0
+        refuse_pipe(path)
         with ExitStack() as stack, readable(path):
             file = self._stream = stack.enter_context(open(path, "rb"))
             ending = os.path.splitext(os.fspath(path))[1].lower()

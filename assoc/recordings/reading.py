@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.reading import read_lines, readable
+from assoc._files.reading import read_lines, readable, refuse_pipe
 from assoc._system.door import door
 from assoc._system.imports import check_extra
 from assoc._text.plain import one_line
@@ -164,6 +164,7 @@ def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataF
     check_extra("pyarrow", "parquet")
     from pyarrow import parquet
 
+    refuse_pipe(file)
     with readable(file), open(file, "rb"):
         pass
 

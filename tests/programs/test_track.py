@@ -11,7 +11,9 @@ import pytest
 
 from assoc import track
 from assoc._cli.track import options as track_options
-from assoc.recordings import Recording, write_plots
+from assoc.errors import InvalidInputError
+from assoc.recordings import Recording, read_plots, write_plots
+from assoc.recordings.flights.reports import read_flight_reports
 from assoc.scene import Scene, Truth
 from assoc.sensors import Radar2D
 from assoc.simulation import simulate
@@ -53,6 +55,20 @@ def test_what_comes_by_a_pipe_is_read_once(tmp_path):
         assert os.read(end, 100) == b"time,range,bearing\n"
     finally:
         os.close(end)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("name", ["plots.csv", "link.csv", "plots.parquet"])
+def test_a_pipe_that_nobody_may_write_to_is_no_file(name, tmp_path):
+    pipe = tmp_path / name
+    if name == "link.csv":
+        os.mkfifo(tmp_path / "pipe")
+        pipe.symlink_to("pipe")
+    else:
+        os.mkfifo(pipe)
+    for read in (read_plots, lambda path: read_flight_reports(str(path), {})):
+        with pytest.raises(InvalidInputError, match=f"{name}: is a named pipe, expected a file"):
+            read(pipe)
 
 
 def test_a_scene_as_a_program(run, scene_file, tmp_path):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.reading import check_unpacked, open_input
+from assoc._files.reading import check_unpacked, open_input, refuse_pipe
 from assoc._system.imports import check_extra
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
@@ -143,6 +143,7 @@ def read_flight_reports(
 def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, dict[str, str]]:
     import pandas as pd
 
+    refuse_pipe(path)
     parquet = _is_parquet(path)
     if parquet:
         check_extra("pyarrow", "parquet")
