@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
 from assoc._system import memory
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError, LimitExceededError, warn
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _FROM_DENSE = (
 _MAX_TOTAL_COST = 1e300
 
 
-@doors
+@explains_wrong_types
 class AssignmentProblem:
     """Choose tuples of minimum total cost such that each measurement is in exactly one.
 

@@ -7,8 +7,8 @@ where:
   ``--flag value``: one of its values
 - ``assoc.room.name``: a public name of a package
 - ``Class.name``: an attribute or a method
-- ``function(argument)``, ``Class.method(argument)``: an argument by keyword of a function that `door` decorates, or
-  a parameter of a solver, ``aco(argument)``
+- ``function(argument)``, ``Class.method(argument)``: an argument by keyword of a public function (one that
+  `explains_wrong_types` decorates), or a parameter of a solver, ``aco(argument)``
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``associate``: the door from a scene to its association."""
+"""``associate``: the entrance from a scene to its association."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from assoc._parameters import whole_seed
-from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.association.association import Association
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
 
-@door
+@explains_wrong_types
 @interruptible()
 def associate(
     scene: Scene,

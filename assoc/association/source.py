@@ -6,7 +6,7 @@ import os
 
 from assoc._files.npz import format_of
 from assoc._files.problem_text import is_text
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
@@ -15,7 +15,7 @@ from assoc.solvers.plausibility import cost_warnings
 Source = Scene | AssignmentProblem
 
 
-@door
+@explains_wrong_types
 def load(path: str | os.PathLike[str]) -> Source:
     """Load a scene or a problem, by the format that the file names.
 

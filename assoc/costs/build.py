@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays, unmissed
@@ -31,7 +31,7 @@ GATE_PROBABILITY = 0.999
 """Default share of true tuples that each chi-square gate lets through."""
 
 
-@door
+@explains_wrong_types
 @interruptible()
 def build_problem(
     scene: Scene,
@@ -178,7 +178,7 @@ def _whole_grid(
     return AssignmentProblem(tuples, costs, chosen.sizes)
 
 
-@door
+@explains_wrong_types
 def tuple_costs(
     scene: Scene,
     scan: int | Scan,
@@ -214,7 +214,7 @@ def tuple_costs(
     return timed_costs(scene, chosen, tuples, speed)
 
 
-@door
+@explains_wrong_types
 def positions_and_covariances(
     scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
 ) -> tuple[Array, Array]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import State
 from assoc.filters.state import finite
 
 
-@door
+@explains_wrong_types
 def nees(state: State, truth: Array) -> Array:
     """Normalised estimation error squared of each target, (B,); its mean is n if the filter is right.
 
@@ -41,7 +41,7 @@ def nees(state: State, truth: Array) -> Array:
     return np.einsum("bi,bi->b", error, np.linalg.solve(unit, error[..., None])[..., 0])
 
 
-@door
+@explains_wrong_types
 def bounds(dim: int, runs: int, probability: float = 0.95) -> tuple[float, float]:
     """Interval that the mean of `runs` chi-square variables of `dim` degrees of freedom hits."""
     from scipy.stats import chi2

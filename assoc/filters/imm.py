@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import positive
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import (
@@ -93,7 +93,7 @@ def transition_rates(transition: Array, interval: float) -> Array:
     return np.asarray(off - np.diag(off.sum(axis=1)))
 
 
-@door
+@explains_wrong_types
 def transition_from_sojourns(seconds: Sequence[float], interval: float = 1.0) -> Array:
     """Transition probabilities of modes that last for these mean times, each change as likely to any other mode.
 

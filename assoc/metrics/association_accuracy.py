@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.metrics.trajectories import columns_of_rows
 
@@ -37,7 +37,7 @@ class AssociationAccuracy:
     targets_recognised: float
 
 
-@door
+@explains_wrong_types
 def association_accuracy(sources: Array, labels: Array, instants: Array | None = None) -> AssociationAccuracy:
     """Compare groups of measurements with their sources.
 

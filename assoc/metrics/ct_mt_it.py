@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.metrics.plot_identity import LastPlots
@@ -38,7 +38,7 @@ class CtMtIt(Shown):
         return f"CtMtIt(CT {self.ct:.1f} %, MT {self.mt:.1f} %, IT {self.it:.1f} %, {len(self.windows)} windows)"
 
 
-@door
+@explains_wrong_types
 def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) -> CtMtIt:
     """CT, MT and IT of plots that a tracker has given to tracks.
 

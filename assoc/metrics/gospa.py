@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.metrics.ospa import check_cutoff, distances, point_sets
 from assoc.metrics.trajectories import Trajectories, epochs
@@ -35,7 +35,7 @@ class Gospa(NamedTuple):
     pairs: Array
 
 
-@door
+@explains_wrong_types
 def gospa(truth: Array, estimates: Array, cutoff: float, order: float = 2.0) -> Gospa:
     """Generalised optimal subpattern assignment metric, alpha = 2.
 
@@ -82,7 +82,7 @@ def _gospa(between: Array, cutoff: float, order: float) -> Gospa:
     )
 
 
-@door
+@explains_wrong_types
 def gospa_over_time(
     truth: Trajectories, tracks: Trajectories, cutoff: float, order: float = 2.0
 ) -> tuple[Array, list[Gospa]]:
@@ -105,7 +105,7 @@ def gospa_over_time(
     return np.array(times), values
 
 
-@door
+@explains_wrong_types
 def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     """Mean over time of GOSPA and of its parts, each ``mean(x ** order) ** (1 / order)``, metres.
 

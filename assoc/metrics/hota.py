@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.metrics.ospa import check_cutoff, distances
@@ -40,7 +40,7 @@ class Hota(Shown):
         return f"Hota({self.hota:.3f}, detection {self.detection:.3f}, association {self.association:.3f})"
 
 
-@door
+@explains_wrong_types
 def hota(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Hota:
     """Higher order tracking accuracy.
 

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.metrics.ospa import check_cutoff, distances
 from assoc.metrics.trajectories import Trajectories, columns_of_rows, epochs
@@ -51,7 +51,7 @@ class Identity:
     targets: int
 
 
-@door
+@explains_wrong_types
 def identity(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Identity:
     """Follow targets through tracks.
 
@@ -161,7 +161,7 @@ def _idf1(together: dict[tuple[int, int], int], targets: int, tracks: int) -> fl
     return 2.0 * agreed / (targets + tracks)
 
 
-@door
+@explains_wrong_types
 def label_switches(sources: Array, labels: Array) -> int:
     """Identity switches where the source of each measurement is known: changes of label along each source.
 

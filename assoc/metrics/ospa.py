@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from assoc._system import memory
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
@@ -28,7 +28,7 @@ class Ospa(NamedTuple):
     cardinality: float
 
 
-@door
+@explains_wrong_types
 def ospa(truth: Array, estimates: Array, cutoff: float, order: float = 1.0) -> Ospa:
     """Optimal subpattern assignment metric.
 
@@ -71,7 +71,7 @@ def ospa_of_distances(between: Array, cutoff: float, order: float) -> Ospa:
     )
 
 
-@door
+@explains_wrong_types
 def ospa_over_time(
     truth: Trajectories, tracks: Trajectories, cutoff: float, order: float = 1.0
 ) -> tuple[Array, list[Ospa]]:

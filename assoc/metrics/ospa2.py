@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._system import memory
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import Ospa, check_cutoff, distances, ospa_of_distances
 from assoc.metrics.trajectories import Trajectories, epochs
 
 
-@door
+@explains_wrong_types
 def ospa2(
     truth: Trajectories,
     tracks: Trajectories,

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.metrics.trajectories import columns_of_rows
 
@@ -15,7 +15,7 @@ MEMORY = 6
 """A track's identity is the majority of its last plots, of this many."""
 
 
-@door
+@explains_wrong_types
 def identity_after_each(sources: Array, tracks: Array) -> Array:
     """Identity of the track that took each plot, after it took it.
 
@@ -85,7 +85,7 @@ def majority(plots: deque[int]) -> int:
     return next(aircraft for aircraft in reversed(plots) if votes.get(aircraft, 0) == most)
 
 
-@door
+@explains_wrong_types
 def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> int:
     """How often an aircraft changes its track; single plots given to another track do not count.
 
@@ -110,7 +110,7 @@ def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> i
     return switches
 
 
-@door
+@explains_wrong_types
 def tracks_of_one_identity(sources: Array, tracks: Array, confirmed: Array) -> tuple[int, int]:
     """How many confirmed tracks kept one identity all the time, and how many had any.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.gospa import gospa_over_time
@@ -12,7 +12,7 @@ from assoc.metrics.ospa import distances, point_sets
 from assoc.metrics.trajectories import Trajectories, epochs
 
 
-@door
+@explains_wrong_types
 def rmse(truth: Array, estimates: Array) -> float:
     """Root of the mean squared distance of points that belong together, row by row, metres.
 
@@ -32,7 +32,7 @@ def rmse(truth: Array, estimates: Array) -> float:
     return float(np.sqrt(((x - y) ** 2).sum(axis=1).mean())) if len(x) else float("nan")
 
 
-@door
+@explains_wrong_types
 def track_rmse(truth: Trajectories, tracks: Trajectories, cutoff: float) -> tuple[float, dict[int, float]]:
     """Root mean square position error of tracks that are closer than a cutoff to their target.
 

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc.metrics.gospa import gospa_over_time, mean_gospa
 from assoc.metrics.identity import Identity, identity
@@ -47,7 +47,7 @@ class Summary(Shown):
         return {**{name: value for name, value in values.items() if name != "identity"}, **values["identity"]}
 
 
-@door
+@explains_wrong_types
 def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summary:
     """Compare tracks with the truth.
 

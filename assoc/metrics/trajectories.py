@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._text.times import moment
 from assoc._types import Array
@@ -19,7 +19,7 @@ SAME_TIME = 1e-6
 """Time stamps that differ by less than about this (s) are one epoch."""
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectories(Shown):
     """Targets, or tracks, over time.

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import colour, marker
@@ -17,7 +17,7 @@ _ROUNDING = 1e-6
 _UNITS = {"iteration": "iteration (number)", "time": "time (ms)"}
 
 
-@door
+@explains_wrong_types
 def plot_convergence(
     solutions: Solution | Mapping[str, Solution], *, over: Literal["iteration", "time"] = "iteration", ax: Any = None
 ) -> Any:

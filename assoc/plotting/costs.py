@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import is_whole
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
@@ -23,7 +23,7 @@ from assoc.solution import Solution
 _SPREAD = 0.7
 
 
-@door
+@explains_wrong_types
 def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, ax: Any = None) -> Any:
     """Draw the cost of each candidate tuple by its number of measurements, and which were chosen.
 
@@ -75,7 +75,7 @@ def belongs(solution: Solution, problem: AssignmentProblem) -> bool:
     return bool(inside and np.array_equal(problem.tuples[rows], solution.tuples))
 
 
-@door
+@explains_wrong_types
 def plot_gates(
     scene: Scene,
     association: Association | Sequence[ScanAssociation],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new
@@ -29,7 +29,7 @@ LABELS = {
 """Descriptions of the measures, in the units of `FACTORS`."""
 
 
-@door
+@explains_wrong_types
 def plot_heat_map(
     study: pd.DataFrame, measure: str = "gap", parameters: Sequence[str] | None = None, *, ax: Any = None
 ) -> Any:

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.times import UNIX
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import DASHES, colour, marker
 
 
-@door
+@explains_wrong_types
 def plot_metric(times: Any, values: Any, *, name: str, unit: str, ax: Any = None) -> Any:
     """Draw a metric, or several of one unit, over time.
 

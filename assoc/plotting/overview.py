@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from assoc._system.door import door
 from assoc._system.imports import load_extra
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.association.association import Association
 from assoc.costs import build_problem
 from assoc.errors import InvalidInputError
@@ -16,7 +16,7 @@ from assoc.plotting.solution import plot_solution
 from assoc.scene.scene import Scene
 
 
-@door
+@explains_wrong_types
 def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes: Any = None) -> Any:
     """Draw the scene, the association of one scan, the costs it chose from, and its convergence.
 

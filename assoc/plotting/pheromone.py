@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import VERMILION
@@ -22,7 +22,7 @@ _LABELS = {
 }
 
 
-@door
+@explains_wrong_types
 def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: int = 25, ax: Any = None) -> Any:
     """Draw how the pheromone increases on some tuples and evaporates from the others.
 

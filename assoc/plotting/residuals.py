@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import BLACK, BLUE, ORANGE
@@ -24,7 +24,7 @@ def residual_columns(registration: Registration, component: str) -> list[tuple[i
     ]
 
 
-@door
+@explains_wrong_types
 def plot_residuals(registration: Registration, component: str = "range", *, ax: Any = None) -> Any:
     """Draw the residuals of a component before and after registration, one pair of boxes for each sensor.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
@@ -19,7 +19,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
 
 
-@door
+@explains_wrong_types
 def plot_scene(
     scene: Scene,
     scan: int | None = None,

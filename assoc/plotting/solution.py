@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
@@ -19,7 +19,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 
 
-@door
+@explains_wrong_types
 def plot_solution(
     scene: Scene, association: ScanAssociation, *, target: int | None = None, probability: float = 0.95, ax: Any = None
 ) -> Any:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, unit_of
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _NAMED = 12
 
 
-@door
+@explains_wrong_types
 def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = None) -> Any:
     """Draw tracks, each in its own colour and dashes, over the paths of the targets.
 

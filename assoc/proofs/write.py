@@ -12,7 +12,7 @@ import numpy as np
 from assoc import check
 from assoc._files.output import FilePath, check_writable, write_text
 from assoc._parameters import checked_time_limit
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.prepare import prepare
@@ -29,7 +29,7 @@ _ONE = 10**check.DECIMALS
 _TINY = 10.0 ** (18 - check.DECIMALS)
 
 
-@door
+@explains_wrong_types
 def write_proof(
     path: FilePath,
     problem: AssignmentProblem,

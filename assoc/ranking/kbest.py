@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assoc._parameters import checked_time_limit
 from assoc._system import memory
-from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.prepare import Prepared, prepare, with_capped_costs
 from assoc.packing.run import Outcome, Run, infeasible
@@ -41,7 +41,7 @@ from assoc.solvers.methods import EXACT_METHODS
 _SOLUTION, _MEASUREMENT = 2_000, 130
 
 
-@door
+@explains_wrong_types
 def kbest(problem: AssignmentProblem | ArrayLike, k: int, *, time_limit: float | None = None) -> list[Solution]:
     """Return the k best solutions, truly ranked.
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._parameters import checked_time_limit
-from assoc._system.door import door
 from assoc._system.imports import removed_attribute
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array, Floats, Ints
 from assoc.packing.prepare import prepare
@@ -74,7 +74,7 @@ class Marginals(Shown):
         return f"Marginals({len(self.tuples)} tuples, {self.exact.sum()} exact, largest error {worst:.3g})"
 
 
-@door
+@explains_wrong_types
 @interruptible()
 def marginals(problem: AssignmentProblem | ArrayLike, *, time_limit: float | None = None) -> Marginals:
     """Return the association probability of every tuple.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 
 GARBLED_CODES = (0, 1, 2, 3, 256, 257, 258, 512, 513, 514, 584, 770)
@@ -18,7 +18,7 @@ LARGEST_STEP = 30.0
 """Flight levels: no aircraft changes its level by more between a few rotations."""
 
 
-@door
+@explains_wrong_types
 def garbled_altitudes(
     levels: ArrayLike, identities: ArrayLike, codes: ArrayLike = GARBLED_CODES, times: ArrayLike | None = None
 ) -> Array:

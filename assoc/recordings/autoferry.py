@@ -19,7 +19,7 @@ import numpy as np
 
 from assoc._files.reading import read_bytes
 from assoc._parameters import positive
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import FULL_TURN
@@ -40,7 +40,7 @@ Reach: metres; the radar sees farther, but what is more than 300 m away does not
 _HEIGHT = 1.0
 
 
-@door
+@explains_wrong_types
 def read_autoferry(
     detections: str | os.PathLike[str],
     truth: str | os.PathLike[str] | None = None,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.recordings.windows import MOST_TURNS, Window, windows_of
@@ -15,7 +15,7 @@ from assoc.recordings.windows import MOST_TURNS, Window, windows_of
 MOST_GROUPS = 10_000_000
 
 
-@door
+@explains_wrong_types
 def irregular_groups(
     recording: Recording, rng: np.random.Generator, mean: float = 6.2, shape: float = 2.0
 ) -> list[Window]:
@@ -55,7 +55,7 @@ def irregular_groups(
     return windows_of(recording, np.searchsorted(np.array(edges), recording.times, side="right"))
 
 
-@door
+@explains_wrong_types
 def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
     """Group plots by intervals of one length that is not the antenna's, from the first plot on."""
     if not 0 < seconds < math.inf:
@@ -68,7 +68,7 @@ def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
     return windows_of(recording, np.floor((recording.times - recording.times[0]) / seconds).astype(np.int64))
 
 
-@door
+@explains_wrong_types
 def groups_of_sizes(recording: Recording, sizes: Sequence[int]) -> list[Window]:
     """Group plots by given numbers of plots, in the order of time.
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -22,7 +22,7 @@ _LEAST_SHARE, _FALSE_SHARE = 0.02, 0.1
 """Least share of plots with an altitude, or without one, that counts; the share of false plots with an altitude."""
 
 
-@door
+@explains_wrong_types
 def radar_of(
     recording: Recording | Survey,
     *,
@@ -71,7 +71,7 @@ def radar_of(
     )
 
 
-@door
+@explains_wrong_types
 def with_heights(radar: Radar2D, recording: Recording | Survey) -> list[Radar2D]:
     """The radar of a recording as two sensors at one place: its plots with an altitude that is not garbled, and others.
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.reading import read_lines, readable, refuse_pipe
-from assoc._system.door import door
 from assoc._system.imports import check_extra
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
@@ -34,7 +34,7 @@ MOST_PLOTS = 20_000_000
 _REACH, _ENOUGH = 1.5e6, 10
 
 
-@door
+@explains_wrong_types
 def read_plots(
     path: str | os.PathLike[str],
     *,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -20,7 +20,7 @@ UNDECODED = 0
 """The identity (Mode 3) of a plot whose transponder answer was not decoded."""
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Shown):
     """Plots of a radar, in the order of time.

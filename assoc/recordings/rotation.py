@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -23,7 +23,7 @@ _MOST_FREQUENCIES = 10_000_000
 _LEAST_COHERENCE = 0.5
 
 
-@door
+@explains_wrong_types
 def estimate_rotation(
     recording: Recording | StoredPlots, shortest: float = SHORTEST, longest: float = LONGEST
 ) -> float:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._parameters import positive
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -29,7 +29,7 @@ EARTH = 6.37e6
 """Radius, metres."""
 
 
-@door
+@explains_wrong_types
 def scene_of_radars(
     recordings: Sequence[Recording],
     radars: Sequence[Radar2D],

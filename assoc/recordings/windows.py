@@ -12,7 +12,7 @@ import numpy as np
 
 from assoc._parameters import is_number
 from assoc._system.compiled import njit
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -92,7 +92,7 @@ class Window:
         return f"Window({self.number}, {len(self)} plots{span})"
 
 
-@door
+@explains_wrong_types
 def clustering_time_window(
     recording: Recording, rotation: float | None = None, *, by: Literal["antenna", "time"] = "antenna"
 ) -> list[Window]:

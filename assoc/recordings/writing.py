@@ -10,14 +10,14 @@ import os
 import numpy as np
 
 from assoc._files.output import write_text
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.times import decimals
 from assoc._types import Array
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
 
 
-@door
+@explains_wrong_types
 def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     """Write plots for `read_plots`.
 
@@ -46,7 +46,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     write_text(path, text.getvalue())
 
 
-@door
+@explains_wrong_types
 def write_tracks(path: str | os.PathLike[str], ids: Array, times: Array, positions: Array, velocities: Array) -> None:
     """Write tracks, or the truth, as CSV with the columns track_id, time, x, y, z, vx, vy, vz.
 

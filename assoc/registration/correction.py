@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from assoc._parameters import is_number
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.terms import AXES, Term, owners
@@ -95,7 +95,7 @@ def pointed_at(sensor: Sensor, z: Array) -> Array:
     return sensor.position + np.stack(along, axis=1)
 
 
-@door
+@explains_wrong_types
 def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     """Add biases to the measurements of a scene, for experiments and tests; clocks have none here.
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.correction import biases_of_sensors, corrected_measurements
@@ -31,7 +31,7 @@ _MOST_KEPT = 32
 """Scans that are kept at the beginning, and estimated together."""
 
 
-@doors
+@explains_wrong_types
 class OnlineRegistration:
     """Biases that are estimated while measurements come in.
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.epochs import scene_epochs
@@ -20,7 +20,7 @@ from assoc.registration.terms import make_terms
 from assoc.scene.scene import Scene
 
 
-@door
+@explains_wrong_types
 @interruptible()
 def register(scene: Scene, parameters: RegistrationParameters | None = None, **values: Any) -> Registration:
     """Estimate the biases of the sensors of a scene from the targets that they have in common.

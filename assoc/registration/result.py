@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_json
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -47,7 +47,7 @@ class Residuals:
     after: Array
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Registration(Shown):
     """Biases of sensors: stated less true values.

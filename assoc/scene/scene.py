@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from assoc._parameters import is_whole
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape, table
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
@@ -31,7 +31,7 @@ _DEFAULT_HEIGHT = 20_000.0
 _STANDS = 50
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """Sensors and their measurements over a number of scans.

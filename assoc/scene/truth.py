@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.arrays import finite_array
@@ -27,7 +27,7 @@ def integers(value: object, what: str, length: int) -> Array:
     return array
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth:
     """The true targets.

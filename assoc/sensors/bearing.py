@@ -8,13 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 from assoc.sensors.radar import NEAREST
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BearingSensor(Sensor):
     """A sensor that measures azimuth (rad) from +x towards +y, and neither range nor height.
@@ -44,7 +44,7 @@ class BearingSensor(Sensor):
         return result
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class DirectionSensor(BearingSensor):
     """A sensor that measures azimuth and elevation (rad), and no range: a camera, or passive tracking.

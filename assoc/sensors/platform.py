@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.arrays import finite_array
@@ -16,7 +16,7 @@ from assoc.sensors.arrays import finite_array
 FAST, FASTER = 100.0, 10.0
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False)
 class Platform:
     """Where a carrier of sensors is, and which way it points, over time.

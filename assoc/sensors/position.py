@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 from assoc.sensors.platform import turned
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PositionSensor(Sensor):
     """A sensor that reports x, y or x, y, z (m) in the scene's own frame, whatever its place.

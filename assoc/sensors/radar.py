@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import Sensor
@@ -17,7 +17,7 @@ from assoc.sensors.base import Sensor
 NEAREST = 1e-9
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Radar3D(Sensor):
     """A radar that measures slant range (m), azimuth and elevation (rad), and on request range rate (m/s).
@@ -148,7 +148,7 @@ class Radar3D(Sensor):
         return np.asarray(velocities, dtype=np.float64)
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Radar2D(Sensor):
     """A radar that measures slant range (m) and azimuth (rad), and leaves the height open.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
@@ -15,7 +15,7 @@ from assoc.sensors.base import Sensor, wrap_angle
 from assoc.simulation.memory import require_scene_memory
 
 
-@door
+@explains_wrong_types
 def observe(
     sensors: Sequence[Sensor],
     times: Array,

@@ -16,8 +16,8 @@ from assoc._files.output import FilePath, check_writable
 from assoc._parameters import Parameters, checked_time_limit, whole_seed
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
-from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import Prepared, prepare, with_capped_costs
@@ -36,7 +36,7 @@ from assoc.solvers.start import start_columns
 _EARLY = ("time_limit", "callback", "interrupted", "memory_limit")
 
 
-@door
+@explains_wrong_types
 def assign(
     problem: AssignmentProblem | ArrayLike,
     solver: str = "exact",

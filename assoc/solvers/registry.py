@@ -15,7 +15,7 @@ from typing import Any
 
 from assoc._parameters import Parameters
 from assoc._system.compile_time import loading
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.near import did_you_mean
 from assoc._text.removed import removed
 from assoc.errors import InvalidInputError
@@ -29,13 +29,13 @@ Own = tuple[str, type[Parameters], SolveFunction]
 """Name, parameters and function of a user's solver."""
 
 
-@door
+@explains_wrong_types
 def names() -> list[str]:
     """Names of all solvers, the package's first."""
     return [*_NAMES, *_REGISTERED]
 
 
-@door
+@explains_wrong_types
 def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> None:
     """Add a solver of your own under a new name.
 
@@ -75,7 +75,7 @@ def restore(solvers: Iterable[Own]) -> None:
         _REGISTERED.setdefault(name, (kind, solve))
 
 
-@door
+@explains_wrong_types
 def parameters(name: str) -> type[Parameters]:
     """Return the parameter dataclass of a solver; its fields' metadata have a "help" text.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.frame import load
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@door
+@explains_wrong_types
 def compare(study: pd.DataFrame | str | os.PathLike[str], first: str, second: str) -> pd.DataFrame:
     """Compare two settings of a study by the differences of their runs on the same problems with the same repeats.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import whole_seed
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.solvers import registry
 from assoc.sweeps.setting import Setting, parameter
@@ -20,7 +20,7 @@ MOST_SETTINGS = 1_000_000
 """Largest number of settings of a design; more are taken for a typing error."""
 
 
-@door
+@explains_wrong_types
 def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     """Every combination of the values of some parameters of a solver.
 
@@ -46,7 +46,7 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     return _combinations(solver, _spaces(solver, space or {}), "grid", "assoc.sweeps.random_settings")
 
 
-@door
+@explains_wrong_types
 def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int | None = 0) -> list[Setting]:
     """Draw settings at random; the first n of a longer design are the design of length n.
 
@@ -146,7 +146,7 @@ def _owners(name: str, solvers: list[str], label: str) -> list[str]:
     return owners
 
 
-@door
+@explains_wrong_types
 def settings_from(
     tables: Mapping[str, Any], random: int | None = None, seed: int = 0, label: str = ""
 ) -> list[Setting]:

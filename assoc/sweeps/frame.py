@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.sweeps.store import COLUMNS, Store
@@ -35,7 +35,7 @@ RESULTS = (
 """Columns of the table after ``solver`` and the parameters."""
 
 
-@door
+@explains_wrong_types
 def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read the runs of a study, which may still be running.
 
@@ -108,7 +108,7 @@ def column_of(parameter: str) -> str:
     return f"parameter_{parameter}" if parameter in RESULTS else parameter
 
 
-@door
+@explains_wrong_types
 def load_traces(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read how the runs of a study converged.
 

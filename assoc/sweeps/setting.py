@@ -11,12 +11,12 @@ from types import MappingProxyType
 from typing import Any
 
 from assoc._parameters import Parameter, parameters_of
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True)
 class Setting:
     """One solver and its parameters.

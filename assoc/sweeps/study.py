@@ -11,8 +11,8 @@ from typing import Any
 
 from assoc._parameters import checked_time_limit, is_whole, whole_seed
 from assoc._system.cluster import LostError
-from assoc._system.door import doors
 from assoc._system.engine import parallel_map
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
@@ -44,7 +44,7 @@ class Counts:
         return self.before + self.new
 
 
-@doors
+@explains_wrong_types
 @dataclass(frozen=True, repr=False)
 class Study(Shown):
     """Settings to run on scenes and problems.

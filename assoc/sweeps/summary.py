@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.sweeps.bootstrap import mean_interval, weighted_mean
@@ -42,7 +42,7 @@ FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 """Factors of measures in printed tables: per cent, milliseconds."""
 
 
-@door
+@explains_wrong_types
 def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
     """Average the runs of each setting.
 

@@ -14,8 +14,8 @@ import numpy as np
 from assoc._files.output import write_text
 from assoc._files.reading import check_regular
 from assoc._parameters import is_whole
-from assoc._system.door import door
 from assoc._system.imports import load_extra
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
@@ -60,7 +60,7 @@ class Report:
     """Description of the held-out runs."""
 
 
-@door
+@explains_wrong_types
 def tune(
     folder: str | os.PathLike[str],
     sources: Sequence[StudySource],

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assoc._files.tables import csv_text, escaped
-from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.exports.maps import FOLLOWED_WITHIN, coordinates, followed_targets
@@ -47,7 +47,7 @@ _KINDS: dict[str, type] = {"track_id": np.int64, "confirmed": np.bool_, "hits": 
                            "parent": np.int64}  # fmt: skip
 
 
-@doors
+@explains_wrong_types
 class TrackTable(Shown):
     """Collects tracks of scan after scan.
 
@@ -306,7 +306,7 @@ def _nees(mean: Array, covariance: Array, positions: Sequence[int], truth: Array
     return float(nearest @ np.linalg.solve(covariance[np.ix_(axes, axes)], nearest)) / len(axes)
 
 
-@door
+@explains_wrong_types
 def track_scene(
     tracker: Tracker,
     scene: Scene,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from assoc._parameters import checked_time_limit, whole_seed
-from assoc._system.door import doors
 from assoc._system.imports import removed_attribute
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
@@ -39,7 +39,7 @@ from assoc.tracking.step import advance, check
 from assoc.tracking.target_kinds import target_kind
 
 
-@doors
+@explains_wrong_types
 class Tracker:
     """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
 

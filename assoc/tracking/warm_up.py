@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import AssocWarning
 from assoc.scene.scene import Scene
 from assoc.simulation import simulate
@@ -22,7 +22,7 @@ from assoc.tracking.tracker import Tracker
 _CROWDS = {60: ("mht", "joint-probabilistic"), 250: ("multi-sensor",)}
 
 
-@door
+@explains_wrong_types
 def warm_up(solvers: Iterable[str] | None = None) -> float:
     """Compile the kernels of solvers and trackers, or load them, so that no later call has to.
 

@@ -11,7 +11,7 @@ import warnings
 import numpy as np
 import pytest
 
-from assoc._system import door
+from assoc._system import wrong_types
 from assoc.errors import AssocError, InvalidInputError
 from tests.doors.examples import examples, scene
 from tests.sizes import sample
@@ -75,9 +75,9 @@ def test_wrong_everywhere(name, tmp_path, monkeypatch):
         one for one in signature(function).parameters.values()
         if one.default is one.empty and one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)
     ]  # fmt: skip
-    kinds = door.annotations_of(function.__init__ if inspect.isclass(function) else function)
+    kinds = wrong_types.annotations_of(function.__init__ if inspect.isclass(function) else function)
     for value in [None, Strange(), 3]:
-        if not all(door.fits(value, kinds.get(one.name)) for one in needed):
+        if not all(wrong_types.fits(value, kinds.get(one.name)) for one in needed):
             assert complaint(function, **{one.name: value for one in needed}), (name, value)
 
 
@@ -87,11 +87,11 @@ def test_one_wrong_argument(name, argument, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = target(name), examples()[name]
     defaults = signature(function).parameters
-    kinds = door.annotations_of(function.__init__ if inspect.isclass(function) else function)
+    kinds = wrong_types.annotations_of(function.__init__ if inspect.isclass(function) else function)
     for value in wrong_values():
         # anything can stand for true or false, and a default is no wrong value
         # (and one number is an array where a sensor measures one component)
-        if door.fits(value, kinds[argument]) or kinds[argument] is bool or value is defaults[argument].default:
+        if wrong_types.fits(value, kinds[argument]) or kinds[argument] is bool or value is defaults[argument].default:
             continue
         if (name, argument) == ("assoc.sensors.BearingSensor", "noise") and value in (3, 2.5):
             continue
@@ -148,7 +148,7 @@ def test_doors_let_errors_of_other_kinds_through():
     ],
 )  # fmt: skip
 def test_what_fits(value, kind, good):
-    assert door.fits(value, kind) is good
+    assert wrong_types.fits(value, kind) is good
 
 
 def test_a_random_seed():

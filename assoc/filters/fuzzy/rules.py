@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from assoc._parameters import positive
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
 
 PAPER_SETS: dict[str, Mapping[str, tuple[float, float, float, float]]] = {
@@ -28,14 +28,14 @@ PAPER_SETS: dict[str, Mapping[str, tuple[float, float, float, float]]] = {
 """Membership functions under the paper's names; it shows no numbers, these are chosen."""
 
 
-@door
+@explains_wrong_types
 def paper_rules() -> FuzzyRules:
     """Return the paper's four rules, the same for q and r, with the chosen `PAPER_SETS`."""
     input_sets, output_sets = FuzzyVariable(PAPER_SETS["input"]), FuzzyVariable(PAPER_SETS["output"])
     return FuzzyRules(input_sets, output_sets, list(zip(input_sets.sets, output_sets.sets, strict=True)), points=201)
 
 
-@door
+@explains_wrong_types
 def tuned_data() -> dict[str, Any]:
     """Return the tuned parameters that come with the package, for `FuzzyAdaptiveEKF.from_data`.
 

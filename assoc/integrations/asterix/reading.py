@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
@@ -161,7 +161,7 @@ class SourceRows:
         return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
-@door
+@explains_wrong_types
 def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None) -> AsterixContent:
     """Read a file of ASTERIX data blocks, plain or in the UDP packets of a pcap.
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import EDITIONS, data_blocks, read_bytes, records, signed, value
 from assoc.integrations.asterix.reading import SourceRows, full_time
@@ -51,7 +51,7 @@ COLUMNS = ("category", "sac", "sic", "time", *dict.fromkeys(name for name, *_ in
 COLUMNS += ("mode3_oct", "address_hex", "callsign")
 
 
-@door
+@explains_wrong_types
 def read_records(path: str | os.PathLike[str], notes: dict[str, int] | None = None) -> list[dict[str, Any]]:
     """Read the records of the categories in `EDITIONS`, of all sources, in the order of the file.
 

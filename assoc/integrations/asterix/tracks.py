@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
 from assoc._system.imports import check_extra
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
@@ -41,7 +41,7 @@ _IDENTITIES = {"mode3_oct": (("060", "MODE3A"), 8, 4), "address_hex": (("380", "
 MOST_TRACKS = 65536
 
 
-@door
+@explains_wrong_types
 def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Source = (0, 1)) -> None:
     """Write a table of tracks as category 062, in the order of time; docs/formats.md lists the items.
 
@@ -199,7 +199,7 @@ def _up(sigma: float, step: float, most: int = 65535) -> int:
     return int(min(math.ceil(min(sigma / step, most)), most))
 
 
-@door
+@explains_wrong_types
 def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
     """Read tracks of category 062 that have a time, a number and a system position.
 

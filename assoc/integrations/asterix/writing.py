@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from assoc._files.output import write_atomically
-from assoc._system.door import door
 from assoc._system.imports import check_extra
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import edition
 from assoc.integrations.asterix.reading import ANGLE_STEP, LEVEL_STEP, RANGE_STEP, SECOND, Source
@@ -40,7 +40,7 @@ def write_blocks(path: str | os.PathLike[str], category: int, contents: list[dic
     write_atomically(path, lambda file: file.write(content))
 
 
-@door
+@explains_wrong_types
 def write_plots(path: str | os.PathLike[str], recording: Recording, source: Source = (0, 1)) -> None:
     """Write a recording as plots of category 048, with its resolutions: 1/128 s, 1/256 nmi, 0.0055 deg, 25 ft.
 

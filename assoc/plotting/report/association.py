@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape, warning_list
 from assoc._text.times import moment
 from assoc._types import Array
@@ -30,7 +30,7 @@ _LINES_OF_TRACE = 200
 _CSV = "; --csv writes all"
 
 
-@door
+@explains_wrong_types
 def write_association_report(
     path: str | os.PathLike[str],
     association: Association,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape
 from assoc._types import Array
 from assoc.plotting.colours import BLUE, GREY, ORANGE
@@ -23,7 +23,7 @@ from assoc.sensors.base import ANGLES
 _COMPONENTS = ("range", "azimuth", "elevation", "x", "y", "z")
 
 
-@door
+@explains_wrong_types
 def write_registration_report(
     path: str | os.PathLike[str], registration: Registration, *, name: str = "", words: Sequence[str] | None = None
 ) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape
 from assoc.plotting.colours import SERIES
 from assoc.plotting.heat_map import LABELS, cells
@@ -39,7 +39,7 @@ _NOTE_CURVES = (
 )
 
 
-@door
+@explains_wrong_types
 def write_sweep_report(
     path: str | os.PathLike[str],
     folder: str | os.PathLike[str],

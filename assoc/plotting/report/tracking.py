@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -33,7 +33,7 @@ _NEEDED = ("track_id", "time", "x", "y")
 _MOST_ALTITUDES = 30
 
 
-@door
+@explains_wrong_types
 def write_tracking_report(
     path: str | os.PathLike[str],
     tracks: pd.DataFrame,

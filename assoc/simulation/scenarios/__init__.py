@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from assoc._parameters import Parameters, whole_seed
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
@@ -29,19 +29,19 @@ _MODULES = {
 _RECORDINGS = {"rotating-radar": "assoc.simulation.scenarios.rotating_radar"}
 
 
-@door
+@explains_wrong_types
 def names() -> list[str]:
     """Names of all scenarios that make a scene."""
     return list(_MODULES)
 
 
-@door
+@explains_wrong_types
 def recording_names() -> list[str]:
     """Names of all scenarios that make a recording of plots."""
     return list(_RECORDINGS)
 
 
-@door
+@explains_wrong_types
 def parameters(name: str) -> type[Parameters]:
     """Return the parameter dataclass of a scenario; its fields' metadata have a "help" text.
 
@@ -56,7 +56,7 @@ def parameters(name: str) -> type[Parameters]:
     return cast("type[Parameters]", import_module(every[name]).parameters)
 
 
-@door
+@explains_wrong_types
 def simulate(name: str, seed: int | None = 0, **values: Any) -> Scene:
     """Simulate a scene.
 
@@ -84,7 +84,7 @@ def simulate(name: str, seed: int | None = 0, **values: Any) -> Scene:
     return cast(Scene, _simulate(name, seed, values))
 
 
-@door
+@explains_wrong_types
 def simulate_recording(name: str, seed: int | None = 0, **values: Any) -> SimulatedPlots:
     """Simulate a recording of radar plots.
 

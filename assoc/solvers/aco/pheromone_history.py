@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system import memory
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Floats
 from assoc.packing.packing import Packing
@@ -74,7 +74,7 @@ class PheromoneHistory(Shown):
         )
 
 
-@door
+@explains_wrong_types
 def pheromone(
     problem: AssignmentProblem,
     *,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
@@ -24,7 +24,7 @@ from assoc.sensors import Sensor
 from assoc.sensors.arrays import numbers
 
 
-@door
+@explains_wrong_types
 def track_problem(
     filter: Filter[Any],
     states: Any,

@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc._files.reading import open_input
 from assoc._parameters import positive
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -27,7 +27,7 @@ _SIGMAS = ("sigma_x", "sigma_y", "sigma_z")
 _LARGEST, _LEAST_SIGMA = 1e12, 1e-6
 
 
-@door
+@explains_wrong_types
 def fuse_tables(
     tables: Sequence[TrackTable | pd.DataFrame | str | os.PathLike[str]],
     parameters: FusionParameters | None = None,

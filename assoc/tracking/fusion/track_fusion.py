@@ -29,7 +29,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from assoc._parameters import positive
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
@@ -108,7 +108,7 @@ class _FusedTracks(NamedTuple):
     hits: Array
 
 
-@doors
+@explains_wrong_types
 class TrackFusion:
     """Fuses the tracks of several systems, step by step.
 

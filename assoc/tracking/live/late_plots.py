@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from assoc._parameters import positive
-from assoc._system.door import doors
 from assoc._system.imports import removed_attribute
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
@@ -76,7 +76,7 @@ class _Move(NamedTuple):
     """Index of the first of them in the scan."""
 
 
-@doors
+@explains_wrong_types
 class LatePlots:
     """A tracker for measurements that may be late.
 

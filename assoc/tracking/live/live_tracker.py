@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from assoc._parameters import positive
-from assoc._system.door import doors
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.positions import positions_of_scan
@@ -42,7 +42,7 @@ _MOST_TIMED = 100_000
 _LOOKS = (1, 10, 50)
 
 
-@doors
+@explains_wrong_types
 class LiveTracker:
     """Takes plots one by one, in nearly any order; gives a picture for each interval.
 

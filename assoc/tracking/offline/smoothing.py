@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.door import door
+from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.costs.positions import positions_and_covariances
 from assoc.errors import InvalidInputError
@@ -25,7 +25,7 @@ from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
 
-@door
+@explains_wrong_types
 def smoothed(
     tracker: Tracker, scene: Scene, decisions: Sequence[Decision], *, altitudes: Mapping[int, float] | None = None
 ) -> TrackTable:

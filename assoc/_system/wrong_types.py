@@ -1,8 +1,8 @@
 """One-line errors for arguments of a wrong type to public functions: they name the argument and what was expected.
 
-A function decorated with `door` checks ranges and shapes itself. An object of an unexpected type makes Python raise
-somewhere inside; then the decorator finds the argument that does not fit its annotation and names it. Correct calls
-cost nothing.
+A function decorated with `explains_wrong_types` checks ranges and shapes itself. An object of an unexpected type makes
+Python raise somewhere inside; then the decorator finds the argument that does not fit its annotation and names it.
+Correct calls cost nothing.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from numpy.typing import ArrayLike
 from assoc._text.removed import removed
 from assoc.errors import AssocError, InvalidInputError
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-Class = TypeVar("Class", bound=type)
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 _ERRORS = (TypeError, AttributeError, ValueError, IndexError, KeyError, OverflowError)
 _LISTS = (list, tuple, Sequence, Iterable)
@@ -33,11 +32,25 @@ _LISTS = (list, tuple, Sequence, Iterable)
 _SOME = 1000
 
 
-def door(function: Function) -> Function:
-    """Make a public function raise one `InvalidInputError` for arguments of a wrong type."""
+def explains_wrong_types(decorated: Decorated) -> Decorated:
+    """Make a public function raise one `InvalidInputError` for arguments of a wrong type.
 
+    Of a class: its constructor and its public methods.
+    """
+    if not isinstance(decorated, type):
+        return typing.cast(Decorated, _explaining(decorated))
+    for name, value in [*vars(decorated).items()]:
+        if name == "__init__" or not name.startswith("_"):
+            if isinstance(value, types.FunctionType):
+                setattr(decorated, name, _explaining(value))
+            elif isinstance(value, classmethod):
+                setattr(decorated, name, classmethod(_explaining(value.__func__)))
+    return decorated
+
+
+def _explaining(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
-    def through(*args: Any, **keywords: Any) -> Any:
+    def explaining(*args: Any, **keywords: Any) -> Any:
         try:
             return function(*args, **keywords)
         except _ERRORS as error:
@@ -46,18 +59,7 @@ def door(function: Function) -> Function:
                 raise
             raise InvalidInputError(wrong) from error
 
-    return typing.cast(Function, through)
-
-
-def doors(kind: Class) -> Class:
-    """Decorate the constructor and the public methods of a public class with `door`."""
-    for name, value in [*vars(kind).items()]:
-        if name == "__init__" or not name.startswith("_"):
-            if isinstance(value, types.FunctionType):
-                setattr(kind, name, door(value))
-            elif isinstance(value, classmethod):
-                setattr(kind, name, classmethod(door(value.__func__)))
-    return kind
+    return explaining
 
 
 def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords: Mapping[str, Any]) -> str | None:
