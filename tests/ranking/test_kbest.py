@@ -8,7 +8,7 @@ import pytest
 
 import assoc
 from assoc.costs import build_problem
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import AssocWarning, InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.counts import Splitting
 from assoc.packing.prepare import prepare
@@ -346,7 +346,9 @@ def test_bad_k(arguments, message):
 
 def test_bad_problem_and_time_limit():
     with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem"):
-        kbest([[1.0]], 3)
+        kbest("costs", 3)
+    with pytest.warns(AssocWarning, match="is taken as by scipy"):
+        assert [one.cost for one in kbest([[1.0, 2.0]], 3)] == [1.0, 2.0]
     with pytest.raises(InvalidInputError, match="time_limit: expected seconds > 0"):
         kbest(blackman_popoli(), 3, time_limit=0)
 

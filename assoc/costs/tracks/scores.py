@@ -121,10 +121,10 @@ def existence_gain(score: Array, gain: Array, seen: Array) -> Array:
     return np.asarray(np.where(seen, gain - np.logaddexp(0.0, -score), doubted_gain(score, gain)))
 
 
-def sequential_threshold(false_probability: float, missed_probability: float = 0.0) -> float:
+def sequential_threshold(false_probability: Array, missed_probability: float = 0.0) -> Array:
     """Score at which a track is confirmed: ln((1 - beta) / alpha), the upper limit of Wald's sequential test.
 
     alpha is the share of false tracks that may be confirmed, beta that of true tracks that may be given up. A. Wald,
     Sequential Analysis, 1947, section 3.2.
     """
-    return math.log((1.0 - missed_probability) / false_probability)
+    return np.asarray(np.log((1.0 - missed_probability) / false_probability))

@@ -4,7 +4,7 @@ The last plots of each sensor are kept. Of those near a measurement, the nearest
 only the others show clutter, and the density follows from the distance within which there are six of them, in units of
 the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
-And it must have predicted its plots better than tracks did: where targets stand or circle, each is near its own track.
+And tracks must not have predicted its plots better: where targets stand or circle, each is near its own track.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ _NEEDED = [
     next((h for h in range(n) if sum(math.comb(n + 1, k) for k in range(h + 1)) >= _SURE * 2.0 ** (n + 1)), n)
     for n in range(int(_TURNS) + 1)
 ]
+# by how much tracks must predict plots of a place better on average; among clutter they fit about as well, by chance
+_AGAINST = -0.05
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 
@@ -156,5 +158,5 @@ def _densities(
     ratio = (last + 1) / (radius**d * usual)
     found = (others[:, -1] >= _OTHERS) & (ratio > least) & (hits >= _NEEDED[before])
     result[dense] = np.where(found, np.log(np.maximum(ratio, 1.0)), 0.0)
-    used[dense] = votes[near].sum(axis=1) >= 0.0
+    used[dense] = votes[near].mean(axis=1) > _AGAINST
     return np.where(used, result, 0.0), result

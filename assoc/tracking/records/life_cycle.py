@@ -96,18 +96,19 @@ class LifeCycle:
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 
-    def false_share(self, alarms: float) -> float:
+    def false_share(self, alarms: Array | float) -> Array:
         """Share of false tracks that may be confirmed, with so many false alarms in an hour (inf: not known)."""
+        alarms = np.asarray(alarms, dtype=np.float64)
         if self.false_probability is not None:
-            return self.false_probability
-        if math.isinf(alarms):
-            return _UNKNOWN
-        return min(_MOST, self.false_tracks_per_hour / max(alarms, 1e-300))
+            return np.full(alarms.shape, self.false_probability)
+        share = np.minimum(_MOST, self.false_tracks_per_hour / np.maximum(alarms, 1e-300))
+        return np.where(np.isinf(alarms), _UNKNOWN, share)
 
-    def confirms(self, score: Array, detections: Array, alarms: float) -> Array:
+    def confirms(self, score: Array, detections: Array, alarms: Array | float) -> Array:
         """Which tracks are to be confirmed.
 
-        `detections` has one bit for each scan, the last scan lowest; `alarms` are the false alarms in an hour.
+        `detections` has one bit for each scan, the last scan lowest; `alarms` are the false alarms in an hour, of all
+        or for each track.
         """
         if self.confirmation == "score":
             reached: Array = score >= sequential_threshold(self.false_share(alarms), self.missed_probability)

@@ -178,7 +178,7 @@ class TrackBatch:
             counts[self.track_id == i, PARENT] = parent
         return TrackBatch(self.states, self.numbers, counts)
 
-    def confirm(self, life_cycle: LifeCycle, alarms: float) -> TrackBatch:
+    def confirm(self, life_cycle: LifeCycle, alarms: Array | float) -> TrackBatch:
         """Confirm the tracks that meet the criterion."""
         return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections, alarms))
 

@@ -7,6 +7,7 @@ predicted density in its view (`assoc.costs.views`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,20 @@ def false_alarms(progress: Progress) -> float:
         return math.inf
     rates = np.array([sensor.false_alarm_rate for sensor in progress.settings.sensors])
     return float(rates @ state.turns) * _HOUR / state.pace
+
+
+def false_alarms_at(progress: Progress, tracks: TrackBatch, assigned: Sequence[Array]) -> Array | float:
+    """The same where each track was detected in this scan, (T,): denser at some places, as false tracks are."""
+    alarms, clutter = false_alarms(progress), progress.scan.clutter
+    if clutter is None or math.isinf(alarms):
+        return alarms
+    order = np.argsort(tracks.track_id, kind="stable")
+    ids, crowd = tracks.track_id[order], np.zeros(len(tracks))
+    for taken, dense in zip(assigned, clutter, strict=True):
+        row = np.minimum(np.searchsorted(ids, taken), max(len(ids) - 1, 0))
+        known = np.flatnonzero(ids[row] == taken) if len(ids) else row[:0]
+        np.maximum.at(crowd, order[row[known]], dense[known])
+    return np.asarray(alarms * np.exp(crowd))
 
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
