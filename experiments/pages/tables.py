@@ -27,6 +27,13 @@ SHOWN = {
     "joint-probabilistic": "`joint-probabilistic`",
 }
 """Trackers as the results name them, and in the tables; GNN is `nearest-neighbour` with the rule `assignment`."""
+KINDS = {
+    "a-none": "three radars without rates", "a-rate": "with rates", "a-notch": "rates, blind near 0",
+    "a-folded": "rates folded at 90 m/s", "c-one": "merged plots, one radar", "c-three": "merged plots, three radars",
+    "d-multipath": "multipath", "d-lobes": "side lobes", "d-none": "neither", "f-clock": "a clock 1 s off",
+    "k-ballistic": "ballistic", "k-orbital": "satellites", "n-dense": "formation of twelve",
+}  # fmt: skip
+"""Kinds of unseen scenes in words."""
 GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark", "live")
 """Experiments of trackers whose goals are listed, in this order."""
 _HEADS = {
@@ -359,6 +366,15 @@ def _line(name: str, row: dict[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
+def unseen() -> str:
+    """GOSPA on scenes of a file outside of the project, by kind."""
+    r = Results("trackers.unseen")
+    kinds = [claim.quantity.partition(", ")[0] for claim in r.claims if claim.quantity.endswith(", oracle: GOSPA")]
+    heads = [*dict.fromkeys(c.quantity.partition(", ")[2].partition(":")[0] for c in r.claims)]
+    rows = [[KINDS.get(kind, kind), *(number(r[f"{kind}, {head}: GOSPA"].ours) for head in heads)] for kind in kinds]
+    return table(["GOSPA, m", *heads], rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "benchmark-set": benchmark_set,
     "benchmark-set-comparison": comparison_tables,
@@ -391,6 +407,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "biases": registration,
     "goals": goals,
     "as-they-are": as_they_are,
+    "unseen": unseen,
     "autoferry": autoferry,
     "air-traffic": air_traffic,
     "air-traffic-association": air_traffic_association,
