@@ -376,9 +376,12 @@ def test_commands_of_the_pages_run(page, inputs, tmp_path, monkeypatch, capsys):
     for words in commands(page):
         if words[1].endswith(".pcap") and not find_spec("asterix"):
             continue
+        # no page makes an old study
+        if words[:2] == ["sweep", "import"]:
+            continue
         if words[:2] == ["simulate", "three-radar"]:
             words += ["--scans", "4"]
-        if words[0] == "sweep" and "--summary" not in words:
+        if words[0] == "sweep" and words[1] != "compare" and "--summary" not in words:
             words += ["--scans", "0"]
             for flag, fewer in (("--repeats", "2"), ("--tune", "4")):
                 if flag in words:

@@ -80,9 +80,9 @@ def _best_known(self: Any, trail: Any, ants: int) -> Any:
 _child, _parent = Breeding._child, Breeding._parent
 
 
-def _child_of_one(self: Any, component: Any, first: int, second: int, rng: Any) -> Any:
+def _child_of_one(self: Any, search: Any, first: int, second: int) -> Any:
     """A child has one parent."""
-    return _child(self, component, first, first, rng)
+    return _child(self, search, first, first)
 
 
 def _worst_parent(self: Any, rng: Any) -> int:
