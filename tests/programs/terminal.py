@@ -4,7 +4,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 
 def shown(
@@ -28,19 +28,6 @@ def shown(
     seen = _read(main)
     status = process.wait(600)
     assert status == 0
-    return seen
-
-
-def shown_until(text: str, then: Callable[[], object], words: Sequence[object], **options: object) -> str:
-    """Run ``python -m words`` on a pseudo terminal; call ``then`` as soon as it shows a text; return all it shows."""
-    main, side = os.openpty()
-    command = [sys.executable, "-m", *map(str, words)]
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
-    process = subprocess.Popen(command, stdout=side, stderr=side, env=environment, **options)
-    os.close(side)
-    seen = _read(main, text, then)
-    status = process.wait(600)
-    assert status == 0, seen
     return seen
 
 
@@ -69,10 +56,9 @@ def shown_at(widths: Sequence[int], words: Sequence[object], *, status: int = 0,
     return {int(width): part for width, part in zip(parts[1::2], parts[2::2], strict=True)}
 
 
-def _read(main: int, text: str = "", then: Callable[[], object] = bool) -> str:
+def _read(main: int) -> str:
     """Read what was written to the other side of a pseudo terminal until that is closed."""
     seen = b""
-    told = False
     while True:
         try:
             part = os.read(main, 4096)
@@ -81,8 +67,5 @@ def _read(main: int, text: str = "", then: Callable[[], object] = bool) -> str:
         if not part:
             break
         seen += part
-        if not told and text.encode() in seen:
-            told = True
-            then()
     os.close(main)
     return seen.decode()

@@ -14,7 +14,7 @@ import pytest
 import assoc
 from assoc.simulation import simulate
 from tests.listening import wait_until_it_listens
-from tests.programs.terminal import shown, shown_until
+from tests.programs.terminal import shown
 
 
 def content(path):
@@ -182,49 +182,6 @@ def test_on_a_terminal_the_table_is_drawn(scene_file):
     assert "─" in text and "associating" in text and "false alarms" in text
     # a scan that is not certified optimal shows its gap in the place of its status
     assert "certified optimal" in text and "lower bound  " not in text
-
-
-WAITING_SOLVER = """
-import time
-from dataclasses import dataclass
-from pathlib import Path
-
-from assoc.solvers import Parameters, register
-from assoc.solvers.greedy.solve import solve as greedy
-
-
-@dataclass(frozen=True)
-class WaitingParameters(Parameters):
-    pass
-
-
-def solve(packing, parameters, run):
-    global scans
-    scans += 1
-    until = time.monotonic() + 600
-    while scans > 2 and not Path("first-rows-seen").exists():
-        assert time.monotonic() < until, "nobody saw the first rows"
-        time.sleep(0.05)
-    return greedy(packing, parameters, run)
-
-
-scans = 0
-register("waiting", WaitingParameters, solve)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
-def test_a_terminal_shows_each_scan_when_it_is_done(run, scene_file, tmp_path):
-    """The solver goes on with its third scan only after the second one's row was seen."""
-    (tmp_path / "waits.py").write_text(WAITING_SOLVER)
-    words = ["assoc.solve", scene_file, "--solver", "greedy", "--scans", "0:2"]
-    cost = run(*words, cwd=tmp_path).stdout.splitlines()[2].split()[6]
-    words = ["assoc.solve", scene_file, "--import", "waits", "--solver", "waiting"]
-    text = shown_until(f" {cost} ", (tmp_path / "first-rows-seen").touch, words, cwd=tmp_path)
-    lines = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", text.replace("\r", "\n")).split("\n")
-    rows = [line.split()[0] for line in lines if re.match(r" +\d+ .*(gap|optimal) ", line)]
-    assert rows == [*"012345"] and "more scans" not in text
 
 
 def test_kbest_ranks_every_scan(run, scene_file, tmp_path):
