@@ -20,6 +20,7 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from assoc._cli.track.radars_file import Radars
     from assoc.registration import Registration
 
 _SETTINGS = (
@@ -37,13 +38,13 @@ _SETTINGS = (
     COMMON["max_tuples"],
 )  # fmt: skip
 _OPTIONS = (
-    Option("file", "SCENE.npz", "scene whose sensors are registered", positional=True),
-    Option("output", "FILE", "file for the scene without the biases (.npz)", Output(".npz", strict=True),
-           short="-o", rest={"required": True}),
+    Option("file", "FILE", "scene.npz, or radars.toml (docs/from_files.md)", positional=True),
+    Option("output", "FILE", "file for the scene without the biases (.npz)", Output(".npz", strict=True), short="-o"),
+    Option("write", "", "write the biases into radars.toml, where assoc track and assoc live take them off"),
     Option("json", "FILE", "write the biases, their covariance and what is not observable as JSON", Output(".json")),
     Option("report", "FILE",
-           "write an HTML page: biases, residuals before and after (default name: the output's, .html; needs "
-           "assoc[report])", html_page, rest={"nargs": "?", "const": ""}),
+           "write an HTML page: biases, residuals before and after (default name: the output's or the input's, .html; "
+           "needs assoc[report])", html_page, rest={"nargs": "?", "const": ""}),
     *_SETTINGS,
     *verbosity("the options that were used"),
 )  # fmt: skip
@@ -51,11 +52,17 @@ _OPTIONS = (
 
 def _register(words: list[str]) -> None:
     given = parser().read(words)
-    output = given["output"]
+    output, described = given["output"], given["file"].lower().endswith(".toml")
+    if output is None and not described:
+        raise InvalidInputError("-o: expected a file for the scene without the biases")
+    if given["write"] and not described:
+        raise InvalidInputError("--write: expected radars.toml, in which a radar has a bias; a scene has none")
+    if given["write"] and "position" in (given["components"] or ()):
+        raise InvalidInputError("--write: a bias of the position is not written; correct place in the file by hand")
     if given["report"] == "":
-        if output == STDOUT or is_stream(output):
+        if output == STDOUT or (output and is_stream(output)):
             raise InvalidInputError(f"--report: expected a file name, because --output {output} has none")
-        given["report"] = f"{output.removesuffix('.npz')}.html"
+        given["report"] = f"{(output or given['file']).removesuffix('.npz').removesuffix('.toml')}.html"
     given.check_outputs([given["file"]])
     with messages(given):
         _write(given, given.some(parameter.name for parameter in _SETTINGS))
@@ -63,10 +70,12 @@ def _register(words: list[str]) -> None:
 
 def _write(given: Given, values: dict[str, Any]) -> None:
     file, output = given["file"], given["output"]
+    from assoc._cli.track.radars_file import read_radars
     from assoc.registration import register
     from assoc.scene.scene import Scene
 
-    scene = Scene.load(file)
+    radars = read_radars(file) if file.lower().endswith(".toml") else None
+    scene = Scene.load(file) if radars is None else radars.scene
     if given["verbose"]:
         used = ", ".join(f"{name} {value}" for name, value in values.items())
         print_lines(f"{printable(file)}: {scene!r}; {used or 'all defaults'}")
@@ -83,25 +92,35 @@ def _write(given: Given, values: dict[str, Any]) -> None:
         (output, lambda: found.correct(scene).save(output)),
         (given["json"], lambda: found.to_json(given["json"])),
         (given["report"], write_report),
-        (given, lambda: _print(found, output, elapsed)),
+        (given, lambda: print_biases(found)),
+        (given["write"] or None, lambda: _write_biases(file, radars, found)),
+        (given, lambda: print_lines(f"{printable(output) + ': written; ' if output else ''}{elapsed:.2f} s")),
     )
+
+
+def _write_biases(file: str, radars: Radars | None, found: Registration) -> None:
+    """Add what was found to what the description says already."""
+    from assoc._cli.track.radars_file import write_biases
+
+    assert radars is not None
+    if not found.significant:
+        print_lines(f"{printable(file)}: stays as it is")
+        return
+    write_biases(file, radars.with_further(found))
+    print_lines(f"{printable(file)}: biases written")
 
 
 def parser() -> Parser:
     """Return the parser of the program."""
     made = Parser(
         prog="assoc.register",
-        usage=f"{command('register')} SCENE.npz -o REGISTERED.npz [options]",
+        usage=f"{command('register')} SCENE.npz -o REGISTERED.npz [options]\n"
+        f"       {command('register')} radars.toml [--write] [options]",
         description="Estimate biases of sensors from the targets that they have in common, \n"
-        "without knowing the truth, and write the scene without them.",
+        "without knowing the truth, and write the scene without them, or the biases into radars.toml.",
     )
     made.declare(*_OPTIONS)
     return made
-
-
-def _print(found: Registration, output: str, elapsed: float) -> None:
-    print_biases(found)
-    print_lines(f"{printable(output)}: written; {elapsed:.2f} s")
 
 
 PROGRAM = Program("assoc.register", _register, EarlyEnd("assoc.register").on_signals)

@@ -21,4 +21,4 @@ def print_biases(found: Registration) -> None:
     headers = ["sensor", "component", "bias", "sigma", "unit", "observed"]
     print_table(headers, rows, keys=2, left=("sensor", "component", "unit"))
     print()
-    print_lines(found.summary())
+    print_lines("\n".join([found.summary(), *found.advice()]))

@@ -94,7 +94,9 @@ def scene_of_radars(
         z = part.recording.measurements
         if part.radar.dim == 3:
             heights = part.recording.trusted_altitudes
-            z = np.column_stack([z, heights if origin is None else heights_above(z, heights, part.radar, origin)])
+            z = np.column_stack(
+                [z, heights if origin is None else heights_above(z, heights, part.radar.position, origin)]
+            )
         # a plot on an edge belongs to the scan before it, but for the first
         cut = np.searchsorted(part.recording.times, edges[1:-1], side="right")
         measured.append(np.split(z, cut))
@@ -160,14 +162,14 @@ def identities_of_radars(
     return list(zip(*found, strict=True))
 
 
-def heights_above(z: Array, altitudes: Array, radar: Radar2D, origin: Origin) -> Array:
-    """Heights above a scene's plane (n,) of measurements (n, 2) at altitudes above the ellipsoid, metres."""
+def heights_above(z: Array, altitudes: Array, place: Array, origin: Origin) -> Array:
+    """Heights above a scene's plane (n,) of measurements (n, 2) from a place (3,), of altitudes above the ellipsoid."""
     heights = altitudes - origin[2]
     directions = np.stack([np.cos(z[:, 1]), np.sin(z[:, 1])], axis=1)
     # two rounds leave centimetres
     for _ in range(3):
-        ground = np.sqrt(np.maximum(z[:, 0] ** 2 - (heights - radar.position[2]) ** 2, 0.0))
-        places = np.column_stack([radar.position[:2] + ground[:, None] * directions, heights])
+        ground = np.sqrt(np.maximum(z[:, 0] ** 2 - (heights - place[2]) ** 2, 0.0))
+        places = np.column_stack([place[:2] + ground[:, None] * directions, heights])
         heights = heights + altitudes - geodetic(places, origin)[:, 2]
     return heights
 

@@ -52,10 +52,10 @@ def describe(direction: Array, terms: Sequence[Term], sensors: Sequence[Sensor])
     # the shift of very many sensors together has small parts only
     share = min(_SHARE, 0.5 * float(np.abs(direction).max()))
     order = order[np.abs(direction[order]) > share]
-    first = np.sign(direction[order[0]])
+    signs = np.sign(direction) * np.sign([term.scale for term in terms])
     parts = []
     for number in order[:_MOST_NAMED]:
-        term, sign = terms[number], first * direction[number]
-        parts.append(f"{'+' if sign > 0 else '-'} {term.component} of {label_of(sensors, term.sensor)}")
+        term, sign = terms[number], signs[order[0]] * signs[number]
+        parts.append(f"{'+' if sign > 0 else '-'} {term.shown} of {label_of(sensors, term.sensor)}")
     text = " ".join(parts).removeprefix("+ ")
     return text + (" ..." if len(order) > _MOST_NAMED else "")

@@ -29,6 +29,18 @@ OBSERVED = 0.5
 SIGNIFICANCE = 0.01
 """Probability of finding biases where there are none."""
 
+_SAID = {
+    "range": ("ranges are", "long", "short"),
+    "gain": ("ranges are", "long", "short"),
+    "bearing": ("bearings are", "far clockwise", "far counter-clockwise"),
+    "elevation": ("elevations are", "high", "low"),
+    "time": ("times are", "late", "early"),
+    "x": ("x (east) is", "large", "small"),
+    "y": ("y (north) is", "large", "small"),
+    "z": ("z (up) is", "large", "small"),
+}
+"""What a bias is of, and what it is above and below zero."""
+
 
 @dataclass(frozen=True)
 class Residuals:
@@ -133,32 +145,43 @@ class Registration(Shown):
         return without_biases(scene, [self.of(s) for s in range(len(self.sensors))], velocities)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a table: sensor, component, unit, bias, sigma, observed; angles in degrees."""
+        """Return a table: sensor, component, unit, bias, sigma, observed; bearings in degrees, clockwise positive."""
         import pandas as pd
 
         return pd.DataFrame(self.rows())
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for each bias, angles in degrees."""
+        """Return a dictionary for each bias, as people say it: bearings in degrees, clockwise positive."""
         values = zip(self.terms, self.biases.tolist(), self.deviations.tolist(), self.observed.tolist(), strict=True)
         return [
             {
                 "sensor": label_of(self.sensors, term.sensor),
-                "component": term.component,
+                "component": term.shown,
                 "unit": term.shown_unit,
                 "bias": term.scale * bias,
-                "sigma": term.scale * sigma,
+                "sigma": abs(term.scale) * sigma,
                 "observed": observed,
             }
             for term, bias, sigma, observed in values
         ]
+
+    def advice(self) -> list[str]:
+        """Say what to do about observed biases beyond three standard deviations, a line for each sensor."""
+        found: dict[str, list[str]] = {}
+        for row in self.rows() if self.significant else []:
+            if row["observed"] and abs(row["bias"]) > 3.0 * row["sigma"]:
+                what, more, less = _SAID[row["component"]]
+                amount = f"{abs(row['bias']):.3g} {row['unit']}"
+                wrong, do = (more, "subtract") if row["bias"] > 0 else (less, "add")
+                found.setdefault(row["sensor"], []).append(f"{what} {amount} too {wrong}, {do} {amount}")
+        return [f"{sensor}: {'; '.join(parts)}" for sensor, parts in found.items()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of a JSON file."""
         scales = np.array([term.scale for term in self.terms])
         return {
             "format": "assoc.registration",
-            "version": 1,
+            "version": 2,
             "biases": self.rows(),
             "covariance": (self.covariance * np.outer(scales, scales)).tolist(),
             "open": list(self.open),
@@ -169,7 +192,7 @@ class Registration(Shown):
         }
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
-        """Write the biases as JSON; angles in degrees."""
+        """Write the biases as JSON: bearings in degrees, clockwise positive (azimuths before version 2)."""
         write_json(path, self.to_dict())
 
     def summary(self) -> str:

@@ -35,14 +35,21 @@ class Term(NamedTuple):
         return "rad" if self.component in ANGLES else {"time": "s", "gain": "m/m"}.get(self.component, "m")
 
     @property
+    def shown(self) -> str:
+        """The component for people, who read azimuths off a compass: "bearing", clockwise."""
+        return "bearing" if self.component == "azimuth" else self.component
+
+    @property
     def shown_unit(self) -> str:
         """m, deg, s or m/km, for people."""
         return "deg" if self.component in ANGLES else "m/km" if self.component == "gain" else self.unit
 
     @property
     def scale(self) -> float:
-        """Factor from `unit` to `shown_unit`."""
-        return math.degrees(1.0) if self.component in ANGLES else 1e3 if self.component == "gain" else 1.0
+        """Factor from `unit` to `shown_unit`; below 0 for azimuths, which become bearings."""
+        if self.component in ANGLES:
+            return math.degrees(-1.0 if self.component == "azimuth" else 1.0)
+        return 1e3 if self.component == "gain" else 1.0
 
 
 def label_of(sensors: Sequence[Sensor], number: int) -> str:

@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from assoc import inspect, live, track
+from assoc import inspect, live, register, track
 from assoc._cli.track.plot_lines import parse_line
-from assoc._cli.track.radars_file import read_radars
+from assoc._cli.track.radars_file import read_radars, write_biases
+from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
 from assoc.recordings import Recording, radar_of, read_plots
-from assoc.recordings.on_earth import placed
+from assoc.recordings.on_earth import Bias, placed
 from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
 from tests.sizes import sample
 
@@ -300,3 +301,64 @@ def test_what_is_wrong_is_one_line(tmp_path, changes, message, capsys):
         assert program.main([file, *words]) == 2
         said = capsys.readouterr().err
         assert re.search(message, said) and said.count("\n") == 1, said
+
+
+def turned(file, degrees, metres):
+    """The plots of a file as a radar with these errors would give them."""
+    north = pd.read_csv(file)
+    north["rho_m"], north["theta"] = north["rho_m"] + metres, (north["theta"] + degrees) % 360
+    north.to_csv(file, index=False)
+
+
+def test_biases_are_written_and_taken_off(tmp_path, capsys):
+    file = described(tmp_path)
+    exact = read_radars(file)
+    turned(tmp_path / "north.csv", 0.4, 250.0)
+    before = (tmp_path / "radars.toml").read_text()
+    assert register.main([file, "--reference", "south", "--components", "range,azimuth", "--write"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"north: ranges are 2\d\d m too long, .*; bearings are 0\.\d+ deg too far clockwise, sub", said)
+    after = (tmp_path / "radars.toml").read_text()
+    assert [line for line in after.splitlines() if not line.startswith("bias")] == before.splitlines()
+    found = read_radars(file)
+    assert found.biases[0].bearing == pytest.approx(0.4, abs=0.03) and found.biases[1] == Bias()
+    assert found.biases[0].range == pytest.approx(250.0, abs=40.0)
+    off = np.abs(np.angle(np.exp(1j * (found.recordings[0].azimuths - exact.recordings[0].azimuths))))
+    assert np.degrees(np.median(off)) < 0.03
+    # what is left is no bias, and a second run writes nothing else
+    assert register.main([file, "--reference", "south", "--components", "range,azimuth", "--write"]) == 0
+    assert "stays as it is" in capsys.readouterr().out and (tmp_path / "radars.toml").read_text() == after
+
+
+def test_biases_add_up():
+    """Gains multiply; bearings stay within half a turn."""
+    plots = Recording([1.0, 2.0], [1e5, 2e4], [0.3, -2.0])
+    first, second = Bias(120.0, 170.0, 3.0, 0.5), Bias(-40.0, 20.0, -1.0, 0.25)
+    twice, once = second.off(first.off(plots)), first.and_then(second).off(plots)
+    np.testing.assert_allclose(once.ranges, twice.ranges, rtol=1e-12)
+    np.testing.assert_allclose(np.exp(1j * once.azimuths), np.exp(1j * twice.azimuths), atol=1e-12)
+    assert once.times.tolist() == twice.times.tolist() == [0.25, 1.25] and first.and_then(second).bearing == -170.0
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("bias = 3", "bias: expected a table such as"),
+        ("bias = { azimuth = 1.0 }", "bias: unknown key 'azimuth'"),
+        ("bias = { range = true }", "bias: range: expected a number, got True"),
+    ],
+)
+def test_biases_that_are_none(tmp_path, capsys, written, said):
+    file = described(tmp_path)
+    (tmp_path / "radars.toml").write_text((tmp_path / "radars.toml").read_text() + written + "\n")
+    assert inspect.main([file]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_description_that_cannot_be_written_stays(tmp_path):
+    file = described(tmp_path)
+    text = (tmp_path / "radars.toml").read_text() + "[radar.bias]\nrange = 3.0\n"
+    (tmp_path / "radars.toml").write_text(text)
+    with pytest.raises(InvalidInputError, match="write yourself: bias = { range = 1.0 }; bias = { bearing = 2.5 }"):
+        write_biases(file, [Bias(range=1.0), Bias(bearing=2.5)])
+    assert (tmp_path / "radars.toml").read_text() == text

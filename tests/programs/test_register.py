@@ -33,7 +33,7 @@ def test_options(biased, tmp_path, capsys):
     words = [str(biased), "-o", str(tmp_path / "out.npz")]
     assert register.main([*words, "--components", "range, azimuth", "--reference", "radar 2"]) == 0
     shown = capsys.readouterr().out
-    assert "radar 2" not in shown and "elevation" not in shown and shown.count("azimuth") == 2
+    assert "radar 2" not in shown and "elevation" not in shown and shown.count("  bearing ") == 2
     # angles are in degrees here: with a spread of 0.001 deg nothing of 0.3 deg can be found
     assert register.main([*words, "--components", "azimuth", "--angle-spread", "0.001"]) == 0
     value = float(capsys.readouterr().out.splitlines()[1].split()[3])
@@ -49,6 +49,7 @@ def test_options(biased, tmp_path, capsys):
         (["--range-spread", "-1"], "range_spread: expected a number above 0"),
         (["--max-tuples", "0"], "--max-tuples: expected a whole number >= 1"),
         (["-o", "-", "--report"], "--report: expected a file name, because --output - has none"),
+        (["--write"], "--write: expected radars.toml"),
     ],
 )
 def test_bad_options(biased, tmp_path, capsys, words, said):
@@ -61,6 +62,8 @@ def test_bad_options(biased, tmp_path, capsys, words, said):
 def test_bad_files(biased, tmp_path, capsys):
     assert register.main([str(tmp_path / "none.npz"), "-o", str(tmp_path / "out.npz")]) == 2
     assert "none.npz" in capsys.readouterr().err
+    assert register.main([str(biased)]) == 2
+    assert "-o: expected a file for the scene without the biases" in capsys.readouterr().err
     assert register.main([str(biased), "-o", str(biased)]) == 2
     assert "overwrite an input" in capsys.readouterr().err
     np.savez(tmp_path / "other.npz", a=np.zeros(1))

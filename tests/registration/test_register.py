@@ -1,6 +1,7 @@
 """Registration against biases that were put in, against scipy's least squares, and where nothing can be known."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -127,7 +128,7 @@ def test_two_radars_at_one_place():
     assert not result.observed.any() and not result.significant
     assert sorted(result.open) == sorted(
         f"{component} of radar {one} + {component} of radar {3 - one}"
-        for component, one in zip(("range", "azimuth", "elevation"), _leads(result), strict=True)
+        for component, one in zip(("range", "bearing", "elevation"), _leads(result), strict=True)
     )
     # differences are known well
     for i in range(3):
@@ -139,7 +140,7 @@ def test_two_radars_at_one_place():
 def _leads(result):
     """Which radar each line names first: either is right."""
     first = {line.split()[0]: int(line.split()[3]) for line in result.open}
-    return [first[component] for component in ("range", "azimuth", "elevation")]
+    return [first[component] for component in ("range", "bearing", "elevation")]
 
 
 def test_a_radar_alone():
@@ -354,7 +355,16 @@ def test_files(found, tmp_path):
     content = json.loads((tmp_path / "biases.json").read_text())
     assert content["format"] == "assoc.registration" and len(content["biases"]) == 9
     first = content["biases"][1]
-    assert first["component"] == "azimuth" and first["unit"] == "deg" and first["bias"] == pytest.approx(-0.3, abs=0.03)
+    # azimuths 0.3 degrees too small are bearings 0.3 degrees too far clockwise
+    assert first["component"] == "bearing" and first["unit"] == "deg" and first["bias"] == pytest.approx(0.3, abs=0.03)
+    assert first["sigma"] > 0.0
+    said = found.advice()
+    assert "radar 1: ranges are" in said[0] and re.search(
+        r"bearings are 0\.[23]\d* deg too far clockwise, subtract", said[0]
+    )
+    assert re.search(
+        r"ranges are 2\d\d m too short, add 2\d\d m; bearings are 0\.\d+ deg too far counter-clockwise", said[1]
+    )
     assert np.sqrt(content["covariance"][1][1]) == pytest.approx(first["sigma"])
     frame = found.to_frame()
     assert list(frame.columns) == ["sensor", "component", "unit", "bias", "sigma", "observed"]

@@ -146,7 +146,7 @@ def _with_height(name: str, values: list[Any], scene: Scene, sensor: Sensor) -> 
         return name + NO_HEIGHT, values
     if len(values) == sensor.dim and scene.origin is not None:
         z = np.array([values], dtype=np.float64)
-        values[-1] = float(heights_above(z, z[:, -1], sensor, scene.origin)[0])  # type: ignore[arg-type]
+        values[-1] = float(heights_above(z, z[:, -1], sensor.position, scene.origin)[0])
     return name, values
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,13 +17,16 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc._types import Array
     from assoc.recordings import Recording
+    from assoc.recordings.on_earth import Bias
+    from assoc.registration import Registration
+    from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.sensors import Radar2D
 
 ASTERIX = (".ast", ".asterix", ".pcap")
 KEYS = (
     "name", "file", "radar", "columns", "units", "place", "noise", "detection_probability", "false_alarms", "reach_km",
-    "resolution",    "turn",
+    "resolution", "turn", "bias",
 )  # fmt: skip
 """Keys of a table [[radar]]."""
 _TOP = ("name", "origin", "interval", "closed", "radar")
@@ -42,13 +46,33 @@ class Radars(NamedTuple):
     """Codes and addresses of the scene's plots."""
     closed: list[Array]
     """Areas where no track starts: x and y of their corners."""
+    places: list[Origin]
+    biases: list[Bias]
+    """What was taken off the plots of each radar."""
+
+    def with_further(self, found: Registration) -> list[Bias]:
+        """The biases of all radars, with those found in the scene."""
+        from assoc.recordings.on_earth import Bias
+
+        further = []
+        for number, bias in enumerate(self.biases):
+            of = found.of(self.numbers.index(number))
+            bearing = -math.degrees(of.get("azimuth", 0.0))
+            more = Bias(of.get("range", 0.0), bearing, 1e3 * of.get("gain", 0.0), of.get("time", 0.0))
+            further.append(bias.and_then(more))
+        return further
+
+    @property
+    def numbers(self) -> list[int]:
+        """The radar of each sensor of the scene, from 0."""
+        from assoc.recordings.several import parts_of_radars
+
+        return [part.number for part in parts_of_radars(self.recordings, self.radars)]
 
     @property
     def sensor_turns(self) -> list[float]:
         """Seconds for a turn of each sensor of the scene."""
-        from assoc.recordings.several import parts_of_radars
-
-        return [self.turns[part.number] for part in parts_of_radars(self.recordings, self.radars)]
+        return [self.turns[number] for number in self.numbers]
 
 
 def read_radars(path: str) -> Radars:
@@ -70,9 +94,12 @@ def read_radars(path: str) -> Radars:
     read = [_read_radar(path, number, table) for number, table in enumerate(tables, 1)]
     origin = _place(top["origin"], f"{path}: origin") if "origin" in top else read[0][3]
     recordings, radars = [], []
+    biases = [_bias(table, f"{path}: radar {printable(str(table.get('name', number)))}")
+              for number, table in enumerate(tables, 1)]  # fmt: skip
     days = _days([recording for recording, *_ in read])
-    for (recording, radar, _, place, height_noise), day in zip(read, days, strict=True):
-        own = placed(replace(recording, times=recording.times + day), radar, place, origin, height_noise)
+    for (recording, radar, _, place, height_noise), day, bias in zip(read, days, biases, strict=True):
+        plots = bias.off(replace(recording, times=recording.times + day))
+        own = placed(plots, radar, place, origin, height_noise)
         recordings.append(own[0])
         radars.append(own[1])
     turns = [turn for _, _, turn, _, _ in read]
@@ -81,7 +108,72 @@ def read_radars(path: str) -> Radars:
     scene = replace(scene, name=str(top.get("name", scene.name)))
     identities = identities_of_radars(recordings, radars, scene.times)
     closed = _areas(top.get("closed", []), f"{path}: closed", origin)
-    return Radars(scene, recordings, radars, turns, identities, closed)
+    places = [place for _, _, _, place, _ in read]
+    return Radars(scene, recordings, radars, turns, identities, closed, places, biases)
+
+
+def _bias(table: dict[str, Any], where: str) -> Bias:
+    """What a radar states less what is true."""
+    from dataclasses import fields
+
+    from assoc.recordings.on_earth import Bias
+
+    value = table.get("bias", {})
+    if not isinstance(value, dict):
+        raise InvalidInputError(f"{where}: bias: expected a table such as {{ range = 120.0, bearing = -0.3 }}")
+    _check_keys(f"{where}: bias", value, tuple(field.name for field in fields(Bias)))
+    for key, number in value.items():
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not abs(number) < 1e9:
+            raise InvalidInputError(f"{where}: bias: {key}: expected a number, got {number!r}")
+    return Bias(**{key: float(number) for key, number in value.items()})
+
+
+def write_biases(path: str, biases: list[Bias]) -> None:
+    """Write the biases of all radars into a description, which stays as it is otherwise.
+
+    Raises
+    ------
+    InvalidInputError
+        Its tables are not written as ``[[radar]]``, or a bias is written in several lines.
+    """
+    import tomllib
+
+    from assoc._files.output import write_text
+    from assoc._files.reading import read_bytes
+
+    text = read_bytes(path, 1_000_000).decode()
+    lines, number, inside = [], 0, False
+    for line in text.splitlines(keepends=True):
+        if re.match(r"\s*\[", line):
+            inside = re.match(r"\s*\[\[\s*radar\s*\]\]", line) is not None
+        elif inside and re.match(r"\s*bias\s*=", line):
+            continue
+        lines.append(line)
+        if inside and re.match(r"\s*\[\[", line) and number < len(biases):
+            end = "\r\n" if line.endswith("\r\n") else "\n"
+            lines.append(f"bias = {_inline(biases[number])}{end}")
+            number += 1
+    written = "".join(lines)
+    wanted = tomllib.loads(text)
+    for table, bias in zip(wanted["radar"], biases, strict=True):
+        table["bias"] = tomllib.loads(f"bias = {_inline(bias)}")["bias"]
+    try:
+        good = tomllib.loads(written) == wanted
+    except tomllib.TOMLDecodeError:
+        good = False
+    if not good:
+        raise InvalidInputError(
+            f"{path}: --write: expected tables [[radar]] on lines of their own, a bias on one line; write yourself: "
+            + "; ".join(f"bias = {_inline(bias)}" for bias in biases)
+        )
+    write_text(path, written)
+
+
+def _inline(bias: Bias) -> str:
+    """A bias as an inline table of TOML, without what is 0."""
+    digits = {"range": 1, "bearing": 4, "gain": 4, "time": 3}
+    shown = {name: round(getattr(bias, name), places) for name, places in digits.items()}
+    return "{ " + ", ".join(f"{name} = {value}" for name, value in shown.items() if value) + " }"
 
 
 def _areas(value: object, label: str, origin: tuple[float, float, float]) -> list[Array]:
