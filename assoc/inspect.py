@@ -21,7 +21,11 @@ from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from assoc._cli.track.radars_file import Radars
+    from assoc._types import Array
+    from assoc.registration.agreement import Agreement
 
+_MANY = 30
+"""Plots or places below which nothing is said of noise, or of radars that see nothing in common."""
 _KEPT = ("Mode A", "an address", "a height")
 _OPTIONS = (
     Option("file", "radars.toml", "description of radars (docs/from_files.md)", positional=True),
@@ -38,10 +42,15 @@ def _inspect(words: list[str]) -> None:
         found = read_radars(given["file"])
         for line in _lines(found):
             print_lines(line)
-        wrong = suspicious(found)
-        print_lines("nothing looks wrong" if not wrong else "looks wrong:")
-        for line in wrong:
-            print_lines(f"  {printable(line)}")
+        compared, differing, unknown = compared_lines(found)
+        wrong = suspicious(found) + differing
+        for line in compared:
+            print_lines(printable(line))
+        for title, lines in (("looks wrong:", wrong), ("not compared with anything:", unknown)):
+            if lines:
+                print_lines("\n  ".join([title, *map(printable, lines)]))
+        if not wrong:
+            print_lines("nothing looks wrong" + (" in what was compared" if unknown else ""))
         if given["picture"]:
             _draw(given["picture"], found)
 
@@ -118,6 +127,76 @@ def suspicious(found: Radars) -> list[str]:
         rate = len(recording) / max((recording.times[-1] - recording.times[0]) / turn, 1.0)
         if rate < 0.5:
             lines.append(f"{radar.name}: {rate:.2g} plots a turn: is a part of the file missing?")
+    return lines
+
+
+def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
+    """What agrees with what, what does not, and what was compared with nothing: nothing else may be called right."""
+    from assoc.registration.agreement import compare, noise_of
+
+    agreed, wrong, unknown = [], [], []
+    assert found.scene.origin is not None
+    for s, one in enumerate(compare(found.recordings, found.radars, found.turns, found.scene.origin)):
+        radar = found.radars[s]
+        declared = radar.covariance.diagonal() ** 0.5
+        if one.change is None:
+            if one.places >= _MANY:
+                wrong.append(
+                    f"{radar.name}: {one.places} places where another radar looks, and no turn of north, unit of "
+                    "ranges or clock with which they see the same targets: is the place right?"
+                )
+            else:
+                unknown.append(f"{radar.name}: bearings, ranges and times: too few targets that another radar sees")
+        else:
+            agreed.append(f"{radar.name}: another radar sees the same target at {one.common} of {one.places} places")
+            wrong += [f"{radar.name}: {text}" for text in _differences(one, declared)]
+        noise = noise_of(found.recordings[s], found.turns[s])
+        if noise.plots < _MANY:
+            unknown.append(f"{radar.name}: noise: {noise.plots} plots are between two others of the same target")
+            continue
+        seen = f"{noise.range:.3g} m and {math.degrees(noise.azimuth):.2g} deg"
+        agreed.append(f"{radar.name}: plots are {seen} from straight lines through those before and after")
+        ratios = (noise.range / declared[0], noise.azimuth / declared[1])
+        if not all(1 / 3 < ratio < 3 for ratio in ratios):
+            said = f"{declared[0]:.3g} m and {math.degrees(declared[1]):.2g} deg"
+            wrong.append(f"{radar.name}: noise: {said} are declared, {seen} are seen")
+    return agreed, wrong, unknown
+
+
+def _differences(one: Agreement, declared: Array) -> list[str]:
+    """What is different between a radar and the others."""
+    from assoc.registration.agreement import UNITS
+
+    change = one.change
+    assert change is not None
+    lines = []
+    if change.mirrored:
+        lines.append("its bearings fit the others if they are counted counter-clockwise")
+    units = [f"{was}, read as {read}" for (was, read), factor in UNITS.items() if factor == change.scale]
+    if units:
+        lines.append(f"its ranges fit the others times {change.scale:.4g}: are they {units[0]}?")
+    if change.shift:
+        early = "early" if change.shift > 0 else "late"
+        bias = f"bias = {{ time = {-change.shift:g} }}"
+        lines.append(
+            f"its times are about {abs(change.shift):g} s too {early} beside the others ({bias} takes that off)"
+        )
+    turn, length = math.degrees(change.turn + one.turn[0]), one.length[0]
+    way = "clockwise" if turn > 0 else "counter-clockwise"
+    if change.turn:
+        bias = f"bias = {{ bearing = {turn:.2f} }}"
+        lines.append(f"its bearings are {abs(turn):.4g} deg too far {way} beside the others ({bias} takes that off)")
+    small = [
+        f"bearings {abs(turn):.2g} deg too far {way}",
+        f"ranges {abs(length):.3g} m too {'short' if length > 0 else 'long'}",
+    ]
+    apart = [
+        abs(one.turn[0]) > max(4.0 * one.turn[1], 0.5 * declared[1]) and not change.turn,
+        abs(length) > max(4.0 * one.length[1], 0.5 * declared[0]),
+    ]
+    if any(apart):
+        said = " and ".join(text for text, is_so in zip(small, apart, strict=True) if is_so)
+        lines.append(f"beside the others {said}: assoc register radars.toml --write finds whose error it is")
     return lines
 
 

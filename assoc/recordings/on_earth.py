@@ -90,6 +90,7 @@ def azimuths_in_plane(z: Array, altitudes: Array, place: Origin, origin: Origin,
     up = np.clip(up, -most, most)
     ground = np.sqrt(ranges**2 - up**2)
     local = np.column_stack([ground * np.cos(z[:, 1]), ground * np.sin(z[:, 1]), up])
-    away = east_north_up(*geodetic(local, place).T, origin) - here
+    latitude, longitude, height = geodetic(local, place).T
+    away = east_north_up(latitude, longitude, height, origin) - here
     azimuths: Array = np.arctan2(away[:, 1], away[:, 0])
     return azimuths

@@ -362,3 +362,25 @@ def test_a_description_that_cannot_be_written_stays(tmp_path):
     with pytest.raises(InvalidInputError, match="write yourself: bias = { range = 1.0 }; bias = { bearing = 2.5 }"):
         write_biases(file, [Bias(range=1.0), Bias(bearing=2.5)])
     assert (tmp_path / "radars.toml").read_text() == text
+
+
+def test_nothing_is_right_that_was_compared_with_nothing(tmp_path, capsys):
+    file = described(tmp_path)
+    turned(tmp_path / "north.csv", -20.0, 0.0)
+    assert inspect.main([file]) == 0
+    said = capsys.readouterr().out
+    found = re.search(r"north: its bearings are (\S+) deg too far counter-clockwise .*bearing = (\S+) }", said)
+    assert found and float(found[1]) == pytest.approx(20.0, abs=0.2) == -float(found[2])
+    assert "south: its" not in said and "nothing looks wrong" not in said
+    # written into the file, it is taken off
+    text = (tmp_path / "radars.toml").read_text()
+    alone = text.replace("noise = [40.0, 0.05]", "noise = [4.0, 0.05]").split("[[radar]]")[1]
+    (tmp_path / "radars.toml").write_text(text.replace("[[radar]]", f"[[radar]]\nbias = {{ bearing = {found[2]} }}", 1))
+    assert inspect.main([file]) == 0
+    assert "nothing looks wrong\n" in capsys.readouterr().out
+    # one radar, whose noise is ten times that declared
+    (tmp_path / "radars.toml").write_text(f"[[radar]]{alone}")
+    assert inspect.main([file]) == 0
+    said = capsys.readouterr().out
+    assert "not compared with anything:\n  north: bearings, ranges and times" in said
+    assert re.search(r"looks wrong:\n  north: noise: 4 m and 0.05 deg are declared, \d\d\.?\d? m and", said)
