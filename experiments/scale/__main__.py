@@ -1,9 +1,8 @@
-"""How time and memory grow with the work: scans, trackers, processes, an hour of air traffic.
+"""How time and memory grow with the work: scans and trackers.
 
 *One scan*: from measurements to a certified answer, at a constant density of targets: position sensors, 2-D radars, two
 of these and a bearing sensor. *Trackers*: the worst scan, which is one of the first, and the median of later ones.
-*Processes*: scans solved by one and by two. *Hour*: three radars, 500 aircraft at a time. Each row is a process of its
-own, so that peak memory is its own; processor time of all threads, kernels loaded.
+Each row is a process of its own, so that peak memory is its own; processor time of all threads, kernels loaded.
 """
 
 import math
@@ -12,8 +11,8 @@ from collections.abc import Callable, Sequence
 
 from experiments.common.claims import Claim
 from experiments.common.command import main
-from experiments.scale import one_scan, trackers
-from experiments.scale.alone import Measured, alone
+from experiments.scale import sizes as of
+from experiments.scale.sizes import SOLVERS, Measured, alone
 
 SIZES = {
     "positions": (1_000, 10_000, 100_000, 340_000, 400_000),
@@ -28,9 +27,7 @@ TARGETS = {
 }
 SCANS, LONG = 12, 10_000
 """Scans of a tracker; fewer of them where there are so many targets."""
-BYTES = 64
-"""Of a plot or of a row of a track: eight numbers."""
-UNITS = {"peak": "MB", "tracked": "%", "seconds": "s", "build": "s", "worst": "s", "median": "s", "greedy": "s",
+UNITS = {"peak": "MB", "tracked": "%", "build": "s", "worst": "s", "median": "s", "greedy": "s",
          "exact": "s", "lagrangian": "s"}  # fmt: skip
 
 
@@ -52,8 +49,8 @@ def scans(quick: bool) -> list[Claim]:
     claims = []
     for kind, sizes in SIZES.items():
         sizes = sizes[:2] if quick else sizes
-        solvers = tuple(one_scan.SOLVERS) if kind == "positions" else ("exact",)
-        rows = [alone(one_scan.measure, kind, targets, solvers) for targets in sizes]
+        solvers = tuple(SOLVERS) if kind == "positions" else ("exact",)
+        rows = [alone(of.scan, kind, targets, solvers) for targets in sizes]
         for targets, row in zip(sizes, rows, strict=True):
             claims += _claims(f"one scan, {kind}, {targets}", row)
         claims += _exponents(f"one scan, {kind}", sizes, rows, ("build", "tuples", *solvers))
@@ -65,50 +62,14 @@ def crowds(quick: bool) -> list[Claim]:
     claims = []
     for kind, sizes in TARGETS.items():
         sizes = sizes[:1] if quick else sizes
-        rows = [alone(trackers.measure, kind, size, 8 if size >= LONG else SCANS) for size in sizes]
+        rows = [alone(of.tracker, kind, size, 8 if size >= LONG else SCANS) for size in sizes]
         for targets, row in zip(sizes, rows, strict=True):
             claims += _claims(f"{kind}, {targets}", row)
         claims += [] if quick else _exponents(kind, sizes, rows, ("worst", "median"))
     return claims
 
 
-def processes(quick: bool) -> list[Claim]:
-    """The same scans by one process and by two."""
-    rows = {jobs: alone(one_scan.solved, jobs, 50 if quick else 10_000) for jobs in (1, 2)}
-    claims = [claim for jobs, row in rows.items() for claim in _claims(f"processes, {jobs}", row)]
-    return [*claims, Claim("processes: one / two, wall", "", ours=rows[1]["wall"] / rows[2]["wall"])]
-
-
-def hours(quick: bool) -> list[Claim]:
-    """An hour of the day, and what follows from it."""
-    if quick:
-        return []
-    row = alone(trackers.hour, "multi-sensor")
-    return [*_claims("hour", row), *extrapolated(row)]
-
-
-def extrapolated(row: Measured) -> list[Claim]:
-    """The day as 24 such hours, and a plan for 1,000 radars, three over each area: rows of BYTES."""
-    areas = 1_000 / 3
-    plots, tracks = row["plots"] * BYTES / 1e9, trackers.HOUR["scans"] * trackers.AIRCRAFT * BYTES / 1e9
-    # a mean and a covariance of six numbers for each track, from both sides
-    stitch = 2 * trackers.AIRCRAFT * 8 * (6 + 36) / 1e6
-    day = 24.0 * row["seconds"] / 3600.0
-    return [
-        Claim("a day as 24 of these hours: CPU", "h", ours=day),
-        Claim("plan, an area and an hour: plots in", "MB", ours=1e3 * plots),
-        Claim("plan, an area and an hour: tracks out", "MB", ours=1e3 * tracks),
-        Claim("plan, an area and an hour: states of tracks at a border", "MB", ours=stitch),
-        Claim("plan, 1000 radars and a day: plots", "", ours=24.0 * areas * row["plots"]),
-        Claim("plan, 1000 radars and a day: plots in", "GB", ours=24.0 * areas * plots),
-        Claim("plan, 1000 radars and a day: tracks out", "GB", ours=24.0 * areas * tracks),
-        Claim("plan, 1000 radars and a day: CPU of tracking", "h", ours=areas * day),
-    ]
-
-
-PARTS: dict[str, Callable[[bool], list[Claim]]] = {
-    "scans": scans, "trackers": crowds, "processes": processes, "hour": hours
-}  # fmt: skip
+PARTS: dict[str, Callable[[bool], list[Claim]]] = {"scans": scans, "trackers": crowds}
 
 
 def experiment(chosen: Namespace) -> list[Claim]:

@@ -11,8 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,18 +100,14 @@ def lengths(files: Mapping[int, Path]) -> list[Claim]:
     return claims
 
 
-PARTS: dict[str, Callable[[Mapping[int, Path]], list[Claim]]] = {"lengths": lengths}
-
-
-def experiment(chosen: Namespace) -> list[Claim]:
-    """Write recordings of growing length, and measure these parts."""
-    rng = np.random.default_rng(chosen.seed)
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
+    """Write recordings of growing length, and track them."""
     with tempfile.TemporaryDirectory() as folder:
-        files = {plots: Path(folder) / f"{plots}.csv" for plots in ((10_000,) if chosen.quick else SIZES)}
+        files = {plots: Path(folder) / f"{plots}.csv" for plots in ((10_000,) if quick else SIZES)}
         for plots, path in files.items():
             write(path, plots, rng)
-        return [claim for name in chosen.names for claim in PARTS[name](files)]
+        return lengths(files)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main("scale.recordings", experiment, __doc__, only=PARTS))
+    raise SystemExit(main("scale.recordings", experiment, __doc__))

@@ -9,11 +9,10 @@ import numpy as np
 from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, hota, identity, mean_gospa, ospa2
 from assoc.scene import Scene
-from assoc.tracking import TRACKERS, MultiSensorTracker, Track, Tracker, TrackTable
+from assoc.tracking import TRACKERS, Tracker, TrackTable
 from assoc.tracking.associate.all_sensors import whole_scan
 from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
-from assoc.tracking.fusion import SystemTracks, TrackFusion
 from assoc.tracking.method import Method
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track_batch import TrackBatch
@@ -108,26 +107,6 @@ def _rows(sources: Any, targets: list[int]) -> Array:
         number = {t: m + 1 for m, t in enumerate(source.tolist()) if t >= 0}
         rows[:, s] = [number.get(t, 0) for t in targets]
     return rows
-
-
-class Sites:
-    """Takes measurements as a tracker does, and hands out fused tracks."""
-
-    def __init__(self, scene: Scene, **options: Any) -> None:
-        noise = manoeuvre_noise(pace_of(scene.times))
-        options = {"filter": two_speeds(noise, unscented=open_heights(scene.sensors))} | options
-        self.sites = [MultiSensorTracker([sensor], region=scene.region, **options) for sensor in scene.sensors]
-        self.fusion, self.filter = TrackFusion(len(self.sites)), options["filter"]
-        self.tracks: list[Track] = []
-
-    def step(self, time: float, measurements: Any, times: Any = None, sectors: Array | None = None) -> None:
-        """Step each site, and fuse the tracks that they report."""
-        found = []
-        for s, site in enumerate(self.sites):
-            own = None if times is None else [times[s]]
-            site.step(time, [measurements[s]], own, None if sectors is None else sectors[s : s + 1])
-            found.append(SystemTracks.of([track for track in site.tracks if track.reported], site.filter.motion))
-        self.tracks = self.fusion.step(time, found).tracks
 
 
 CUTOFF = 500.0
