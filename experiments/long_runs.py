@@ -97,9 +97,7 @@ class Watch:
         slower = float(np.median(pace[-tenth:]) / np.median(pace[1 : tenth + 1]))
         return [
             Claim(f"{name}: processor time of a step", "ms", None, 1e3 * float(np.median(self.seconds))),
-            _limited(
-                f"{name}: growth of resident memory from the second tenth", grown, most=5.0, unit="MB"
-            ),
+            _limited(f"{name}: growth of resident memory from the second tenth", grown, most=5.0, unit="MB"),
             _limited(f"{name}: growth of Python's objects", more, most=1_000.0),
             _limited(f"{name}: time of a step over that of unchanging work, last tenth / first", slower, most=1.15),
         ]

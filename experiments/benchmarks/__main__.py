@@ -53,7 +53,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--update", action="store_true", help=text)
     text = "keep all rows of the CSV, and run only families and sizes that have none: go on after an interruption"
     add("--resume", action="store_true", help=text)
-    add("--remark", metavar="TEXT", help="a remark on the rows, printed in the report")
     add("--report-only", action="store_true", help="run nothing; write the report again from the CSV")
     return parser
 
@@ -67,8 +66,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.report_only:
         if not table.exists():
             parser.error(f"--report-only: {table} does not exist")
-        head, remark = markdown.head_and_remark(report.read_text(encoding="utf-8") if report.exists() else "")
-        _tell(table, report, head, options.remark or remark)
+        _tell(table, report, markdown.head_of(report.read_text(encoding="utf-8") if report.exists() else ""))
         return 0
     part = options.update or options.resume or options.families or options.sizes or options.solvers
     missing = [] if part or table != TABLE else contestants.not_installed()
@@ -79,8 +77,7 @@ def main(argv: list[str] | None = None) -> int:
             "(pip install -e '.[test,peers]', or write elsewhere with --csv)"
         )
     start = time.perf_counter()
-    words = [word for word in sys.argv[1:] if word not in ("--remark", options.remark)] if argv is None else argv
-    command = shlex.join(["python", "-m", "experiments.benchmarks", *words])
+    command = shlex.join(["python", "-m", "experiments.benchmarks", *(sys.argv[1:] if argv is None else argv)])
     rows: list[Row] = []
     if (options.update or options.resume) and table.exists():
         rows = [row for row in storage.load(table) if options.resume or not _measured_anew(row, options)]
@@ -90,15 +87,15 @@ def main(argv: list[str] | None = None) -> int:
         # after every case, so that an interrupted run keeps what it has measured
         storage.save(table, rows)
         minutes = None if options.update or options.resume else (time.perf_counter() - start) / 60
-        _tell(table, report, markdown.head(minutes, command), options.remark)
+        _tell(table, report, markdown.head(minutes, command))
     print(f"{len(rows)} rows in {table}, report in {report}")
     return 0
 
 
-def _tell(table: Path, report: Path, head: str | None, remark: str | None) -> None:
+def _tell(table: Path, report: Path, head: str | None) -> None:
     """Write what is told of the rows in a file: of the figures as they are saved, in so many digits."""
     saved = storage.load(table)
-    write_text(report, markdown.render(saved, head, remark))
+    write_text(report, markdown.render(saved, head))
     for page in filter(Path.exists, PAGES if table == TABLE else ()):
         write_text(page, readme.insert(page.read_text(encoding="utf-8"), saved))
 

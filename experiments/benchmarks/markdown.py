@@ -45,15 +45,13 @@ the best cost that any solver found; an excess is relative to it. aco, genetic a
 optimum."""
 
 
-def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> str:
+def render(rows: Sequence[Row], head: str | None) -> str:
     """Return the report.
 
     head: What `head` says of the run; None: nothing.
-    remark: What readers should know of these rows.
     """
     results = Results(rows)
     parts = ["# Benchmarks", *([head] if head else []), HOW]
-    parts += [f"**These rows**: {remark}"] if remark else []
     missing = _missing(rows)
     parts += [f"**Not in these rows** (not run): {missing}."] if missing else []
     parts += ["## Goals", _goals(rows), "## Families"]
@@ -65,11 +63,10 @@ def render(rows: Sequence[Row], head: str | None, remark: str | None = None) -> 
     return "\n\n".join(parts) + "\n"
 
 
-def head_and_remark(report: str) -> tuple[str | None, str | None]:
-    """What a report written by `render` says of its run, and its remark."""
-    patterns = r"^(Written by .*)$", r"^\*\*These rows\*\*: (.*)$"
-    said, remark = (re.search(pattern, report, re.MULTILINE) for pattern in patterns)
-    return said and said[1], remark and remark[1]
+def head_of(report: str) -> str | None:
+    """What a report written by `render` says of its run."""
+    said = re.search(r"^(Written by .*)$", report, re.MULTILINE)
+    return said and said[1]
 
 
 def _missing(rows: Sequence[Row]) -> str:
@@ -110,17 +107,14 @@ def _processor() -> str:
 def _goals(rows: Sequence[Row]) -> str:
     """How many goals of each family are met, and those that are not."""
     verdicts = judge(rows)
-
-    def count(family: str | None, *, stretch: bool) -> str:
-        met = [v.met for v in verdicts if v.stretch == stretch and family in (None, v.family)]
-        return f"{sum(met)} of {len(met)}"
-
-    families = dict.fromkeys(verdict.family for verdict in verdicts)
-    counts = [[family, *(count(family, stretch=stretch) for stretch in (False, True))] for family in families]
-    missed = [[v.family, v.size, v.goal, v.measured] for v in verdicts if not v.met and not v.stretch]
+    families: dict[str, list[bool]] = {}
+    for verdict in verdicts:
+        families.setdefault(verdict.family, []).append(verdict.met)
+    counts = [[family, f"{sum(met)} of {len(met)}"] for family, met in families.items()]
+    missed = [[v.family, v.size, v.goal, v.measured] for v in verdicts if not v.met]
     return "\n\n".join([
-        f"{count(None, stretch=False)} goals met, and {count(None, stretch=True)} stretch goals.",
-        plain_table(["family", "goals met", "stretch goals met"], counts),
+        f"{len(verdicts) - len(missed)} of {len(verdicts)} goals met.",
+        plain_table(["family", "goals met"], counts),
         "Goals not met:" if missed else "All are met.",
         *([plain_table(["family", "size", "goal", "measured"], missed)] if missed else []),
     ])  # fmt: skip

@@ -11,10 +11,12 @@ from functools import partial
 from statistics import median
 from typing import Any
 
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.prepare import prepare
+from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks.families import Case, Entry, Instance
 from experiments.benchmarks.rows import Row
-from experiments.benchmarks.wide_gaps import linear_bound
 from experiments.common.contestants import STOPPED, run, takes, warm_up
 
 PROVING = ("exact", "milp")
@@ -105,6 +107,12 @@ def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[
             raise AssertionError(f"{row.solver}: bound {row.bound} above the optimum {optimum}")
     gap = (reference - linear_bound(problem)) / max(1.0, abs(reference)) if case.family in GHOSTS else 0.0
     return [replace(row, reference=reference, proven=optimum is not None, extra=gap) for row in rows]
+
+
+def linear_bound(problem: AssignmentProblem) -> float:
+    """Return the bound of a problem's linear program."""
+    prepared = prepare(problem)
+    return LinearProgram(prepared.packing).solve(duals=dual_bound(prepared.packing)).bound + prepared.offset
 
 
 def _run(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: float | None) -> Row:

@@ -14,7 +14,7 @@ from experiments.common.instances import scenes, synthetic
 
 # of the first problem of each name; benchmarks begin with 1000, tuning ends before 100
 FIRST_SEED = 3000
-# the first seeds of 36 targets whose linear program is 0.6 % or more below the optimum (benchmarks/wide_gaps.py)
+# the first seeds of 36 targets whose linear program is 0.6 % or more below the optimum
 _WIDE_GAPS = (3000, 3012, 3023, 3033, 3035, 3043, 3051, 3054)
 
 

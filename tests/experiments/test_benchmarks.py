@@ -54,7 +54,6 @@ def test_speed_goal_needs_median_and_never_slower() -> None:
     speed = verdict(found, "exact: 30 times")
     assert speed.met
     assert "median 40 times, least 30" in speed.measured
-    assert not verdict(found, "exact: 100 times").met
     slow = goals.judge([ROW, PEER, *other, replace(PEER, seed=1001, solver="cp_sat", seconds=0.005)])
     assert not verdict(slow, "exact: 30 times").met
     # a peer that did not prove its answer is not in the race
@@ -71,32 +70,30 @@ def test_goals_of_proofs_on_ghosts() -> None:
 
     twenty = [at("20", seconds=0.02), peer("20", "highs", seconds=0.3), peer("20", "scip", seconds=0.1)]
     found = goals.judge(twenty)
-    assert verdict(found, "exact: faster than every peer").met and not verdict(found, "exact: 10 times").met
+    assert verdict(found, "exact: faster than every peer").met
     assert not verdict(goals.judge([*twenty, peer("20", "cp_sat", seconds=0.01)]), "exact: faster").met
     # a peer without a proof took at least its limit
     forty = [at("40", seconds=2.0, extra=1e-3), peer("40", "highs", status="feasible", limit=60.0, seconds=60.0)]
     found = goals.judge(forty)
     assert verdict(found, "exact: 5 times as fast as HiGHS").met and verdict(found, "exact: at most 3 s").met
-    assert not verdict(found, "exact: at most 1 s").met
     assert not verdict(goals.judge([replace(forty[0], status="feasible"), forty[1]]), "exact: 5 times").met
     # a wide gap does not count for the three seconds
     wide = goals.judge([at("40", seconds=9.0, extra=1e-2), at("40", seed=1001, seconds=1.0, extra=1e-3)])
     assert verdict(wide, "exact: at most 3 s").met
     sixty = [at("60", seed=s, status="optimal" if s % 2 else "feasible", seconds=9.0) for s in range(1, 6)]
-    found = goals.judge(sixty)
-    assert verdict(found, "exact: proof in 60 s").met and not verdict(found, "exact: all in 10 s").met
+    assert verdict(goals.judge(sixty), "exact: proof in 60 s").met
+    assert not verdict(goals.judge(sixty[1:4]), "exact: proof in 60 s").met
     gaps = (0.008, 0.009, 0.02)
     hundred = goals.judge([at("100", seed=s, status="feasible", bound=-100 - gap) for s, gap in enumerate(gaps)])
     assert verdict(hundred, "exact: gap at most 0.01 % in 30 s (median)").met
     assert not verdict(hundred, "exact: gap at most 0.01 % in 30 s (each seed)").met
-    assert not verdict(hundred, "exact: gap at most 0.003").met
 
 
 def test_goals_of_wide_gaps_and_axial_problems() -> None:
     wide = replace(ROW, family="wide gap", size="20", seconds=0.5)
     scip = replace(wide, solver="scip_1", peer=True, seconds=1.4)
     found = goals.judge([wide, scip, replace(scip, solver="cp_sat", seconds=0.1)])
-    assert verdict(found, "exact: faster than SCIP").met and not verdict(found, "exact: 10 times").met
+    assert verdict(found, "exact: faster than SCIP").met
     assert not verdict(goals.judge([wide, replace(scip, seconds=0.4)]), "exact: faster than SCIP").met
     gates = replace(wide, family="wide gates", size="1000")
     for seconds, met in ((2.6, True), (2.4, False)):
@@ -106,7 +103,7 @@ def test_goals_of_wide_gaps_and_axial_problems() -> None:
     assert verdict(goals.judge([known]), "exact: proof in 20 s").met
     assert not verdict(goals.judge([known, replace(known, seed=1001, status="feasible")]), "exact: proof").met
     axial = replace(ROW, family="random axial", size="n=26")
-    assert "1 of 1, n=26 median 0.01 s" in verdict(goals.judge([axial]), "exact: proof in 60 s").measured
+    assert "1 of 1, at most 0.01 s" in verdict(goals.judge([axial]), "exact: proof in 60 s").measured
     for row in (known, axial):
         assert verdict(goals.judge([row]), "exact: no slower than").met
         assert not verdict(goals.judge([replace(row, seconds=7.0, cpu=7.0)]), "exact: no slower than").met
@@ -168,8 +165,6 @@ def test_ghost_goals_compare_at_equal_and_at_long_time() -> None:
     mixed = goals.judge([ours, early, late, *level])
     assert verdict(mixed, "tabu: in 5 s at or below any peer after 60 s (median)").met
     assert not verdict(mixed, "tabu: in 5 s at or below any peer after 60 s (each seed)").met
-    better = goals.judge([replace(ours, cost=-100.02), early, late])
-    assert verdict(better, "tabu: in 5 s 0.01 % below any peer after 60 s").met
     # a peer that was given 60 s but ended within 5 counts as one after 5 s
     quick = goals.judge([ours, replace(late, seconds=3.0)])
     assert not verdict(quick, "tabu: in 5 s at or below any peer after 5 s").met
@@ -211,7 +206,7 @@ def test_report_has_a_line_for_each_family_and_the_goals_missed() -> None:
     assert "- **planted**: " in text
     assert "| gated | 3x300 | 9,000 | 10 ms | 30 | - | - | 300 ms (highs) | - |" in text
     assert "| planted | S=3 | 9,000 | - | - | 0 | - | - | - |" in text
-    assert "| gated | 2 of 2 | 0 of 1 |" in text
+    assert "| gated | 2 of 2 |" in text
     open_gap = markdown.render([replace(ROW, status="feasible", bound=-101.0), replace(PEER, status="feasible")], None)
     assert "| gated | 3x300 | exact: the optimum, proven | worst excess 0 |" in open_gap
     assert "| 10 ms, 0 of 1 proved, worst gap 1 % | - | - | - | 0 of 1 proved | - |" in open_gap
@@ -323,19 +318,12 @@ def test_a_brief_run_is_whole() -> None:
     assert all(1 <= case.brief <= len(case.seeds) for case in cases())
 
 
-def test_report_says_what_its_reader_should_know() -> None:
-    assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "two runs.")
-    assert "These rows" not in markdown.render([ROW, PEER], None)
-
-
-def test_a_report_written_again_keeps_its_head_and_remark(tmp_path: Path) -> None:
+def test_a_report_written_again_keeps_its_head(tmp_path: Path) -> None:
     path, report = tmp_path / "b.csv", tmp_path / "b.md"
     rows.save(path, [ROW, PEER])
     report.write_text(markdown.render([ROW, PEER], markdown.head(1.5, "make bench")))
-    assert main(["--report-only", "--csv", str(path), "--remark", "two runs."]) == 0
     assert main(["--report-only", "--csv", str(path)]) == 0
     assert "\nWritten by `make bench` in 1.5 minutes, on " in report.read_text()
-    assert "**These rows**: two runs." in report.read_text()
 
 
 def test_time_that_others_took_does_not_count():
