@@ -18,7 +18,6 @@ import assoc
 from assoc._files.output import write_atomically
 from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
-from experiments.common.results import Results
 from experiments.metaheuristics import sweep
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
@@ -189,22 +188,11 @@ def overview(figure: Any) -> None:
     plot_overview(scene, assoc.associate(scene, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
 
 
-def surfaces(kind: str) -> Callable[[Any], None]:
-    """Return what draws the published surfaces of the ant colony on one kind of problem."""
-
-    def draw(figure: Any) -> None:
-        shown, size = sweep.pictures(Results(sweep.NAME).claims)[kind]
-        figure.set_size_inches(*size)
-        sweep.draw(figure, shown)
-
-    return draw
-
-
 _DRAWN = (
     first_sight, scene, solution, ghosts, gates, costs, convergence, pheromone, heat_map, tracks, metric, overview,
 )  # fmt: skip
 PICTURES: dict[str, Callable[[Any], None]] = {draw.__name__.replace("_", "-"): draw for draw in _DRAWN}
-PICTURES["surfaces-ghosts-20"] = surfaces("surfaces-ghosts-20")
+PICTURES["surfaces-ghosts-20"] = lambda figure: sweep.draw(figure, "ghosts 20")
 
 
 def drawn(draw: Callable[[Any], None]) -> bytes:

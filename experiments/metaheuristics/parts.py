@@ -178,5 +178,3 @@ PARTS = (
     *(_alone(part) for part in OWN if part.words != "no ants that dive"),
 )
 """All variants, the whole first."""
-
-TWO_WORKERS = Part("two workers", SOLVERS, {"workers": 2})

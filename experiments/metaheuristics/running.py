@@ -41,40 +41,38 @@ def run(
     assign: Callable[..., Solution] = assoc.assign,
     **parameters: Any,
 ) -> float:
-    """Run a solver for so much processor time on each of its workers, and return what its solution costs.
+    """Run a solver for so much processor time, and return what its solution costs.
 
     What it finds after that does not count: an iteration that is at work then ends a little later. `assign` may look
     at its solution.
     """
-    workers = int(parameters.get("workers", 1))
-    budget = seconds * workers
     # what a limit gives them they use: by default they leave a part that has not become better for a while
     options = {"patience": UNLIMITED, "iterations": UNLIMITED} | parameters
     copy = fresh(problem)
-    with _by_processor_time(workers):
+    with _by_processor_time():
         wall, processor = time.perf_counter(), time.process_time()
         known: list[float] = []
 
         def callback(point: TracePoint) -> None:
-            if not known or time.process_time() - processor <= 1.02 * budget:
+            if not known or time.process_time() - processor <= 1.02 * seconds:
                 known.append(point.cost)
 
         solution = assign(copy, solver, seed=seed, time_limit=seconds, callback=callback, **options)
         spent = time.process_time() - processor
-        _pace.saw(time.perf_counter() - wall, spent / workers)
-    if not known or spent <= 1.02 * budget:
+        _pace.saw(time.perf_counter() - wall, spent)
+    if not known or spent <= 1.02 * seconds:
         return check_answer(problem, solution.tuples)
     # as an answer within its time: never worse than the greedy one
     return min(*known, assoc.assign(problem, "greedy").cost)
 
 
 @contextmanager
-def _by_processor_time(workers: int) -> Iterator[None]:
-    """Let a run's clock count the processor time of this process, shared among its workers."""
+def _by_processor_time() -> Iterator[None]:
+    """Let a run's clock count the processor time of this process."""
     began = time.process_time()
 
     def runtime(self: Run) -> float:
-        return (time.process_time() - began) / workers
+        return time.process_time() - began
 
     def deadline(self: Run, share: float = 1.0) -> float:
         left = share * self.remaining()

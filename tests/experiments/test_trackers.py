@@ -20,7 +20,6 @@ from experiments.trackers import (
     plane,
 )
 from experiments.trackers.plane import in_plane
-from tests.sizes import sample
 
 
 @pytest.mark.slow
@@ -97,27 +96,6 @@ def test_the_table_of_sensors_as_they_are(capsys):
     assert [line.split("oracle")[0] for line in shown] == ["splitting, ", "ships, radar and AIS, "]
     with pytest.raises(SystemExit):
         as_they_are.program(["--only", "nothing"])
-
-
-@sample(
-    "label, part",
-    [
-        ("ships, radar and AIS", "views"),
-        ("three 2-D radars", "heights"),
-        ("noise twice the declared", "estimates"),
-        ("wind farm", "map"),
-        ("dark band of 4 km", "life"),
-    ],
-    every=5,
-)
-def test_what_is_left_out_is_missed(label, part):
-    """Without a part, trackers are worse on a scene that needs it."""
-    row = as_they_are.ROWS[label]
-    assert part in row.without
-    case = row.make(7)
-    with_it = as_they_are.judge(as_they_are.ADAPTING, case, case.declared)
-    without = as_they_are.judge(f"multi-sensor, without {part}", case, case.declared)
-    assert without.gospa > 1.04 * with_it.gospa
 
 
 def test_goals_hold_by_their_intervals():
