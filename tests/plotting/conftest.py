@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.browser import opened
+from tests.browser import opened
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,7 @@ from assoc.plotting.live import LivePage
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from assoc.tracking.live.pictures import Agreement, SensorState
-from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, screenshot
+from tests.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from assoc.registration import register
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid
 from assoc.sweeps.sources import StudySource
-from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, requests, screenshot, show
+from tests.browser import DESKTOP, PHONE, complaints, in_time, requests, screenshot, show
 from tests.registration.common import biased_scene
 
 KINDS = ["scene", "problem", "ants", "tracks", "study", "biases"]

@@ -1,4 +1,4 @@
-"""All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
+"""All pictures of the documentation, drawn again: ``python -m docs.gallery [NAME ...] [-o docs/images]``.
 
 Pictures are of fixed scenes and seeds, or of published results (surfaces-*). They have two pixels for each
 of a plain screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
@@ -20,7 +20,7 @@ from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
 from experiments.metaheuristics import sweep
 
-FOLDER = Path(__file__).parents[1] / "docs" / "images"
+FOLDER = Path(__file__).parent / "images"
 LARGEST = 250_000
 """Bytes that a picture may take."""
 DPI = 180
@@ -223,7 +223,7 @@ def screenshot() -> bytes | None:
     if not (shutil.which("chromium") and shutil.which("chromedriver")):
         return None
     from assoc.plotting.report import write_association_report
-    from experiments.common.browser import opened, show
+    from tests.browser import opened, show
 
     scene, association = _radars()
     with tempfile.TemporaryDirectory() as folder, opened() as browser:
@@ -239,7 +239,7 @@ def screenshot() -> bytes | None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the pictures named, or all."""
     parser = argparse.ArgumentParser(
-        prog="python -m experiments.gallery", description="Draw the pictures of the documentation again."
+        prog="python -m docs.gallery", description="Draw the pictures of the documentation again."
     )
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help=f"pictures to draw (default: all): {', '.join([*PICTURES, 'report'])}"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments import gallery
+from docs import gallery
 
 
 def test_committed_pictures_are_those_of_the_gallery():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments import long_runs
+from tests.reliability import long_runs
 from tests.sizes import few_or_all
 
 

@@ -1,5 +1,7 @@
 """Trackers and solvers that run for weeks: memory, speed and covariances must not get worse.
 
+    python -m tests.reliability.long_runs [--steps 2000]
+
 The multi-sensor tracker processes 10^5 scans of three radars (four circling targets and false alarms), two others a
 fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by another solver. All in one
 process, one after the other, as in a program that never ends. Measured a hundred times on the way: resident memory,
@@ -10,9 +12,10 @@ Processor time depends on the load of the machine (caches, clock rate). So a fix
 this package is done and timed between the steps; the time of a step divided by the time of that work must not grow.
 """
 
+import argparse
 import gc
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -24,8 +27,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.solvers.assign import assign
 from assoc.tracking import TRACKERS, Tracker
-from experiments.common.claims import Claim
-from experiments.common.command import main
+from experiments.common.claims import Claim, print_table
 from experiments.common.measuring import processor_time
 
 REGION = np.array([[-40e3, 40e3], [-40e3, 40e3], [0.0, 12e3]])
@@ -179,12 +181,18 @@ def solve(count: int, rng: np.random.Generator, looks: int = LOOKS) -> tuple[lis
     return [*watch.claims("exact"), _limited("exact: solves that end without a proof", wrong, most=0.0)], watch
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
-    """Run all, one after the other, in this process."""
-    steps = 2_000 if quick else 100_000
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run all, one after the other, in this process; returns 1 if something is not as it should be."""
+    parser = argparse.ArgumentParser(prog="python -m tests.reliability.long_runs", description=__doc__.split("\n")[0])
+    parser.add_argument(
+        "--steps", type=int, default=100_000, metavar="N", help="of the multi-sensor tracker, and solves"
+    )
+    steps, rng = parser.parse_args(arguments).steps, np.random.default_rng(0)
     claims = [claim for kind, share in KINDS.items() for claim in track(kind, int(share * steps), rng)[0]]
-    return claims + solve(steps, rng)[0]
+    claims += solve(steps, rng)[0]
+    print_table(claims, "Long runs")
+    return int(any(claim.holds is False for claim in claims))
 
 
 if __name__ == "__main__":
-    raise SystemExit(main("long_runs", experiment, __doc__))
+    raise SystemExit(main())
