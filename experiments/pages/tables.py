@@ -34,7 +34,7 @@ KINDS = {
     "k-ballistic": "ballistic", "k-orbital": "satellites", "n-dense": "formation of twelve",
 }  # fmt: skip
 """Kinds of unseen scenes in words."""
-GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark", "live")
+GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark")
 """Experiments of trackers whose goals are listed, in this order."""
 _HEADS = {
     "oracle": "oracle",

@@ -20,7 +20,7 @@ from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
 from experiments.common.command import add_recording, main
-from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means, through
+from experiments.trackers.judging import Judged, beside, compare, distances, goal, judge, mean_claim, through
 
 TURNS, INTERVAL = "4,5,5.5", 4.0
 INSTANT = "multi-sensor, as one instant"
@@ -38,15 +38,11 @@ _SETTLED = 5
 """Scans at the beginning that are left out where ways to treat late plots are compared."""
 
 
-def at_one_instant(scene: Scene) -> Scene:
-    """The scene as one sees it who takes all plots of a scan to be of its end."""
-    return Scene(scene.sensors, scene.times, scene.measurements, scene.region, scene.truth)
-
-
 def judge_own_times(name: str, scene: Scene) -> Judged:
     """Run a tracker over a scene of turning radars; "..., as one instant" is not told the measurements' own times."""
     if name == INSTANT:
-        scene, name = at_one_instant(scene), "multi-sensor"
+        scene = Scene(scene.sensors, scene.times, scene.measurements, scene.region, scene.truth)
+        name = "multi-sensor"
     return judge(name, scene)
 
 
@@ -102,13 +98,10 @@ def experiment(chosen: Namespace) -> list[Claim]:
     for label, setting in settings.items():
         count = 2 if quick else (seeds if setting["name"] == "rotating-radars" else max(2, seeds // 2))
         scenes = [simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting) for k in range(count)]
-        found = {name: [judge_own_times(name, scene) for scene in scenes] for name in names}
-        for name, runs in found.items():
-            claims += claims_of(label, name, runs)
+        told, found = compare(label, names, scenes, judge_own_times)
+        claims += told
         for name in NEAR_ORACLE:
-            if {name, "oracle"} <= set(found):
-                ratio = means(found[name]) / means(found["oracle"])
-                claims.append(goal(f"{label}: GOSPA, {name} / oracle", "", ratio, WITHIN_ORACLE))
+            claims += beside(label, name, "oracle", found, WITHIN_ORACLE)
     if "multi-sensor" not in names:
         return claims
     setting = settings["thirty airliners"] | {"duration": 100.0 if quick else 200.0}

@@ -19,7 +19,7 @@ from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth,
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE
 from experiments.common.claims import Claim
 from experiments.common.command import main
-from experiments.trackers.judging import NAMES, claims_of, goal, judge, means
+from experiments.trackers.judging import NAMES, beside, compare
 
 TARGETS, SCANS, INTERVAL = 12, 40, 4.0
 REGION = np.array([[-30_000.0, 30_000.0], [-30_000.0, 30_000.0], [0.0, 12_000.0]])
@@ -142,13 +142,8 @@ def experiment(chosen: Namespace) -> list[Claim]:
     quick, seeds = chosen.quick, range(chosen.seed, chosen.seed + (2 if chosen.quick else chosen.seeds))
     for label, setting in list(SETTINGS.items())[: 2 if quick else None]:
         scenes = [simulate(setting, seed, 8 if quick else SCANS) for seed in seeds]
-        found = {name: [judge(name, scene) for scene in scenes] for name in chosen.names}
-        for name, runs in found.items():
-            claims += claims_of(label, name, runs)
-        if not {"mht", "multi-sensor"} <= set(found):
-            continue
-        difference = means(found["mht"]) - means(found["multi-sensor"])
-        claims.append(goal(f"{label}: GOSPA, mht - multi-sensor", "m", difference, 0.0, surely=label in CLEARLY_BETTER))
+        told, found = compare(label, chosen.names, scenes)
+        claims += told + beside(label, "mht", "multi-sensor", found, 0.0, surely=label in CLEARLY_BETTER)
     return claims
 
 

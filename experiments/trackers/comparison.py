@@ -16,32 +16,24 @@ from assoc import simulation
 from assoc.scene import Scene
 from experiments.common.claims import Claim
 from experiments.common.command import add_recording, main
-from experiments.trackers.judging import NAMES, claims_of, goal, judge, mean_claim, means
+from experiments.trackers.judging import NAMES, beside, compare, goal
 
 WITHIN_ORACLE = 1.02
 """Recorded traffic: GOSPA of the multi-sensor tracker, as a multiple of the oracle's."""
 
 
-def compare(label: str, scenes: list[Scene], names: Sequence[str]) -> list[Claim]:
+def all_trackers(label: str, scenes: list[Scene], names: Sequence[str]) -> list[Claim]:
     """Trackers of these names on the same scenes."""
-    found = {name: [judge(name, scene) for scene in scenes] for name in names}
-    claims = []
+    claims, found = compare(label, names, scenes)
     for name, runs in found.items():
-        claims += claims_of(label, name, runs)
         claims += [
             Claim(f"{label}, {name}: {part}", "m", ours=float(np.mean([run.parts[part] for run in runs])))
             for part in ("localisation", "missed", "false")
         ]
-    others = {"multi-sensor": "nearest-neighbour", "mht": "nearest-neighbour", "static": "multi-sensor"}
-    for name, other in others.items():
-        if {name, other} <= set(found):
-            difference = means(found[name]) - means(found[other])
-            claims.append(mean_claim(f"{label}: GOSPA, {name} - {other}", "m", difference))
+    claims += beside(label, "multi-sensor", "oracle", found, WITHIN_ORACLE)
     if {"multi-sensor", "oracle"} <= set(found):
-        best, oracle = found["multi-sensor"], found["oracle"]
-        ratio = means(best) / means(oracle)
-        claims.append(goal(f"{label}: GOSPA, multi-sensor / oracle", "", ratio, WITHIN_ORACLE))
-        switches = np.array([float(a.switches - b.switches) for a, b in zip(best, oracle, strict=True)])
+        pairs = zip(found["multi-sensor"], found["oracle"], strict=True)
+        switches = np.array([float(a.switches - b.switches) for a, b in pairs])
         claims.append(goal(f"{label}: switches, multi-sensor - oracle", "", switches, 0.0, surely=False))
     return claims
 
@@ -51,11 +43,11 @@ def experiment(chosen: argparse.Namespace) -> list[Claim]:
     seed, names = int(np.random.default_rng(chosen.seed).integers(2**31)), chosen.names
     count, length = (2, 15) if chosen.quick else (10, 100)
     scenes = [simulation.simulate("three-radar", seed + k, scans=length) for k in range(count)]
-    claims = compare("three radars", scenes, names)
+    claims = all_trackers("three radars", scenes, names)
     if chosen.file is not None:
         runs = range(1 if chosen.quick else chosen.seeds)
         scenes = [simulation.simulate("from-tracks", seed + k, file=chosen.file) for k in runs]
-        claims += compare("recorded traffic", scenes, names)
+        claims += all_trackers("recorded traffic", scenes, names)
     return claims
 
 

@@ -1,6 +1,6 @@
 """Running trackers and judging them, beside an oracle: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -161,6 +161,26 @@ def distances(scene: Scene, tracks: Trajectories, cutoff: float = CUTOFF) -> Arr
 def means(runs: Sequence[Judged]) -> Array:
     """Mean GOSPA of each run, metres."""
     return np.array([run.distances.mean() for run in runs])
+
+
+def compare(
+    label: str, names: Sequence[str], scenes: Sequence[Scene], judge: Callable[[str, Scene], Judged] = judge
+) -> tuple[list[Claim], dict[str, list[Judged]]]:
+    """What trackers of these names did on the same scenes: the claims, and all runs."""
+    found = {name: [judge(name, scene) for scene in scenes] for name in names}
+    return [claim for name, runs in found.items() for claim in claims_of(label, name, runs)], found
+
+
+def beside(
+    label: str, name: str, other: str, runs: Mapping[str, Sequence[Judged]], most: float, **how: bool
+) -> list[Claim]:
+    """The goal for GOSPA of a tracker beside another's: as a ratio to the oracle's, else as a difference."""
+    if not {name, other} <= set(runs):
+        return []
+    first, second = means(runs[name]), means(runs[other])
+    if other == "oracle":
+        return [goal(f"{label}: GOSPA, {name} / oracle", "", first / second, most, **how)]
+    return [goal(f"{label}: GOSPA, {name} - {other}", "m", first - second, most, **how)]
 
 
 def claims_of(label: str, name: str, runs: Sequence[Judged]) -> list[Claim]:

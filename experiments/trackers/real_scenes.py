@@ -12,7 +12,6 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.views import BANDS
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
-from assoc.registration import register
 from assoc.scene import Scene
 from assoc.sensors import Platform, PositionSensor, Radar2D, Radar3D, Sensor
 from assoc.simulation.observation import observe
@@ -112,22 +111,6 @@ def _left(scene: Scene, kept: Sequence[Sequence[Array]]) -> Scene:
 def _with(scene: Scene, measurements: Any, sources: Any) -> Scene:
     """The scene with these measurements, each of one of these targets."""
     return replace(scene, measurements=measurements, truth=replace(scene.truth, sources=sources))
-
-
-def splitting(seed: int) -> Case:
-    """Six targets; a second one leaves each at half time, at 5 to 15 m/s."""
-    rng = np.random.default_rng(seed)
-    half, count = SCANS // 2, TARGETS // 2
-    heading, speed = rng.uniform(-np.pi, np.pi, count), rng.uniform(150.0, 230.0, count)
-    ahead = level(heading, np.ones(count))
-    aside = np.stack([-np.sin(heading), np.cos(heading), np.zeros(count)], axis=1)
-    middle = rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (count, 3))
-    after = (TIMES - TIMES[half])[:, None, None]
-    parents = middle + after * speed[:, None] * ahead
-    parted = parents + np.maximum(after, 0.0) * rng.uniform(5.0, 15.0, (count, 1)) * aside
-    ids = [np.arange(count if k <= half else TARGETS) for k in range(SCANS)]
-    paths = [np.concatenate([parents[k], parted[k]])[: len(ids[k])] for k in range(SCANS)]
-    return Case(observe(radars(SEPARATE), TIMES, ids, paths, rng, region=REGION))
 
 
 def _all_seen(paths: Array, rng: np.random.Generator, interval: float = INTERVAL) -> Case:
@@ -252,68 +235,6 @@ def flat_radars(seed: int, height: float | None = None) -> Case:
     return Case(scene, options={"filter": filter}, level=True)
 
 
-def abreast(seed: int, gap: float) -> Case:
-    """Two targets side by side for the whole time."""
-    rng = np.random.default_rng(seed)
-    heading = rng.uniform(-np.pi, np.pi)
-    ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
-    side = np.array([[-0.5], [0.5]]) * gap * np.array([-ahead[1], ahead[0], 0.0])
-    paths = [0.0, 0.0, 6e3] + side + (200.0 * (TIMES - TIMES.mean()))[:, None, None] * ahead
-    return _all_seen(paths, rng)
-
-
-def landing(seed: int) -> Case:
-    """Aircraft at 75 m/s on glide paths of 3 degrees, 5 km apart, to three runways 5 km before each radar."""
-    rng = np.random.default_rng(seed)
-    places = on_circle(np.zeros(3), 20e3, 3)
-    sensors = [_radar(place, f"radar {number}") for number, place in enumerate(places, 1)]
-    ids, paths = [], []
-    first = rng.uniform(3e3, 8e3, 3)
-    for t in TIMES.tolist():
-        left = first[:, None] + 5e3 * np.arange(TARGETS // 3) - 75.0 * t
-        along = -places / np.linalg.norm(places, axis=1)[:, None]
-        where = (places + 5e3 * along)[:, None] + left[..., None] * along[:, None]
-        where[..., 2] = np.tan(np.radians(3.0)) * left
-        flying = left.ravel() > 0
-        ids.append(np.flatnonzero(flying))
-        paths.append(where.reshape(-1, 3)[flying])
-    return Case(observe(sensors, TIMES, ids, paths, rng, region=REGION))
-
-
-def crossing(seed: int) -> Case:
-    """Pairs that meet at half time at right angles, 50 m off."""
-    rng, pairs = np.random.default_rng(seed), TARGETS // 2
-    middle = np.repeat(rng.uniform([-12e3, -12e3, 4e3], [12e3, 12e3, 10e3], (pairs, 3)), 2, axis=0)
-    middle[:, 2] = np.repeat(rng.permutation(np.linspace(2e3, 10e3, pairs)), 2)
-    middle[:, :2] += rng.normal(0.0, 50.0, (TARGETS, 2))
-    heading = np.repeat(rng.uniform(-np.pi, np.pi, pairs), 2) + np.tile([0.0, np.pi / 2], pairs)
-    paths = middle + (TIMES - TIMES.mean())[:, None, None] * level(heading, np.full(TARGETS, 200.0))
-    return _all_seen(paths, rng)
-
-
-def hovering(seed: int) -> Case:
-    """Drones that stand for half of the time, then fly at 5 to 15 m/s."""
-    rng = np.random.default_rng(seed)
-    velocity = level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(5.0, 15.0, TARGETS))
-    start = rng.uniform([-15e3, -15e3, 300.0], [15e3, 15e3, 1500.0], (TARGETS, 3))
-    return _all_seen(start + np.maximum(TIMES - TIMES.mean(), 0.0)[:, None, None] * velocity, rng)
-
-
-def late_clock(seed: int) -> Case:
-    """The stamps of the second radar are late by 0.5 s, and found by registration; the first has the right time."""
-    scene = simulate(SEPARATE, seed)
-    truth = scene.truth
-    velocity = (truth.positions[1] - truth.positions[0]) / INTERVAL
-    before = [at - 0.5 * velocity for at in truth.positions]
-    rng = np.random.default_rng([seed, 1])
-    late = observe(scene.sensors[1:2], scene.times, truth.target_ids, before, rng, region=REGION)
-    measurements = [[a, b, c] for (a, _, c), (b,) in zip(scene.measurements, late.measurements, strict=True)]
-    sources = [[a, b, c] for (a, _, c), (b,) in zip(truth.sources, late.truth.sources, strict=True)]
-    scene = _with(scene, measurements, sources)
-    found = register(scene, components=("time",), reference=(scene.sensors[0].name,))
-    return Case(found.correct(scene))
-
-
 def under_way(seed: int) -> Case:
     """Three radars on ships that circle at 10 m/s."""
     rng, times = np.random.default_rng(seed), np.arange(0.0, INTERVAL * SCANS)
@@ -380,9 +301,6 @@ ROWS: dict[str, Row] = {
     "one 2-D radar, 100 false alarms, declared 20": Row(lambda seed: one_planar(seed, 20.0)),
     "one 2-D radar, 100 false alarms, declared 500": Row(lambda seed: one_planar(seed, 500.0)),
     "dark band of 4 km": Row(dark_band),
-    "splitting": Row(splitting),
-    "100 m abreast": Row(lambda seed: abreast(seed, 100.0)),
-    "200 m abreast": Row(lambda seed: abreast(seed, 200.0)),
     "formations": Row(lambda seed: Case(simulate(SETTINGS["formations"], seed)), {"gospa": 205.0}, judged=JOINT),
     "formations, range rates": Row(range_rates),
     "radars on ships under way": Row(under_way),
@@ -391,11 +309,5 @@ ROWS: dict[str, Row] = {
         lambda seed: Case(simulate(_separate(detection_probability=0.6), seed)), harmless=True
     ),
     "P_d 0.9, declared 0.6": Row(misdeclared(_separate(detection_probability=0.6), SEPARATE), harmless=True),
-    "noise half the declared": Row(misdeclared(_separate(noise=NOISY), SEPARATE), harmless=True),
     "five times the false alarms": Row(misdeclared(SEPARATE, _separate(false_alarms=50.0)), harmless=True),
-    "a fifth of the false alarms": Row(misdeclared(SEPARATE, _separate(false_alarms=2.0)), harmless=True),
-    "landing": Row(landing, harmless=True),
-    "crossings at right angles": Row(crossing, harmless=True),
-    "hovering drones": Row(hovering, harmless=True),
-    "clock off by 0.5 s, registered": Row(late_clock, harmless=True),
 }
