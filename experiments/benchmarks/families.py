@@ -110,12 +110,12 @@ def cases() -> list[Case]:
 
 def _paper_cases() -> Iterator[Case]:
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "greedy", "milp"), 1.0)
-    peers = _entries(("highs", "sequential", "nrl_tracker"), 10.0)
+    peers = _entries(("highs", "sequential"), 10.0)
     yield Case("paper", "3 radars", _scans(scenes.three_radar), peers + ours)
 
 
 def _gated_cases() -> Iterator[Case]:
-    peers = _entries(("cp_sat", "highs", "scip", "scip_1", "sequential", "nrl_tracker"), 60.0)
+    peers = _entries(("cp_sat", "highs", "scip", "scip_1", "sequential"), 60.0)
     for sensors, targets, limit in ((3, 100, 1.0), (3, 300, 1.0), (3, 1000, 3.0), (4, 300, 3.0), (5, 200, 3.0)):
         ours = (
             Entry("exact", 60.0),
@@ -141,11 +141,11 @@ def _ghost_cases() -> Iterator[Case]:
         ours += (Entry("annealing", 60.0),) if targets <= 40 else ()
         names = ("cp_sat", "highs", "scip", *(("scip_1",) if targets == 20 else ()))
         peers = [Entry(name, limit) for name in names for limit in limits]
-        peers += [Entry("sequential", 5.0), Entry("nrl_tracker", 60.0)]
+        peers.append(Entry("sequential", 5.0))
         # codes for independent sets, two of them where their graph is not too large; none gives a proof, and that
         # is the question at 20 targets
         late = 10.0 if targets == 20 else 60.0
-        peers += [Entry("kap", late), *(Entry("chils", limit) for limit in sorted({min(limits[0], late), late}))]
+        peers += [Entry("chils", limit) for limit in sorted({min(limits[0], late), late})]
         peers += _entries(("branch_reduce", "mmwis"), late) if targets <= 40 else ()
         brief = {20: 10, 40: 5}.get(targets, 2)
         yield Case("ghost", str(targets), _scans(scenes.ghost, targets), (*peers, *ours), _seeds(seeds), brief)
@@ -169,7 +169,7 @@ def _synthetic_cases() -> Iterator[Case]:
     for n, limit, seeds in ((10, 5.0, 10), (20, 5.0, 10), (30, 5.0, 10), (50, 10.0, 5), (100, 10.0, 3)):
         ours = (Entry("exact", 20.0), *_entries((*HEURISTICS, "lagrangian", "greedy"), limit))
         peers = (Entry("highs", 30.0), Entry("scip_1", 30.0), Entry("cp_sat", 10.0))
-        peers += _entries(("sequential", "nrl_tracker"), limit)
+        peers += _entries(("sequential",), limit)
         if n == 100:
             # a million tuples, which no other solver takes
             ours, peers = ours[:1], _entries(("sequential",), limit)
@@ -180,7 +180,7 @@ def _synthetic_cases() -> Iterator[Case]:
         ours, peers = _entries(("exact",), 60.0), _entries(("highs", "scip_1"), 60.0)
         if n in limits:
             ours += _entries((*HEURISTICS, "lagrangian", "greedy"), limits[n])
-            peers += (Entry("cp_sat", 30.0), *_entries(("sequential", "nrl_tracker"), limits[n]))
+            peers += (Entry("cp_sat", 30.0), Entry("sequential", limits[n]))
         yield Case("random axial", f"n={n}", _one(synthetic.axial_random, n), peers + ours)
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "milp", "greedy"), 5.0)
     peers = _entries(("highs", "cp_sat", "sequential"), 30.0)

@@ -35,8 +35,8 @@ Instances are code and seed (`experiments/common/instances`); the seeds here, fr
 Times are medians, from the tuples to the Solution, after warm-up; that of the processor where it is shorter than the
 wall's: what else ran on the machine does not count. Our solvers have one core. Peers (other solvers) get the same
 tuples in the same process: CP-SAT (costs times 1e6, rounded), SCIP, HiGHS (gap 1e-9), independent sets (`chils`,
-`branch_reduce`, `mmwis`, which prove nothing), `kap` and `nrl_tracker` where their form allows it. With `--processes`
-in the command above everybody had one core. *One by one* assigns one sensor at a time with scipy, as most trackers do.
+`branch_reduce`, `mmwis`, which prove nothing). With `--processes` in the command above everybody had one core. *One by
+one* assigns one sensor at a time with scipy, as most trackers do.
 Independent code checks the feasibility and cost of every answer.
 
 Every run of every solver, with cost, bound, wall and processor time, is a row of the CSV (`docs/benchmarks.csv`); here
@@ -79,7 +79,7 @@ def _missing(rows: Sequence[Row]) -> str:
 
 def head(minutes: float | None, command: str) -> str:
     """Say how to repeat a run, how long it took, and on what machine."""
-    names = ("numpy", "scipy", "numba", "ortools", "nrl-tracker")
+    names = ("numpy", "scipy", "numba", "ortools")
     versions = ", ".join(f"{name} {version}" for name in names if (version := _version(name)))
     took = "" if minutes is None else f" in {minutes:.1f} minutes"
     return (

@@ -10,11 +10,9 @@ the model, but not importing the package, nor compiling. The cost of its answer 
 ``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
 ``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
 ``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
-``nrl_tracker``         PyPI ``nrl-tracker``: 100 iterations on a dense axial tensor; takes no limit
 ``chils``               CHILS, local search for the heaviest independent set (packing_peers.py)
 ``branch_reduce``       KaMIS's branch and reduce for it
 ``mmwis``               KaMIS's memetic algorithm for it
-``kap``                 PyPI ``kap``: multiple Hungarian method on the costs of pairs
 ``stone_soup``          Stone Soup's multi-frame assignment (multi_frame_peer.py); takes no limit
 ======================  ==========================================================================
 """
@@ -44,7 +42,7 @@ ONE_CORE = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
 """Peers that take two cores, and what they are called on one."""
 _INDEPENDENT_SETS = ("chils", "branch_reduce", "mmwis")
 # of the extra `peers`: what others need comes with the package, or they look for it themselves
-_PACKAGES = {"kap": "kap", "nrl_tracker": "pytcl", **dict.fromkeys(_INDEPENDENT_SETS, "chszlablib")}
+_PACKAGES = dict.fromkeys(_INDEPENDENT_SETS, "chszlablib")
 _UNLIMITED = 1_000_000_000
 _TINY = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
 
@@ -94,9 +92,7 @@ _OTHERS: dict[str, Callable[[AssignmentProblem, float], tuple[Any, ...]]] = {
     "scip_1": partial(peers.scip, 1),
     "highs": peers.highs,
     "sequential": assign_in_turn,
-    "nrl_tracker": peers.nrl_tracker,
     "stone_soup": multi_frame_peer.multi_frame,
-    "kap": packing_peers.kap,
     **{name: partial(packing_peers.independent_set, name) for name in _INDEPENDENT_SETS},
 }
 
@@ -133,16 +129,13 @@ def warm_up(names: Collection[str]) -> None:
 
 def not_installed() -> list[str]:
     """Packages of peers that are not installed (extra ``peers``)."""
-    missing = {package for package in _PACKAGES.values() if importlib.util.find_spec(package) is None}
-    return sorted("nrl-tracker" if package == "pytcl" else package for package in missing)
+    return sorted({package for package in _PACKAGES.values() if importlib.util.find_spec(package) is None})
 
 
 def takes(name: str, problem: AssignmentProblem = _TINY) -> bool:
     """Whether a contestant is installed and can take a problem; without one, whether it is installed."""
     if importlib.util.find_spec(_PACKAGES.get(name, "scipy")) is None:
         return False
-    if name == "nrl_tracker":
-        return peers.dense_elements(problem) <= peers.DENSE_LIMIT
     if name == "stone_soup":
         return multi_frame_peer.available(problem)
     # the heaviest independent set is a solution where measurements may be left alone

@@ -1,17 +1,12 @@
-"""Peers that know another form of the problem: weighted independent sets, and assignment by pairs.
+"""Codes for weighted independent sets as peers.
 
-**Independent sets.** Tuples that save something against false alarms are the vertices of a graph, weighted by what they
-save; those that share a measurement are joined. The heaviest independent set is the best association with dummies.
-Three of the best codes for it, all in the package ``chszlablib``: CHILS (Grossmann, Langedal and Schulz; concurrent
-local search with reductions; also a package of its own, which takes a graph edge by edge), and KaMIS's weighted branch
-and reduce and its memetic algorithm (Lamm, Schulz, Strash and others).
-
-**Pairs.** ``kap`` is Gabrovsek's multiple Hungarian method: costs are given for pairs of measurements alone, and a
-tuple costs the sum of its pairs. Its tuples are priced by our costs afterwards, and those that save nothing are false
-alarms.
+Tuples that save something against false alarms are the vertices of a graph, weighted by what they save; those that
+share a measurement are joined. The heaviest independent set is the best association with dummies. Three of the best
+codes for it, all in the package ``chszlablib``: CHILS (Grossmann, Langedal and Schulz; concurrent local search with
+reductions; also a package of its own, which takes a graph edge by edge), and KaMIS's weighted branch and reduce and its
+memetic algorithm (Lamm, Schulz, Strash and others).
 """
 
-import itertools
 import os
 from typing import Any
 
@@ -109,27 +104,3 @@ def independent_set(kind: str, problem: AssignmentProblem, time_limit: float) ->
         search = _kamis_wmis.branch_reduce if kind == "branch_reduce" else _kamis_mmwis.mmwis_solver
         _, found = search(ends.astype(np.int32), neighbours, weights.astype(np.int32), time_limit, 0)
     return with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
-
-
-def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """Multiple Hungarian method on the costs of pairs, algorithm "Fm"; it takes no time limit."""
-    from kap import k_assignment
-
-    saved = savings(problem)
-    count = (problem.tuples > 0).sum(axis=1)
-    matrices = []
-    for first, second in itertools.combinations(range(problem.num_sensors), 2):
-        matrix = np.zeros((problem.sizes[first], problem.sizes[second]))
-        pairs = np.flatnonzero((count == 2) & (problem.tuples[:, first] > 0) & (problem.tuples[:, second] > 0))
-        np.minimum.at(matrix, (problem.tuples[pairs, first] - 1, problem.tuples[pairs, second] - 1), -saved[pairs])
-        matrices.append(matrix)
-    listed = {tuple(row): place for place, row in enumerate(problem.tuples.tolist())}
-    chosen = []
-    for match in k_assignment(matrices, algo="Fm", random_state=0).matches:
-        row = [0] * problem.num_sensors
-        for sensor, measurement in match:
-            row[sensor] = measurement + 1
-        place = listed.get(tuple(row))
-        if place is not None and saved[place] > 0:
-            chosen.append(place)
-    return with_false_alarms(problem, np.array(sorted(chosen), dtype=np.intp)), None, False

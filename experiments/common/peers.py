@@ -1,4 +1,4 @@
-"""Peers that are general solvers, and one of its own kind: how each is given the tuples, and what it chooses."""
+"""Peers that are general solvers: how each is given the tuples, and what it chooses."""
 
 import datetime
 from collections.abc import Callable, Iterable
@@ -8,12 +8,11 @@ import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csc_array
 
-from assoc._types import Array, Floats, Ints
+from assoc._types import Array, Ints
 from assoc.problem import AssignmentProblem
 from experiments.common.packing_peers import Chosen
 
 CP_SAT_SCALE = 1e6
-DENSE_LIMIT = 8_000_000
 
 
 def _rows(problem: AssignmentProblem) -> tuple[Ints, Ints, Array]:
@@ -130,57 +129,3 @@ def highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
     if result.x is None:
         return None, bound, False
     return np.flatnonzero(result.x > 0.5), bound, result.status == 0
-
-
-def dense_elements(problem: AssignmentProblem) -> float:
-    """Return the elements of the dense axial tensor that ``nrl_tracker`` needs.
-
-    A problem with dummies becomes an axial one by giving every measurement a private dummy: with N
-    measurements in all, N^S elements.
-    """
-    if problem.dummy:
-        return float(problem.sizes.sum()) ** problem.num_sensors
-    return float(np.prod(problem.sizes.astype(float)))
-
-
-def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """The relaxation of ``nrl-tracker`` on a dense tensor; it takes no time limit."""
-    if dense_elements(problem) > DENSE_LIMIT:
-        raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
-    from pytcl.assignment_algorithms.nd_assignment import relaxation_assignment_nd
-
-    large = 1e4 + float(np.abs(problem.costs).max(initial=0.0))
-    sizes = problem.sizes.astype(np.int64)
-    shape = (int(sizes.sum()),) * problem.num_sensors if problem.dummy else tuple(sizes.tolist())
-    tensor = np.full(shape, large)
-    if problem.dummy:
-        _fill_with_dummies(tensor, problem)
-    else:
-        np.minimum.at(tensor, tuple((problem.tuples - 1).T), problem.costs)
-    result = relaxation_assignment_nd(tensor)
-    picked = result.assignments + 1
-    if problem.dummy:
-        picked = np.where(picked > sizes, 0, picked)
-        picked = picked[picked.any(axis=1)]
-    listed: dict[tuple[int, ...], int] = {}
-    for i in np.argsort(-problem.costs, kind="stable"):
-        listed[tuple(problem.tuples[i].tolist())] = int(i)
-    keys = [tuple(row) for row in picked.tolist()]
-    # Its multipliers are free in sign, wrong for indices that may stay unused: on a rectangular problem
-    # (3 x 5 x 4) we saw its bound above the optimum and a wrong answer called converged.
-    square = len(set(shape)) == 1
-    bound = result.cost - result.gap if square else None
-    if not all(key in listed for key in keys):
-        return None, bound, False
-    return np.array([listed[key] for key in keys], dtype=np.intp), bound, result.converged and square
-
-
-def _fill_with_dummies(tensor: Floats, problem: AssignmentProblem) -> None:
-    """Write the costs into every place where a 0 may be any of the dummies of its sensor."""
-    sizes = problem.sizes.tolist()
-    tensor[tuple(slice(size, None) for size in sizes)] = 0.0
-    for key, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
-        cells = tuple(
-            slice(index - 1, index) if index else slice(size, None) for index, size in zip(key, sizes, strict=True)
-        )
-        np.minimum(tensor[cells], cost, out=tensor[cells])

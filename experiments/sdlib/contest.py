@@ -29,7 +29,7 @@ from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 
 Row = dict[str, Any]
-_NO_LIMIT = ("kap", "nrl_tracker", "stone_soup", "sequential")
+_NO_LIMIT = ("stone_soup", "sequential")
 CONTESTANTS = (
     "exact", "milp", "lagrangian", "aco", "genetic", "tabu", "greedy", "cp_sat", "scip", "highs",
     "chils", "branch_reduce", "mmwis", *_NO_LIMIT,
