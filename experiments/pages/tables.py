@@ -10,7 +10,7 @@ from experiments.common.claims import Claim
 from experiments.common.results import RESULTS, Results, number, plain_table, table
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS
-from experiments.real.air_traffic import UNITS, WAYS, WHAT
+from experiments.real.air_traffic import UNITS, WHAT
 from experiments.real.autoferry import SETS
 from experiments.sdlib import store
 from experiments.sdlib.comparison import comparison_tables
@@ -302,15 +302,13 @@ def air_traffic() -> str:
 
 
 def air_traffic_association() -> str:
-    """Wrong plots and mixed tracks, by way to associate."""
+    """Wrong plots and mixed tracks."""
     r = Results("real.air_traffic")
     rows = [
-        [kind, way, *(mean(r[f"{kind}, {way}: {what}"], 2) for what in WHAT)]
+        [kind, *(mean(r[f"{kind}, assoc: {what}"], 2) for what in WHAT)]
         for kind in labels(r, f", {next(iter(_ACCURACY))}")
-        for way in WAYS
     ]
-    return table(["flights", "by", *(f"{what}{', %' if UNITS[what] else ''}" for what in WHAT)], rows,
-                 lambda column: column > 1)  # fmt: skip
+    return table(["flights", *(f"{what}{', %' if UNITS[what] else ''}" for what in WHAT)], rows)
 
 
 def _excess(claim: Claim) -> str:

@@ -3,12 +3,11 @@
 Four turning radars with errors of range, azimuth and gain see the flights of FILE (trajectories, as for from-tracks)
 and simulated ones, while 0, 20 and 100 % of the aircraft have no transponder: their plots have neither altitude, code
 nor address (primary only). The radars are registered, the plots tracked without codes and addresses, and the tracks
-smoothed. Beside it stands an association by address, code and distance, made after the description in the manual of
-OpenATS COMPASS ("Calculate Unique Targets"): from the same corrected plots alone, and with our tracks as its tracker's.
+smoothed.
 """
 
 import math
-from collections.abc import Sequence
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path as File
 from typing import NamedTuple
 
@@ -30,7 +29,7 @@ from assoc.simulation.radars import on_circle
 from assoc.simulation.turning import Path
 from assoc.tracking import TRACKERS, TrackTable, smoothed, track_scene
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, add_seeds, make_parser, run
+from experiments.common.command import main
 from experiments.trackers.judging import mean_claim
 
 SHARES = (0.0, 0.2, 1.0)
@@ -40,8 +39,6 @@ NOISE, HEIGHT_NOISE, DETECTION, FALSE_PLOTS, LOST = (60.0, math.radians(0.06)), 
 BIASES = {"range": 100.0, "azimuth": math.radians(0.1), "gain": 5e-4}
 """Standard deviations from which each radar's are drawn: metres, radians, metres per metre."""
 DURATION, AIRCRAFT, SEEDS = 150.0, 40, 3
-COMPARISON, FARTHEST, HIGHEST = 15.0, 3704.0, 300 * 0.3048
-"""Of the association by distance, defaults of COMPASS's manual: seconds, metres, metres of altitude."""
 
 
 class Traffic(NamedTuple):
@@ -227,62 +224,6 @@ def tracked(seen: Observed, scene: Scene) -> Tracked:
     return Tracked(np.where(confirmed, taken, 0), shown, smoothed(tracker, scene, decisions))
 
 
-def by_distance(seen: Observed, scene: Scene, tracks: TrackTable | None) -> Array:
-    """Targets (n,) of all plots by address, else code, altitude and distance, 0 for none, after COMPASS's manual.
-
-    A target is a track of the system tracker, tracks of one address together, or an address that no track has. A plot
-    with an address belongs to that target. Another one belongs to the nearest target within 3,704 m whose position is
-    known within 15 s before or after, if neither the codes nor, by more than 300 feet, the altitudes differ; else to
-    none. Positions are those of the system's tracks, in between interpolated; of a target without, of its plots.
-    """
-    plots = _flat(seen, scene)
-    targets: dict[object, list[Array]] = {}
-    if tracks is not None:
-        frame = tracks.to_frame()
-        for number, rows in frame.groupby("track_id"):
-            address, code = tracks.identities.get(int(number), ("", ""))
-            known = np.full(len(rows), int(code, 8) if code else 0)
-            reports = np.column_stack([rows[["time", "x", "y", "z"]].to_numpy(), known])
-            targets.setdefault(int(address, 16) if address else ("track", number), []).append(reports)
-    for address in np.unique(plots[:, 5][plots[:, 5] > 0]).astype(int).tolist():
-        if address not in targets:
-            targets[address] = [plots[plots[:, 5] == address, :5]]
-    found = np.zeros(len(plots), dtype=np.int64)
-    open_plots = np.flatnonzero(plots[:, 5] == 0)
-    nearest = np.full(len(open_plots), FARTHEST)
-    t, x, y, z, code = plots[open_plots, :5].T
-    for number, (name, parts) in enumerate(targets.items(), 1):
-        reports = np.concatenate(parts)
-        reports = reports[np.argsort(reports[:, 0], kind="stable")]
-        if not isinstance(name, tuple):
-            found[plots[:, 5] == name] = number
-        after = np.searchsorted(reports[:, 0], t)
-        before, after = np.clip(after - 1, 0, None), np.clip(after, None, len(reports) - 1)
-        at = [np.interp(t, reports[:, 0], column) for column in reports[:, 1:4].T]
-        apart = np.hypot(x - at[0], y - at[1])
-        close = np.minimum(np.abs(reports[before, 0] - t), np.abs(reports[after, 0] - t)) <= COMPARISON
-        same = (code == 0) | (reports[after, 4] == 0) | (code == reports[after, 4])
-        level = np.isnan(z) | np.isnan(at[2]) | (np.abs(z - at[2]) <= HIGHEST)
-        better = (apart < nearest) & close & same & level
-        nearest[better] = apart[better]
-        found[open_plots[better]] = number
-    return found
-
-
-def _flat(seen: Observed, scene: Scene) -> Array:
-    """Time, x, y, z (NaN: unknown), code and address of all plots (n, 6), in the order of scans and sensors."""
-    rows = []
-    for k, scan in enumerate(scene.measurements):
-        for s, sensor in enumerate(scene.sensors):
-            z, known = scan[s], seen.identities[k][s]
-            height = z[:, 2] if sensor.dim == 3 else np.full(len(z), np.nan)
-            above = np.nan_to_num(height - sensor.position[2])
-            ground = np.sqrt(np.maximum(z[:, 0] ** 2 - above**2, 0.0))
-            place = [sensor.position[0] + ground * np.cos(z[:, 1]), sensor.position[1] + ground * np.sin(z[:, 1])]
-            rows.append(np.column_stack([scene.measurement_times[k][s], *place, height, known]))
-    return np.concatenate(rows)
-
-
 def track_errors(table: TrackTable, leaders: dict[int, int], traffic: Traffic) -> tuple[float, float]:
     """Horizontal RMSE of tracks, metres, and their squared errors in squared standard deviations, mean by axis."""
     frame, errors, scaled = table.to_frame(), [], []
@@ -311,11 +252,7 @@ def row(traffic: Traffic, primary: float, duration: float, seed: int) -> dict[st
         found[f"reference, {label}: RMSE"], scaled = track_errors(done.finished, leaders, traffic)
     found["reference, registered: squared error / stated"] = scaled
     found["tracks as shown, registered: RMSE"], _ = track_errors(done.shown, leaders, traffic)
-    judgements = [own]
-    for system in (None, done.shown):
-        judgements.append(judged(by_distance(seen, registered, system), sources, owners)[0])
-    for way, values in zip(WAYS, judgements, strict=True):
-        found |= {f"{way}: {what}": value for what, value in zip(WHAT, values, strict=True)}
+    found |= {f"assoc: {what}": value for what, value in zip(WHAT, own, strict=True)}
     return found
 
 
@@ -323,20 +260,19 @@ def _rms(values: Array) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
-WAYS = ("assoc", "address, code, distance", "address, code, distance, our tracks")
 WHAT = ("wrong plots", "mixed tracks", "plots of aircraft left out", "tracks of an aircraft")
 UNITS = dict(zip(WHAT, ("%", "%", "%", ""), strict=True)) | {"RMSE": "m"}
 
 
-def experiment(file: str | None, kinds: Sequence[str], quick: bool, seed: int, seeds: int = SEEDS) -> list[Claim]:
+def experiment(chosen: Namespace) -> list[Claim]:
     """All shares of aircraft without a transponder, on simulated flights and on those of a file."""
     claims: list[Claim] = []
-    duration = 40.0 if quick else DURATION
-    for kind in kinds:
-        for primary in SHARES[1:2] if quick else SHARES:
+    duration = 40.0 if chosen.quick else DURATION
+    for kind in chosen.names if chosen.file else ["simulated"]:
+        for primary in SHARES[1:2] if chosen.quick else SHARES:
             rows = []
-            for k in range(seed, seed + (1 if quick else seeds)):
-                traffic = simulated(k, duration) if file is None or kind == "simulated" else recorded(file, duration)
+            for k in range(chosen.seed, chosen.seed + (1 if chosen.quick else chosen.seeds)):
+                traffic = simulated(k, duration) if kind == "simulated" else recorded(chosen.file, duration)
                 rows.append(row(traffic, primary, duration, k))
                 shown = {name: round(float(value), 2) for name, value in rows[-1].items()}
                 print(f"{kind}, {primary:.0%}: {shown}", flush=True)
@@ -347,23 +283,20 @@ def experiment(file: str | None, kinds: Sequence[str], quick: bool, seed: int, s
     return claims
 
 
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = make_parser("real.air_traffic", __doc__)
-    parser.add_argument("file", nargs="?", metavar="FILE", help="recorded trajectories (.csv, .parquet)")
-    add_seeds(parser, SEEDS, "scenes: flights if simulated, noise, errors, aircraft without a transponder", least=1)
-    add_only(parser, ("simulated", "recorded"))
-    chosen = parser.parse_args(arguments)
-    if chosen.file is not None and not File(chosen.file).is_file():
-        parser.error(f"{chosen.file}: expected a file of recorded trajectories")
-    kinds = chosen.only or ["simulated", *(["recorded"] if chosen.file else [])]
-    if "recorded" in kinds and chosen.file is None:
-        parser.error("recorded: expected FILE")
-    return run(
-        parser, chosen, lambda quick, rng: experiment(chosen.file, kinds, quick, chosen.seed, chosen.seeds),
-        f"{__doc__} {chosen.seeds} scenes of {DURATION:g} s each.",
-    )  # fmt: skip
+def _add_file(parser: ArgumentParser) -> None:
+    text = "recorded trajectories (.csv, .parquet)"
+    parser.add_argument("file", nargs="?", type=_file, metavar="FILE", help=text)
+
+
+def _file(text: str) -> str:
+    if not File(text).is_file():
+        raise ArgumentTypeError(f"{text}: expected a file of recorded trajectories")
+    return text
 
 
 if __name__ == "__main__":
-    raise SystemExit(program())
+    raise SystemExit(main(
+        "real.air_traffic", experiment, __doc__, options=[_add_file], only=("simulated", "recorded"),
+        seeds=(SEEDS, "scenes: flights if simulated, noise, errors, aircraft without a transponder", 1),
+        said=f" {{seeds}} scenes of {DURATION:g} s each.",
+    ))  # fmt: skip
