@@ -20,7 +20,7 @@ import assoc
 from assoc import solvers
 from assoc._version import __version__ as version
 from assoc.recordings import read_plots
-from experiments.benchmarks import readme, rows
+from experiments.benchmarks import markdown, rows
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -218,18 +218,18 @@ def test_the_example_of_an_own_solver_runs(capsys):
 def test_tables_are_those_of_the_benchmark(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     measured = rows.load(ROOT / "docs" / "benchmarks.csv")
-    assert readme.insert(text, measured) == text, "run python -m experiments.benchmarks --report-only"
+    assert markdown.insert(text, measured) == text, "run python -m experiments.benchmarks --report-only"
 
 
 def test_the_readme_must_have_its_marks():
     with pytest.raises(ValueError, match="expected the marks"):
-        readme.insert(f"{readme.END} {readme.BEGIN}", [])
+        markdown.insert(f"{markdown.END} {markdown.BEGIN}", [])
 
 
 def test_the_paper_has_figures_of_our_tables_and_cites_what_it_lists():
     paper, works = ((ROOT / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
     tables = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "_tables").glob("*.md"))
-    found = re.findall(r"(?<![\w.])\d+\.\d+\b", paper.split(readme.END)[1])
+    found = re.findall(r"(?<![\w.])\d+\.\d+\b", paper.split(markdown.END)[1])
     assert (
         len(found) > 5 and [one for one in found if not re.search(rf"(?<![\d.]){re.escape(one)}(?!\d)", tables)] == []
     )

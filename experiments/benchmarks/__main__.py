@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.benchmarks import markdown, ranking, readme
+from experiments.benchmarks import markdown, ranking
 from experiments.benchmarks import rows as storage
 from experiments.benchmarks.families import Case, Entry, cases, on_one_core
 from experiments.benchmarks.rows import Row
@@ -97,7 +97,7 @@ def _tell(table: Path, report: Path, head: str | None) -> None:
     saved = storage.load(table)
     write_text(report, markdown.render(saved, head))
     for page in filter(Path.exists, PAGES if table == TABLE else ()):
-        write_text(page, readme.insert(page.read_text(encoding="utf-8"), saved))
+        write_text(page, markdown.insert(page.read_text(encoding="utf-8"), saved))
 
 
 def _to_run(what: Row | Case, options: argparse.Namespace) -> bool:

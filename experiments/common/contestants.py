@@ -10,10 +10,10 @@ the model, but not importing the package, nor compiling. The cost of its answer 
 ``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
 ``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
 ``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
-``chils``               CHILS, local search for the heaviest independent set (packing_peers.py)
+``chils``               CHILS, local search for the heaviest independent set
 ``branch_reduce``       KaMIS's branch and reduce for it
 ``mmwis``               KaMIS's memetic algorithm for it
-``stone_soup``          Stone Soup's multi-frame assignment (multi_frame_peer.py); takes no limit
+``stone_soup``          Stone Soup's multi-frame assignment; takes no limit
 ======================  ==========================================================================
 """
 
@@ -29,10 +29,9 @@ import assoc
 from assoc._types import Ints
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
-from experiments.common import annealing, multi_frame_peer, packing_peers, peers
+from experiments.common import annealing, peers
 from experiments.common.checking import check_answer
 from experiments.common.measuring import clocked, fresh, one_core
-from experiments.common.sequential import assign_in_turn
 
 HEURISTICS = ("aco", "genetic", "tabu")
 OURS = ("exact", "milp", "lagrangian", *HEURISTICS, "greedy", "annealing")
@@ -91,9 +90,9 @@ _OTHERS: dict[str, Callable[[AssignmentProblem, float], tuple[Any, ...]]] = {
     "scip": partial(peers.scip, 2),
     "scip_1": partial(peers.scip, 1),
     "highs": peers.highs,
-    "sequential": assign_in_turn,
-    "stone_soup": multi_frame_peer.multi_frame,
-    **{name: partial(packing_peers.independent_set, name) for name in _INDEPENDENT_SETS},
+    "sequential": peers.assign_in_turn,
+    "stone_soup": peers.multi_frame,
+    **{name: partial(peers.independent_set, name) for name in _INDEPENDENT_SETS},
 }
 
 
@@ -137,6 +136,6 @@ def takes(name: str, problem: AssignmentProblem = _TINY) -> bool:
     if importlib.util.find_spec(_PACKAGES.get(name, "scipy")) is None:
         return False
     if name == "stone_soup":
-        return multi_frame_peer.available(problem)
+        return peers.multi_frame_takes(problem)
     # the heaviest independent set is a solution where measurements may be left alone
     return name in LISTENED or (name in _OTHERS and (problem.dummy or name not in _PACKAGES))

@@ -1,17 +1,35 @@
-"""Peers that are general solvers: how each is given the tuples, and what it chooses."""
+"""Peers: how each is given the tuples, and what it chooses.
+
+**General solvers**: CP-SAT, SCIP, HiGHS. **One sensor after the other**, as most trackers do.
+
+**Independent sets.** Tuples that save something against false alarms are the vertices of a graph, weighted by what they
+save; those that share a measurement are joined. The heaviest independent set is the best association with dummies.
+Three of the best codes for it, all in the package ``chszlablib``: CHILS (Grossmann, Langedal and Schulz; concurrent
+local search with reductions), and KaMIS's weighted branch and reduce and its memetic algorithm (Lamm, Schulz, Strash
+and others).
+
+**The optimiser inside Stone Soup's multi-frame assignment**, on any problem with dummies. Stone Soup poses a problem of
+tracks and scans: each track takes one of its hypotheses (a measurement of each scan, or none), each measurement is used
+once, and what no track uses is a false alarm at no cost. It is solved by dual decomposition, a 2-D assignment a scan,
+and SCIP on what the scans do not agree about; at a gap of 2 % it stops. Here the first sensor's measurements are the
+tracks, and each tuple without one is a track of its own that may also use nothing. Costs are against false alarms; a
+track's are raised together so that its cheapest is at 0, since the rule of 2 % is meant for costs above 0.
+"""
 
 import datetime
+import importlib.util
+import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import csc_array
+from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
+from scipy.sparse import csc_array, csr_array
 
-from assoc._types import Array, Ints
+from assoc._types import Array, Floats, Ints
 from assoc.problem import AssignmentProblem
-from experiments.common.packing_peers import Chosen
 
+Chosen = tuple[Ints | None, float | None, bool]
 CP_SAT_SCALE = 1e6
 
 
@@ -129,3 +147,219 @@ def highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
     if result.x is None:
         return None, bound, False
     return np.flatnonzero(result.x > 0.5), bound, result.status == 0
+
+
+def assign_in_turn(problem: AssignmentProblem, time_limit: float) -> tuple[Ints | None, float | None, bool]:
+    """Assign sensor after sensor to the clusters so far; a cluster's cost is its tuple over the sensors seen.
+
+    With dummies a cluster costs what its tuple with all later sensors missed costs, and one that is not
+    listed cannot be formed: this is what a tracker knows when it goes from sensor to sensor. An axial
+    problem has no such tuples; there a cluster is scored by its best completion.
+    """
+    tuples, costs = problem.tuples, problem.costs
+    num_sensors = problem.num_sensors
+    group = np.arange(problem.sizes[0]) + 1
+    clusters = group[:, None].astype(np.int32)
+    for sensor in range(1, num_sensors):
+        size = int(problem.sizes[sensor])
+        whole = ~tuples[:, sensor + 1 :].any(axis=1) if problem.dummy else np.ones(len(tuples), dtype=bool)
+        price = _prefix_costs(tuples[whole, : sensor + 1], costs[whole])
+        now = np.array([price.get((*row, 0), np.inf) for row in clusters.tolist()])
+        alone = np.array([price.get((*([0] * sensor), j + 1), np.inf) for j in range(size)])
+        matrix = np.full((len(clusters), size), np.inf)
+        where = {tuple(row): i for i, row in enumerate(clusters.tolist())}
+        for key, cost in price.items():
+            i = where.get(key[:-1])
+            if i is not None and key[-1]:
+                matrix[i, key[-1] - 1] = cost
+        clusters = _extend(clusters, matrix, now, alone, must_pair=not problem.dummy)
+    listed: dict[tuple[int, ...], int] = {}
+    for i in np.argsort(-costs, kind="stable"):
+        listed[tuple(tuples[i].tolist())] = int(i)
+    chosen: list[int] = []
+    for row in clusters.tolist():
+        if tuple(row) in listed:
+            chosen.append(listed[tuple(row)])
+        elif all(row) or problem.dummy:
+            return None, None, False
+    return np.array(chosen, dtype=np.intp), None, False
+
+
+def _prefix_costs(prefixes: Ints, costs: Floats) -> dict[tuple[int, ...], float]:
+    """Return the least cost of any listed tuple that begins with each prefix."""
+    keys, inverse = np.unique(prefixes, axis=0, return_inverse=True)
+    least = np.full(len(keys), np.inf)
+    np.minimum.at(least, inverse.ravel(), costs)
+    return {tuple(key): cost for key, cost in zip(keys.tolist(), least.tolist(), strict=True)}
+
+
+def _extend(clusters: Ints, matrix: Floats, now: Floats, alone: Floats, *, must_pair: bool) -> Ints:
+    """Solve one 2-D assignment of clusters to measurements and append its column."""
+    num, size = matrix.shape
+    large = 1e6
+    if must_pair:
+        square = np.where(np.isfinite(matrix), matrix, large)
+    else:
+        # What pairing gains over leaving both apart; each cluster has a private "missed" column.
+        apart = np.where(np.isfinite(now), now, 0.0)[:, None] + np.where(np.isfinite(alone), alone, 0.0)
+        square = np.full((num, size + num), large)
+        square[:, :size] = np.where(np.isfinite(matrix), matrix - apart, large)
+        square[np.arange(num), size + np.arange(num)] = 0.0
+    row, column = linear_sum_assignment(square)
+    paired = (column < size) & (square[row, column] < large / 2)
+    extended = np.concatenate([clusters, np.zeros((num, 1), dtype=np.int32)], axis=1)
+    extended[row[paired], -1] = column[paired] + 1
+    if must_pair:
+        return extended
+    left = np.setdiff1d(np.arange(size), column[paired])
+    new = np.zeros((len(left), extended.shape[1]), dtype=np.int32)
+    new[:, -1] = left + 1
+    return np.concatenate([extended, new])
+
+
+# sums of weights stay below this: two of the codes count in 32 bits
+_MOST = 2.0e9
+# searches of CHILS side by side: its own default
+_CONCURRENT = 4
+
+
+def _numbered(problem: AssignmentProblem) -> Ints:
+    """Measurement of each place of each tuple, numbered through all sensors; -1 for none."""
+    offsets = np.concatenate([[0], np.cumsum(problem.sizes.astype(np.int64))[:-1]])
+    return np.where(problem.tuples > 0, problem.tuples + offsets - 1, -1)
+
+
+def _singletons(problem: AssignmentProblem) -> tuple[Ints, Floats]:
+    """Tuple and cost of each measurement as a false alarm."""
+    rows = _numbered(problem)
+    alone = np.flatnonzero((rows >= 0).sum(axis=1) == 1)
+    # the cheapest is written last
+    alone = alone[np.argsort(-problem.costs[alone], kind="stable")]
+    row = rows[alone].max(axis=1)
+    where = np.full(int(problem.sizes.sum()), -1, dtype=np.int64)
+    cost = np.zeros(where.size)
+    where[row], cost[row] = alone, problem.costs[alone]
+    return where, cost
+
+
+def savings(problem: AssignmentProblem) -> Floats:
+    """What each tuple saves against its measurements as false alarms."""
+    rows = _numbered(problem)
+    _, alone = _singletons(problem)
+    return np.where(rows >= 0, alone[rows], 0.0).sum(axis=1) - problem.costs
+
+
+def with_false_alarms(problem: AssignmentProblem, chosen: Ints) -> Ints:
+    """Chosen tuples, and the false alarms that are left; places in the problem."""
+    where, _ = _singletons(problem)
+    rows = _numbered(problem)[chosen]
+    free = np.ones(where.size, dtype=np.bool_)
+    free[rows[rows >= 0]] = False
+    return np.concatenate([chosen, where[free]]).astype(np.intp)
+
+
+def conflict_graph(problem: AssignmentProblem) -> tuple[Ints, Ints, Any]:
+    """Return the vertices (tuples), their weights as whole numbers, and the adjacency as a sparse array.
+
+    Raises ValueError: A problem without dummies: its best solution need not be an independent set of greatest weight.
+    """
+    if not problem.dummy:
+        raise ValueError("expected a problem with dummies")
+    saved = savings(problem)
+    rows = _numbered(problem)
+    vertices = np.flatnonzero((saved > 0) & ((rows >= 0).sum(axis=1) > 1))
+    inside, saved = rows[vertices], saved[vertices]
+    column, place = np.nonzero(inside >= 0)
+    row = inside[column, place]
+    most = np.zeros(int(problem.sizes.sum()))
+    np.maximum.at(most, row, saved[column])
+    # a tuple of two measurements or more counts at half of each at the most
+    weights = np.floor(saved * min(1e6, _MOST / max(0.5 * most.sum(), 1e-9))).astype(np.int64)
+    incidence = csr_array((np.ones(row.size, dtype=np.int32), (column, row)), shape=(vertices.size, most.size))
+    graph = csr_array(incidence @ incidence.T)
+    graph.setdiag(0)
+    graph.eliminate_zeros()
+    graph.sort_indices()
+    return vertices, np.maximum(weights, 1), graph
+
+
+def independent_set(kind: str, problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """Search the conflict graph with one of the codes; KaMIS's do not say whether they ended."""
+    # their threads are counted when they are loaded, and are theirs to take
+    threads = os.environ.pop("OMP_NUM_THREADS", None)
+    try:
+        from chszlablib import _chils, _kamis_mmwis, _kamis_wmis
+    finally:
+        if threads is not None:
+            os.environ["OMP_NUM_THREADS"] = threads
+    vertices, weights, graph = conflict_graph(problem)
+    if not graph.nnz:
+        # all of them; some of the codes fail on a graph without edges
+        return with_false_alarms(problem, vertices), None, True
+    ends, neighbours = graph.indptr, graph.indices.astype(np.int32)
+    if kind == "chils":
+        _, found = _chils.mwis(ends.astype(np.int64), neighbours, weights, time_limit, _CONCURRENT, 0)
+    else:
+        search = _kamis_wmis.branch_reduce if kind == "branch_reduce" else _kamis_mmwis.mmwis_solver
+        _, found = search(ends.astype(np.int32), neighbours, weights.astype(np.int32), time_limit, 0)
+    return with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
+
+
+# cells of its dense matrix of constraints (measurements and tracks by hypotheses)
+_MOST_CELLS = 60_000_000
+
+
+def _candidates(problem: AssignmentProblem) -> Ints:
+    """Tuples of two measurements or more that save something, by their first index; those without one last."""
+    count = (problem.tuples > 0).sum(axis=1)
+    chosen = np.flatnonzero((savings(problem) > 0) & (count > 1))
+    first = problem.tuples[chosen, 0]
+    return chosen[np.argsort(np.where(first > 0, first, problem.sizes[0] + 1), kind="stable")]
+
+
+def multi_frame_takes(problem: AssignmentProblem) -> bool:
+    """Whether Stone Soup is installed and its matrix is not too large."""
+    if not problem.dummy or problem.num_sensors < 2 or importlib.util.find_spec("stonesoup") is None:
+        return False
+    chosen = _candidates(problem)
+    lonely = int((problem.tuples[chosen, 0] == 0).sum())
+    others = int(problem.sizes[1:].sum())
+    tracks = int(problem.sizes[0]) + lonely
+    hypotheses = chosen.size + tracks + 2 * others
+    return (tracks + 2 * others) * hypotheses <= _MOST_CELLS
+
+
+def multi_frame(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """Choose tuples; it takes no time limit and gives no bound."""
+    from stonesoup.dataassociator.mfa._init import Hyp, init_hyp_info
+    from stonesoup.dataassociator.mfa._step import MAX_ITERATION_COUNT, AlgorithmState, algorithm_step
+
+    window = problem.num_sensors - 1
+    chosen = _candidates(problem)
+    saved = savings(problem)
+    by_track: dict[int, list[int]] = {index: [] for index in range(1, int(problem.sizes[0]) + 1)}
+    lonely = int(problem.sizes[0])
+    for place in chosen.tolist():
+        first = int(problem.tuples[place, 0])
+        if first == 0:
+            lonely += 1
+            first = lonely
+        by_track.setdefault(first, []).append(place)
+    hyps, places = [], []
+    for track, own in enumerate(by_track.values()):
+        most = max((float(saved[place]) for place in own), default=0.0)
+        for place in [-1, *own]:
+            history = [0] * window if place < 0 else problem.tuples[place, 1:].tolist()
+            hyps.append(Hyp.create(track, most - (0.0 if place < 0 else float(saved[place])), history, window))
+            places.append(place)
+    # what no hypothesis uses is in none of its lists, and its lists must not be empty
+    if not chosen.size:
+        return with_false_alarms(problem, chosen), None, False
+    info = init_hyp_info(hyps, window)
+    state = AlgorithmState.initialise(window, len(info.hyps))
+    for _ in range(MAX_ITERATION_COUNT):
+        algorithm_step(state, info)
+        if state.should_break:
+            break
+    best = [places[i] for i in state.get_best_hypothesis_indices() if i < len(places) and places[i] >= 0]
+    return with_false_alarms(problem, np.array(sorted(best), dtype=np.intp)), None, False

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import goals, markdown, ranking, readme, rows
+from experiments.benchmarks import goals, markdown, ranking, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases, on_one_core
 from experiments.benchmarks.rows import Row
@@ -285,7 +285,7 @@ def test_tables_of_a_page_are_written_with_the_report(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").mkdir()
     page = tmp_path / name
-    page.write_text(f"before\n{readme.BEGIN}\nold\n{readme.END}\nafter\n")
+    page.write_text(f"before\n{markdown.BEGIN}\nold\n{markdown.END}\nafter\n")
     sequential = replace(ROW, solver="sequential", peer=True, cost=-98.0, status="feasible")
     rows.save(tmp_path / "docs" / "benchmarks.csv", [ROW, PEER, sequential])
     assert main(["--report-only"]) == 0
@@ -299,7 +299,7 @@ def test_the_readme_says_how_long_others_had() -> None:
     ours = [replace(base, solver=name) for name in ("exact", "aco", "genetic", "tabu")]
     for limit in (7.0, 60.0):
         peer = replace(ours[0], solver="highs", peer=True, limit=limit)
-        assert f"best other solver, {limit:g} s" in readme.render([*ours, peer])
+        assert f"best other solver, {limit:g} s" in markdown.tables([*ours, peer])
 
 
 def test_a_brief_run_is_whole() -> None:

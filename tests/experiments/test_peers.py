@@ -5,7 +5,7 @@ import pytest
 
 import assoc
 from assoc.problem import AssignmentProblem
-from experiments.common import contestants, packing_peers
+from experiments.common import contestants, peers
 from experiments.common.instances import synthetic
 from tests import oracles
 
@@ -98,7 +98,7 @@ def test_a_graph_without_edges_is_taken_whole(name: str) -> None:
 def test_conflict_graph() -> None:
     tuples = [[1, 1], [1, 2], [2, 2], [2, 1], [1, 0], [0, 1]]
     problem = AssignmentProblem(tuples, [-3.0, -1.0, -2.0, 4.0, -0.5, 0.25], [2, 2])
-    vertices, weights, graph = packing_peers.conflict_graph(problem)
+    vertices, weights, graph = peers.conflict_graph(problem)
     # what a tuple saves against its false alarms: -0.25 + 3, -0.5 + 1, 2, and nothing
     chosen = problem.tuples[vertices].tolist()
     saved = dict(zip(map(tuple, chosen), weights / 1e6, strict=True))
@@ -109,5 +109,5 @@ def test_conflict_graph() -> None:
         (place[1, 1], place[1, 2]), (place[1, 2], place[1, 1]), (place[1, 2], place[2, 2]), (place[2, 2], place[1, 2]),
     }  # fmt: skip
     with pytest.raises(ValueError, match="dummies"):
-        packing_peers.conflict_graph(synthetic.axial_random(3, 0))
+        peers.conflict_graph(synthetic.axial_random(3, 0))
     assert not contestants.takes("chils", synthetic.axial_random(3, 0))
