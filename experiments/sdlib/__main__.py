@@ -23,11 +23,11 @@ import numpy as np
 
 from assoc.problem import AssignmentProblem
 from experiments.common.command import above_zero
-from experiments.sdlib import recorded, store
+from experiments.sdlib import store
 from experiments.sdlib.command import run_command
 from experiments.sdlib.comparison import read_rows, write_comparison
 from experiments.sdlib.contest import CONTESTANTS, contest, representatives
-from experiments.sdlib.instances import Instance, instances
+from experiments.sdlib.instances import PATH, Instance, instances
 from experiments.sdlib.solve import check_row, solve
 
 
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if not Path(chosen.recording).is_file():
                 print(f"{chosen.recording}: there is no such file", file=sys.stderr)
                 return 2
-            os.environ[recorded.PATH] = chosen.recording
+            os.environ[PATH] = chosen.recording
         return _make(every, compare=chosen.compare)
     family = getattr(chosen, "family", None)
     picked = [i for i in every if i.name in (chosen.names or [i.name]) and i.family == (family or i.family)]
@@ -96,7 +96,7 @@ def _name(text: str) -> str:
 
 def _make(known: Sequence[Instance], *, compare: bool) -> int:
     different = 0
-    every = [i for i in known if not i.kept and (recorded.PATH in os.environ or not i.recorded)]
+    every = [i for i in known if not i.kept and (PATH in os.environ or not i.recorded)]
     for instance in every:
         path, made = store.instance_file(instance.name), instance.make()
         if not compare:

@@ -99,22 +99,13 @@ def _quality(told: Told, seconds: float) -> str:
     return f"{100 * sum(known) / len(found):.3g} %"
 
 
-def _seconds(row: Row, best: float, measure: Measure) -> str:
-    if "trace" not in row:
-        return "-"
-    time = measure(row, best)
-    return ">" if time is None else f"{time:.2g}" if time < 10.0 else f"{time:.0f}"
-
-
 def comparison_tables(path: Path = PUBLISHED) -> str:
     """Return the tables of a comparison as text."""
     content = json.loads(path.read_text())
     rows, limit = content["rows"], float(content["seconds"])
     known = {name: float(row["value"]) for name, row in store.table().items()}
-    instances: dict[str, dict[str, Row]] = {}
     told: dict[str, Told] = {}
     for row in rows:
-        instances.setdefault(row["instance"], {})[row["solver"]] = row
         told.setdefault(row["solver"], []).extend([(row, known[row["instance"]])] if "trace" in row else [])
     marks = (0.01, 0.1, *_EARLY, limit)
 
@@ -123,17 +114,10 @@ def comparison_tables(path: Path = PUBLISHED) -> str:
         lines = [[name, str(len(own)), *(cell(own, mark) for mark in marks)] for name, own in told.items()]
         return table(head, lines)
 
-    def matrix(measure: Measure, solvers: list[str]) -> str:
-        lines = [
-            [name, *(_seconds(own.get(solver, {}), known[name], measure) for solver in solvers)]
-            for name, own in instances.items()
-        ]
-        return table(["instance", *solvers], lines)
-
+    named = {row["instance"] for row in rows}
     wrong = [f"{row['solver']} on {row['instance']}" for row in rows if is_wrong(row, known[row["instance"]])]
-    proving = [name for name, own in told.items() if any(time_to_proof(*row) is not None for row in own)]
     return "\n\n".join((
-        f"`{content['command']}`, {content['date']}, {content['machine']}: {len(instances)} instances, "
+        f"`{content['command']}`, {content['date']}, {content['machine']}: {len(named)} instances, "
         f"{len(told)} solvers, {limit:g} s of CPU time each.",
         "**Time to 0.1 %**: instances on which a solver was that near to the best value known, after so long.",
         summary(_within(time_to_near)),
@@ -142,8 +126,4 @@ def comparison_tables(path: Path = PUBLISHED) -> str:
         f"Said to be optimal, and not: {', '.join(wrong) if wrong else 'none'}.",
         "**Quality**: mean excess over the best value; *none on N*: it had found nothing on N instances.",
         summary(_quality, marks[2:]),
-        "**Seconds to 0.1 %** (-: cannot take the instance; >: not in the time)",
-        matrix(time_to_near, list(told)),
-        "**Seconds to proof** (of those that prove)",
-        matrix(time_to_proof, proving),
     ))  # fmt: skip

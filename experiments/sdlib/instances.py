@@ -1,10 +1,18 @@
-"""The instances of the set: how each is made, from a seed; costs are rounded to six decimals: they are exact."""
+"""The instances of the set: how each is made, from a seed; costs are rounded to six decimals: they are exact.
+
+Some need a recording that is not here, an excerpt of the OpenSky Network's state vectors of 12 July 2021, 14:00 to
+14:20 UTC: a row for each aircraft every 10 seconds, from 50.0 to 54.5 degrees north and 5.0 degrees west to 1.6 east.
+It may not be given away here. What is stored are instances alone: indices, and costs of tuples of measurements that
+simulated radars made of the traffic, with noise, misses and false alarms; no position, time or aircraft can be had from
+them. Who has the recording can make them anew: the environment variable named by `PATH` says where it lies.
+"""
 
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
@@ -18,9 +26,45 @@ from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.progress import Work
 from experiments.common.instances import scenes, synthetic
-from experiments.sdlib.recorded import WATCHES
 
 DECIMALS = 6
+PATH = "SDLIB_RECORDING"
+
+
+class Watch(NamedTuple):
+    """Radars over the traffic: how many, how good, how much else they see, and which scan (10 s each) it is.
+
+    ``noise`` is the standard deviation of range, and across the line of sight at 50 km, metres.
+    """
+
+    radars: int
+    detection_probability: float
+    false_alarms: float
+    noise: float
+    scan: int
+    seed: int
+
+    def make(self) -> AssignmentProblem:
+        """Make the problem from the recording."""
+        if PATH not in os.environ:
+            raise FileNotFoundError(f"{PATH}: names no recording; without it this instance cannot be made anew")
+        options = self._asdict()
+        seed, scan = options.pop("seed"), options.pop("scan")
+        return build_problem(simulate("from-tracks", seed, file=os.environ[PATH], scans=scan + 1, **options), scan)
+
+
+WATCHES = {
+    "recorded-3-1": Watch(3, 0.9, 20.0, 300.0, 30, 1),
+    "recorded-3-2": Watch(3, 0.7, 60.0, 1500.0, 50, 2),
+    "recorded-3-3": Watch(3, 0.6, 400.0, 4000.0, 70, 3),
+    "recorded-4-1": Watch(4, 0.6, 100.0, 3000.0, 40, 1),
+    "recorded-4-2": Watch(4, 0.6, 300.0, 4000.0, 60, 2),
+    "recorded-4-3": Watch(4, 0.7, 150.0, 8000.0, 80, 3),
+    "recorded-5-1": Watch(5, 0.5, 100.0, 6000.0, 45, 1),
+    "recorded-5-2": Watch(5, 0.6, 200.0, 5000.0, 90, 2),
+    "recorded-6-1": Watch(6, 0.5, 80.0, 5000.0, 55, 1),
+    "recorded-6-2": Watch(6, 0.7, 40.0, 3000.0, 100, 2),
+}
 
 
 @dataclass(frozen=True)
@@ -29,7 +73,7 @@ class Instance:
 
     name: Of its files.
     raw: Makes the problem before its costs are rounded.
-    recorded: Whether the recording of recorded.py is needed to make it.
+    recorded: Whether the recording of air traffic is needed to make it.
     kept: Whether the tracker that poses it has changed since: what is stored stays, and `make` makes another one.
     """
 

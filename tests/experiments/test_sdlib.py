@@ -9,10 +9,10 @@ import pytest
 
 from assoc.problem import AssignmentProblem
 from experiments.sdlib import __main__ as program
-from experiments.sdlib import recorded, store
+from experiments.sdlib import store
 from experiments.sdlib.comparison import comparison_tables, excess, is_wrong, time_to_near, time_to_proof
 from experiments.sdlib.contest import representatives
-from experiments.sdlib.instances import instances
+from experiments.sdlib.instances import PATH, instances
 from experiments.sdlib.solve import check_row
 
 EVERY = instances()
@@ -39,7 +39,7 @@ def test_a_row_that_does_not_hold_and_an_instance_that_differs_are_seen(capsys):
 
 
 def test_whoever_wants_recorded_traffic_made_is_told_what_is_missing(monkeypatch, capsys):
-    monkeypatch.delenv(recorded.PATH, raising=False)
+    monkeypatch.delenv(PATH, raising=False)
     with pytest.raises(FileNotFoundError, match="names no recording"):
         next(one for one in EVERY if one.recorded).make()
     assert program.main(["make", "--recording", "no/such.csv", "--compare"]) == 2
