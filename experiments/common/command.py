@@ -116,37 +116,19 @@ def add_only(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
     )  # fmt: skip
 
 
-def report(
-    chosen: argparse.Namespace,
-    claims: list[Claim],
-    name: str,
-    about: str | None,
-    *,
-    seed: int = 0,
-    is_row: Callable[[Claim], bool] = lambda claim: claim.quantity.startswith("setting"),
-    kept: Callable[[list[Claim], list[Claim]], list[Claim]] | None = None,
-) -> None:
-    """Print the claims of an experiment, and write the files that are asked for (`add_files`).
-
-    is_row: Whether a claim is a row of a long table, which is not printed.
-    kept: Of the claims published before and these, what is published; these alone without it.
-    """
-    about = about or ""
-    print_table([claim for claim in claims if not is_row(claim)], about.split("\n")[0].rstrip("."))
+def report(chosen: argparse.Namespace, claims: list[Claim], name: str, about: str | None) -> None:
+    """Print the claims of an experiment, and write the files that are asked for (`add_files`)."""
+    about, seed = about or "", getattr(chosen, "seed", 0)
+    # rows of long tables are not printed
+    print_table([c for c in claims if not c.quantity.startswith("setting")], about.split("\n")[0].rstrip("."))
     if chosen.json:
         save_json(chosen.json, claims, name, seed, about)
     if chosen.publish:
         path = result_file(name)
-        if kept is not None and path.exists():
-            claims = kept(load_json(path), claims)
+        if getattr(chosen, "only", None) and path.exists():
+            claims = replaced(load_json(path), claims)
         save_json(path, claims, name, seed, about)
         print(f"{path}: written; now: python -m experiments.pages")
-
-
-def without_subjects(of: Callable[[Claim], str], claims: list[Claim], newer: list[Claim]) -> list[Claim]:
-    """Claims but those of a subject that newer ones are of, then the newer ones."""
-    subjects = {of(claim) for claim in newer}
-    return [claim for claim in claims if of(claim) not in subjects] + newer
 
 
 def replaced(claims: list[Claim], newer: list[Claim]) -> list[Claim]:
@@ -176,8 +158,7 @@ def run(
         parser.error("--publish needs the full run, got --quick")
     found = experiment(chosen.quick, np.random.default_rng(chosen.seed))
     claims, shown = (found, None) if figure is None else found
-    only = getattr(chosen, "only", None)
-    report(chosen, claims, name, about, seed=chosen.seed, kept=replaced if only else None)
+    report(chosen, claims, name, about)
     if figure is not None and chosen.figure is not None:
         save_figure(Path(chosen.figure), figure[0], shown, figure[1])
         print(f"{chosen.figure}: written")

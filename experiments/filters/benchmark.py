@@ -25,7 +25,6 @@ from assoc.filters import (
     ExtendedKalmanFilter,
     Gaussian,
     KalmanFilter,
-    ModifiedEKF,
     UnscentedKalmanFilter,
 )
 from assoc.filters.base import Filter
@@ -198,7 +197,6 @@ def _time_all(quick: bool) -> list[Claim]:
     repeats = 10 if quick else 200
     tracks = 1_000 if quick else 10_000
     claims: list[Claim] = []
-    table: dict[str, dict[str, float]] = {}
     for kind in KINDS:
         slow = 1 if kind == "EnKF" else 10
         rounds = [
@@ -213,7 +211,6 @@ def _time_all(quick: bool) -> list[Claim]:
             for _ in range(ROUNDS)
         ]
         row = {name: float(np.min([times[name] for times in rounds])) for name in rounds[0]}
-        table[kind] = row
         faster = min(row["filterpy"], row["Stone Soup"])
         claims += [Claim(f"{kind}: {name}", "us", None, value) for name, value in row.items()]
         for words, name in (
@@ -223,19 +220,7 @@ def _time_all(quick: bool) -> list[Claim]:
             ("one track, a step in two calls", "assoc, two calls"),
         ):
             claims.append(with_goal(f"{kind}: faster of the two / assoc, {words}", "", faster / row[name], least=10))
-    ekf = ExtendedKalmanFilter(ConstantVelocity(NOISE))
-    state = Gaussian(np.tile(MEAN, (tracks, 1)), COVARIANCE)
-    z = np.tile(RADAR.measure(MEAN[None, :3]), (tracks, 1))
-    modified, both = ModifiedEKF(ConstantVelocity(NOISE)), table["EKF"]["assoc, batch"]
-    alone, alone_modified = (
-        microseconds(lambda made=made: made.update(state, z, RADAR), 1, ROUNDS) / tracks for made in (ekf, modified)
-    )
-    return [
-        *claims,
-        with_goal(f"EKF, batch of {tracks}: update alone, a track", "us", alone, most=2.0),
-        with_goal(f"EKF, batch of {tracks}: prediction and update, a track", "us", both, most=2.0),
-        Claim(f"modified EKF, batch of {tracks}: update alone, a track", "us", ours=alone_modified),
-    ]
+    return claims
 
 
 if __name__ == "__main__":

@@ -6,8 +6,7 @@ in percent of it: above 0, the part helps. Parts that one solver alone has are a
 ("alone"), where they can be seen. Intervals are 95 %, from resampling problems. The first row gives how far the whole
 is above the best cost that any of these runs found.
 
---publish replaces the rows of the problems, of the budget and of the solvers that were measured, so that the whole
-table can be measured in several runs.
+--publish with --only replaces the rows that were measured, so that the whole table can be measured in several runs.
 """
 
 import argparse
@@ -20,12 +19,11 @@ import assoc
 from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval
 from experiments.common.claims import Claim
-from experiments.common.command import above_zero, add_files, report, whole, without_subjects
+from experiments.common.command import above_zero, main, whole
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS, problem
 from experiments.metaheuristics.running import log, run
 
-NAME = "metaheuristics.ablation"
 # percent by which two sums of the same costs may differ
 _SAME = 1e-9
 
@@ -64,29 +62,22 @@ def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -
     return found
 
 
-def subject(claim: Claim) -> str:
-    """Problem, budget and solver of a claim."""
-    group, what = claim.quantity.split(": ", 1)
-    return f"{group}: {what.split(',')[0]}"
+def experiment(chosen: argparse.Namespace) -> list[Claim]:
+    """Measure all parts on these problems."""
+    count, seconds = (2, 0.2) if chosen.quick else (chosen.count, chosen.seconds)
+    assoc.warm_up({*chosen.solvers})
+    found = ((name, measured(name, count, seconds, chosen.solvers)) for name in chosen.names)
+    return [claim for name, costs in found for claim in claims_of(name, seconds, costs)]
 
 
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=(__doc__ or "").split("\n")[0])
+def _add_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    text = ", ".join(PROBLEMS)
-    add("--problems", nargs="+", choices=PROBLEMS, default=["ghosts 40"], metavar="NAME", help=text)
     add("--seconds", type=above_zero, default=2.0, metavar="S", help="of each run (default 2)")
     add("--count", type=whole(2), default=10, metavar="N", help="problems of each name (default 10)")
     add("--solvers", nargs="+", choices=parts.SOLVERS, default=[*parts.SOLVERS], metavar="NAME", help="only these")
-    add_files(parser, NAME)
-    chosen = parser.parse_args(arguments)
-    assoc.warm_up({*chosen.solvers})
-    claims: list[Claim] = []
-    for name in chosen.problems:
-        claims += claims_of(name, chosen.seconds, measured(name, chosen.count, chosen.seconds, chosen.solvers))
-    report(chosen, claims, NAME, __doc__, kept=partial(without_subjects, subject))
-    return 0
+
+
+program = partial(main, "metaheuristics.ablation", experiment, __doc__, only=PROBLEMS, options=[_add_options])
 
 
 if __name__ == "__main__":

@@ -9,8 +9,6 @@ import pytest
 import assoc
 from assoc.packing.run import Run
 from assoc.solvers.aco.parameters import AcoParameters
-from experiments.common.claims import Claim
-from experiments.common.command import without_subjects
 from experiments.metaheuristics import ablation, parts, running, sweep
 from experiments.metaheuristics.problems import problem
 
@@ -95,7 +93,7 @@ def test_pheromone_fades_away_without_its_limit():
 @pytest.mark.slow
 def test_ablation_reports_every_part(tmp_path, capsys):
     file = tmp_path / "results.json"
-    words = ["--problems", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
+    words = ["--only", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
     assert ablation.program([*words, "--json", str(file)]) == 0
     capsys.readouterr()
     found = {claim["quantity"] for claim in json.loads(file.read_text())["claims"]}
@@ -119,20 +117,6 @@ def test_figures_are_differences_from_the_whole():
     assert alone.ours == pytest.approx(7.5) and alone.interval == pytest.approx((5.0, 10.0))
     part = claims[f"ghosts 40, 2 s: aco, {parts.OWN[2].words}, above all parts"]
     assert part.ours == pytest.approx(0.0, abs=1e-12) and part.interval == pytest.approx((-1.0, 1.0))
-
-
-def test_published_results_of_other_problems_and_solvers_stay():
-    first = [
-        Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=1.0),
-        Claim("a, 1 s: tabu, all parts, above the best found", ours=2.0),
-        Claim("b, 1 s: aco, all parts, above the best found", ours=3.0),
-    ]
-    new = [
-        Claim("a, 1 s: aco, all parts, above the best found", ours=9.0),
-        Claim("a, 2 s: tabu, all parts, above the best found", ours=8.0),
-    ]
-    again = without_subjects(ablation.subject, first, new)
-    assert [claim.ours for claim in again] == [2.0, 3.0, 9.0, 8.0]
 
 
 @pytest.mark.slow
@@ -171,7 +155,7 @@ def test_claims_of_a_case():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--problems", "nothing"], "invalid choice: 'nothing'"),
+        (["--only", "nothing"], "invalid choice: 'nothing'"),
         (["--solvers", "exact"], "invalid choice: 'exact'"),
         (["--count", "1"], "at least 2"),
     ],
