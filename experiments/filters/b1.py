@@ -104,11 +104,10 @@ def converted(z: Array, R: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Result:
-    """Second half of the runs: squared position errors (K/2, runs), NEES and NIS of the same shape."""
+    """Second half of the runs: squared position errors (K/2, runs), and NEES of the same shape."""
 
     squared: Array
     nees: Array
-    nis: Array
 
     @property
     def rmse(self) -> float:
@@ -120,17 +119,15 @@ def run(filter_: Filter[Any], runs: Runs, start: Gaussian | None = None) -> Resu
     """Filter all runs at once; errors of the second half."""
     state = filter_.start(runs.start() if start is None else start)
     radar, steps = runs.setting.radar, runs.setting.steps
-    squared, all_nees, all_nis = [], [], []
+    squared, all_nees = [], []
     for k in range(2, len(runs.truth)):
         state = filter_.predict(state, runs.setting.interval)
-        done = filter_.update(state, runs.measured[k], radar)
-        state = done.state
+        state = filter_.update(state, runs.measured[k], radar).state
         if k >= 2 + steps // 2:
             error = state.mean[:, :3] - runs.truth[k][:, :3]
             squared.append((error**2).sum(axis=1))
             all_nees.append(nees(state, runs.truth[k]))
-            all_nis.append(done.nis)
-    return Result(np.array(squared), np.array(all_nees), np.array(all_nis))
+    return Result(np.array(squared), np.array(all_nees))
 
 
 def ratio_interval(numerator: Array, denominator: Array, rng: np.random.Generator) -> tuple[float, float]:
