@@ -57,11 +57,9 @@ def run(every: Mapping[str, int], folder: str | None) -> int:
             if words is None:
                 print(f"left out  {rows:3} rows         {command}", flush=True)
                 continue
-            # figures are written where the program stands
-            where = scratch if words[2].startswith("experiments") else ROOT
             start = time.perf_counter()
             env = {**os.environ, "PYTHONPATH": str(ROOT)}
-            done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False, env=env)
+            done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, env=env)
             failed, count = failed + (done.returncode != 0), count + 1
             word = "failed" if done.returncode else "done"
             print(f"{word:9} {rows:3} rows {time.perf_counter() - start:6.0f} s {command}", flush=True)
