@@ -3,10 +3,9 @@
 import datetime
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from assoc._files.output import write_text
 
@@ -67,23 +66,17 @@ def with_goal(quantity: str, unit: str, ours: float, *, least: float | None = No
     return Claim(quantity, unit, ours=ours, band=(least, most), source=GOAL)
 
 
-def to_dict(claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> dict[str, Any]:
-    """Return the claims as the JSON form "assoc.claims", version 1; `about` tells the settings."""
-    return {
+def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> None:
+    """Write the claims as JSON, a line each (infinities are refused: they are not JSON); `about` tells the settings."""
+    data = {
         "format": FORMAT,
         "version": VERSION,
         "experiment": experiment,
         "seed": seed,
         "date": datetime.date.today().isoformat(),
         "about": " ".join(about.split()),
-        "claims": [asdict(claim) for claim in claims],
     }
-
-
-def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> None:
-    """Write the claims as JSON, a line each (infinities are refused: they are not JSON)."""
-    data = to_dict(claims, experiment, seed, about)
-    rows = ",\n".join(f"    {json.dumps(claim, allow_nan=False)}" for claim in data.pop("claims"))
+    rows = ",\n".join(f"    {json.dumps(asdict(claim), allow_nan=False)}" for claim in claims)
     head = json.dumps(data, indent=2).removesuffix("\n}")
     write_text(path, f'{head},\n  "claims": [\n{rows}\n  ]\n}}\n')
 
@@ -99,45 +92,3 @@ def load_json(path: str | Path) -> list[Claim]:
     if data.get("version") != VERSION:
         raise ValueError(f"{path}: version {data.get('version')} is not {VERSION}")
     return [Claim(**claim) for claim in data["claims"]]
-
-
-def print_table(claims: Sequence[Claim], title: str) -> None:
-    """Print the claims as a table on stdout."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=title)
-    for column in ("quantity", "unit"):
-        table.add_column(column)
-    for column in ("paper", "ours", "interval", "accepted band"):
-        table.add_column(column, justify="right")
-    table.add_column("holds")
-    table.add_column("source")
-    for claim in claims:
-        table.add_row(
-            claim.quantity,
-            claim.unit,
-            _number(claim.paper),
-            _number(claim.ours),
-            _ends(claim.interval),
-            _ends(claim.band),
-            {True: "yes", False: "no", None: "-"}[claim.holds],
-            claim.source,
-        )
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)
-    console.print(table)
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
-
-
-def _ends(ends: tuple[float | None, float | None] | None) -> str:
-    if ends is None:
-        return "-"
-    low, high = ends
-    if low is None:
-        return f"<= {_number(high)}"
-    return f">= {_number(low)}" if high is None else f"{_number(low)} .. {_number(high)}"

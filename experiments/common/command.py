@@ -10,8 +10,8 @@ from scipy.special import stdtrit
 
 from assoc._files.output import write_atomically
 from assoc._types import Array
-from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.results import result_file
+from experiments.common.claims import Claim, load_json, save_json
+from experiments.common.results import print_claims, result_file
 
 Experiment = Callable[..., Any]
 """From whether it is to be quick and a random generator, or from all options if it has some of its own, to its claims;
@@ -120,7 +120,7 @@ def report(chosen: argparse.Namespace, claims: list[Claim], name: str, about: st
     """Print the claims of an experiment, and write the files that are asked for (`add_files`)."""
     about, seed = about or "", getattr(chosen, "seed", 0)
     # rows of long tables are not printed
-    print_table([c for c in claims if not c.quantity.startswith("setting")], about.split("\n")[0].rstrip("."))
+    print_claims([c for c in claims if not c.quantity.startswith("setting")], about.split("\n")[0].rstrip("."))
     if chosen.json:
         save_json(chosen.json, claims, name, seed, about)
     if chosen.publish:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -88,3 +88,21 @@ def table(
 def plain_table(head: list[str], rows: list[list[str]]) -> str:
     """A table whose columns are all set to the left."""
     return table(head, rows, lambda column: False, tight=True)
+
+
+def print_claims(claims: Sequence[Claim], title: str) -> None:
+    """Print the claims as a table on stdout."""
+
+    def ends(pair: tuple[float | None, float | None] | None) -> str:
+        low, high = (None if end is None else f"{end:.4g}" for end in pair or (None, None))
+        if low is None or high is None:
+            return f">= {low}" if low is not None else f"<= {high}" if high is not None else "-"
+        return f"{low} .. {high}"
+
+    rows = [
+        [c.quantity, c.unit, "-" if c.paper is None else f"{c.paper:.4g}", f"{c.ours:.4g}", ends(c.interval),
+         ends(c.band), {True: "yes", False: "no", None: "-"}[c.holds], c.source]
+        for c in claims
+    ]  # fmt: skip
+    head = ["quantity", "unit", "paper", "ours", "interval", "accepted band", "holds", "source"]
+    print(f"{title}\n\n{table(head, rows, lambda column: 1 < column < 6)}")

@@ -10,6 +10,7 @@ from scipy import stats
 from experiments.common import claims
 from experiments.common.claims import Claim
 from experiments.common.command import mean_interval, replaced, rmse_interval
+from experiments.common.results import print_claims
 
 SAMPLE = [
     Claim("mean cycles", "", 4.03, 4.9, (4.8, 5.0), (3.5, 5.5)),
@@ -60,7 +61,7 @@ def test_json_round_trip_and_form(tmp_path: Path) -> None:
 
 
 def test_table_shows_every_claim(capsys: pytest.CaptureFixture[str]) -> None:
-    claims.print_table(SAMPLE, "Sample")
+    print_claims(SAMPLE, "Sample")
     text = capsys.readouterr().out
     assert all(c.quantity in text for c in SAMPLE)
     assert "<= 2" in text

@@ -27,8 +27,9 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.solvers.assign import assign
 from assoc.tracking import TRACKERS, Tracker
-from experiments.common.claims import Claim, print_table
+from experiments.common.claims import Claim
 from experiments.common.measuring import processor_time
+from experiments.common.results import print_claims
 
 REGION = np.array([[-40e3, 40e3], [-40e3, 40e3], [0.0, 12e3]])
 RADII = np.array([10e3, 15e3, 20e3, 25e3])
@@ -190,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     steps, rng = parser.parse_args(arguments).steps, np.random.default_rng(0)
     claims = [claim for kind, share in KINDS.items() for claim in track(kind, int(share * steps), rng)[0]]
     claims += solve(steps, rng)[0]
-    print_table(claims, "Long runs")
+    print_claims(claims, "Long runs")
     return int(any(claim.holds is False for claim in claims))
 
 
