@@ -13,7 +13,6 @@ the model, but not importing the package, nor compiling. The cost of its answer 
 ``chils``               CHILS, local search for the heaviest independent set
 ``branch_reduce``       KaMIS's branch and reduce for it
 ``mmwis``               KaMIS's memetic algorithm for it
-``stone_soup``          Stone Soup's multi-frame assignment; takes no limit
 ======================  ==========================================================================
 """
 
@@ -91,7 +90,6 @@ _OTHERS: dict[str, Callable[[AssignmentProblem, float], tuple[Any, ...]]] = {
     "scip_1": partial(peers.scip, 1),
     "highs": peers.highs,
     "sequential": peers.assign_in_turn,
-    "stone_soup": peers.multi_frame,
     **{name: partial(peers.independent_set, name) for name in _INDEPENDENT_SETS},
 }
 
@@ -135,7 +133,5 @@ def takes(name: str, problem: AssignmentProblem = _TINY) -> bool:
     """Whether a contestant is installed and can take a problem; without one, whether it is installed."""
     if importlib.util.find_spec(_PACKAGES.get(name, "scipy")) is None:
         return False
-    if name == "stone_soup":
-        return peers.multi_frame_takes(problem)
     # the heaviest independent set is a solution where measurements may be left alone
     return name in LISTENED or (name in _OTHERS and (problem.dummy or name not in _PACKAGES))

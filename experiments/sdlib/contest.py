@@ -29,10 +29,9 @@ from experiments.sdlib import store
 from experiments.sdlib.instances import Instance
 
 Row = dict[str, Any]
-_NO_LIMIT = ("stone_soup", "sequential")
 CONTESTANTS = (
     "exact", "milp", "lagrangian", "aco", "genetic", "tabu", "greedy", "cp_sat", "scip", "highs",
-    "chils", "branch_reduce", "mmwis", *_NO_LIMIT,
+    "chils", "branch_reduce", "mmwis", "sequential",
 )  # fmt: skip
 """All have one core. "sequential" is scipy's 2-D assignment, sensor by sensor, as most trackers do it."""
 CHECKPOINTS = (1.0, 5.0)
@@ -195,7 +194,7 @@ def _listened(solver: str, problem: AssignmentProblem, seconds: float, log: _Log
 
 def _started_anew(solver: str, problem: AssignmentProblem, seconds: float, log: _Log) -> Answer:
     """A peer that tells of nothing before its end; its last answer, with the best tuples of all."""
-    limited = solver not in _NO_LIMIT
+    limited = solver != "sequential"
     best = Answer(math.inf, None, 0.0, problem.tuples[:0])
     for limit in (*(mark for mark in CHECKPOINTS if limited and mark < seconds), seconds):
         _allow(limit)
