@@ -10,14 +10,13 @@ switches of reported tracks in a scene.
 import argparse
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from assoc.metrics import Trajectories, gospa_over_time, identity
 from assoc.scene import Scene
-from assoc.tracking import TRACKERS, Tracker
-from assoc.tracking.records.estimates import Estimates
+from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
 from experiments.common.command import main, whole
 from experiments.trackers.judging import CUTOFF, OracleTracker, goal, mean_claim, through
@@ -35,34 +34,14 @@ class Judged(NamedTuple):
     switches: int
 
 
-class Told:
-    """A tracker that knows how sensors detect, whatever it learns."""
-
-    def __init__(self, tracker: Tracker, estimates: Estimates) -> None:
-        self.tracker, self.estimates, self.filter = tracker, estimates, tracker.filter
-
-    def step(self, *scan: Any) -> None:
-        """Step without what was learnt."""
-        self.tracker.state = self.tracker.state._replace(estimates=self.estimates)
-        self.tracker.step(*scan)
-
-    @property
-    def tracks(self) -> Any:
-        """The tracks to be shown."""
-        return self.tracker.tracks
-
-
 def judge(name: str, case: Case, scene: Scene) -> Judged:
     """Run a tracker, or the oracle, over the scene of a case, as declared or as known."""
     kind, _, adapting = name.partition(", ")
-    tracker: Any
-    if kind == "oracle":
-        tracker = OracleTracker(scene, **case.options)
-    else:
-        told = case.bands is not None and scene is case.known
-        tracker = TRACKERS[kind].for_scene(scene, **case.options, adapt=bool(adapting) or told)
-        if told:
-            tracker = Told(tracker, Estimates.declared(scene.sensors)._replace(bands=case.bands))
+    tracker = (
+        OracleTracker(scene, **case.options)
+        if kind == "oracle"
+        else TRACKERS[kind].for_scene(scene, **case.options, adapt=bool(adapting))
+    )
     truth, tracks = Trajectories.from_scene(scene), through(tracker, scene).tracks
     if case.level:
         truth, tracks = (Trajectories(paths.times, paths.ids, paths.positions * [1, 1, 0]) for paths in (truth, tracks))

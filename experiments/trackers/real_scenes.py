@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.views import BANDS
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
 from assoc.sensors import Platform, PositionSensor, Radar2D, Radar3D, Sensor
@@ -31,8 +30,6 @@ class Case(NamedTuple):
     declared: Its measurements and the sensors that trackers are told of.
     known: The same with sensors as they are; left out where there is nothing to be known.
     options: Of every tracker and the oracle.
-    bands: Detection probabilities by bands of range, (S, BANDS), of trackers that are told; left out where sensors
-        detect alike at all ranges.
     level: Whether tracks are judged by their horizontal places alone.
     """
 
@@ -40,7 +37,6 @@ class Case(NamedTuple):
     known: Scene | None = None
     options: Mapping[str, Any] = {}
     level: bool = False
-    bands: Array | None = None
 
 
 Make = Callable[[int], Case]
@@ -55,13 +51,12 @@ def farther_seen_less(seed: int) -> Case:
     """Six radars that detect 95 % of what is near, half at 17 km; they are said to detect 90 % up to 40 km."""
     told = _short(40e3, 0.9)
     full = simulate(SEPARATE, seed, sensors=[replace(radar, detection_probability=_NEAR) for radar in told])
-    rng, middles = np.random.default_rng([seed, 1]), (np.arange(BANDS) + 0.5) * 40e3 / BANDS
+    rng = np.random.default_rng([seed, 1])
     kept = [
         [(who < 0) | (rng.random(len(z)) * _NEAR < _at_range(z[:, 0])) for z, who in zip(*scan, strict=True)]
         for scan in zip(full.measurements, full.truth.sources, strict=True)
     ]
-    scene = replace(_left(full, kept), sensors=told)
-    return Case(scene, replace(scene), bands=np.tile(_at_range(middles), (len(told), 1)))
+    return Case(replace(_left(full, kept), sensors=told))
 
 
 _NEAR = 0.95
