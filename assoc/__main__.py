@@ -27,6 +27,7 @@ PROGRAMS = {
 
 _OTHERS = {
     "check": ("check a proof, or a solution, in exact arithmetic", "problem.txt proof.json"),
+    "warm-up": ("compile all kernels, once after installation", ""),
     "completion": ("print what a shell needs to complete names and options", "bash (or zsh, fish)"),
 }
 
@@ -48,6 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prepare_streams()
     if name == "completion":
         return run_program(lambda: _complete(rest), "assoc")
+    if name == "warm-up":
+        return run_program(lambda: _warm_up(rest), "assoc")
     if name in ("-h", "--help", "help"):
         return run_program(_list, "assoc")
     if name in ("-V", "--version"):
@@ -62,9 +65,19 @@ def _list() -> None:
     print_lines("assoc: which measurements, from several sensors, came from the same target?")
     print_lines("\nPrograms (each has --help, -q to say nothing and -v to say more):")
     for name, (purpose, example) in {**PROGRAMS, **_OTHERS}.items():
-        called = f"assoc {name}" if name == "completion" else command(name)
-        print_lines(f"  {name:<11}  {purpose}: {called} {example}")
+        called = command(name) if name in PROGRAMS or name == "check" else f"assoc {name}"
+        print_lines(f"  {name:<11}  {purpose}: {called} {example}".rstrip())
     print_lines("\nassoc --version prints the version.")
+
+
+def _warm_up(words: Sequence[str]) -> None:
+    from argparse import ArgumentParser
+
+    from assoc.tracking.warm_up import warm_up
+
+    about = "Compile all kernels, or load them; takes minutes once after installation, then seconds."
+    ArgumentParser("assoc warm-up", description=about).parse_args(words)
+    print(f"all kernels are compiled, in {warm_up():.0f} s")
 
 
 def _complete(words: Sequence[str]) -> None:
@@ -75,7 +88,7 @@ def _complete(words: Sequence[str]) -> None:
     check, shells = ArgumentParser(add_help=False), ArgumentParser(add_help=False)
     check.add_argument("files", nargs="*", metavar="FILE")
     shells.add_argument("shell", choices=SHELLS)
-    others = {"check": check, "completion": shells}
+    others = {"check": check, "completion": shells, "warm-up": ArgumentParser()}
     programs = {name: import_module(f"assoc.{name}").parser() for name in PROGRAMS}
     print(script(words[0] if words else "", {**programs, **others}))
 

@@ -1,4 +1,4 @@
-"""Compile all kernels before the first scan: those of solvers, and those of trackers with their usual settings."""
+"""Compile all kernels before the first scan: of solvers, rankings, probabilities and trackers."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ import numpy as np
 
 from assoc._system.interpreted import compiled_only
 from assoc._system.wrong_types import explains_wrong_types
+from assoc.costs import build_problem
 from assoc.errors import AssocWarning
+from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import kbest
+from assoc.ranking.marginals import marginals
 from assoc.scene.scene import Scene
 from assoc.simulation import simulate
 from assoc.solvers import warm_up as of_solvers
 from assoc.tracking import TRACKERS
+from assoc.tracking.filter_choice import FILTERS, make_filter
 from assoc.tracking.tracker import Tracker
 
 # many targets, and trackers that have kernels for these alone
@@ -24,7 +29,7 @@ _CROWDS = {60: ("mht", "joint-probabilistic"), 250: ("multi-sensor",)}
 
 @explains_wrong_types
 def warm_up(solvers: Iterable[str] | None = None) -> float:
-    """Compile the kernels of solvers and trackers, or load them, so that no later call has to.
+    """Compile all kernels, or load them, so that no later call has to: of solvers, `kbest`, `marginals`, trackers.
 
     Call it once after installation, when it takes a minute or two and uses two processes. Afterwards it takes some
     seconds, and can be called at the start of a program with time limits. On a terminal it shows progress on stderr.
@@ -32,8 +37,8 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     Parameters
     ----------
     solvers : iterable of str, optional
-        Names of solvers, for these alone; by default all but ``milp``, which compiles little itself, and trackers with
-        their usual settings.
+        Names of solvers, for these alone; by default all but ``milp``, which compiles little itself, and all else:
+        trackers with each of their filters.
 
     Returns
     -------
@@ -50,15 +55,33 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     if solvers is None:
         with compiled_only(), warnings.catch_warnings():
             warnings.simplefilter("ignore", AssocWarning)
-            for scene in _scenes():
+            scenes = _scenes()
+            for scene in scenes:
                 for kind in TRACKERS.values():
                     for own_times in (False, True):
                         follow(kind.for_scene(scene), scene, own_times)
+            _rank()
+            for name in FILTERS:
+                scene = scenes[0 if name == "kalman" else 2]
+                chosen = make_filter(name, scene.sensors)
+                for own_times in (False, True):
+                    follow(TRACKERS["multi-sensor"].for_scene(scene, filter=chosen), scene, own_times)
             for targets, names in _CROWDS.items():
                 scene = simulate("crowd", 5, targets=targets, scans=3, width=50.0 * targets)
                 for name in names:
                     follow(TRACKERS[name].for_scene(scene), scene, False)
     return time.perf_counter() - started
+
+
+def _rank() -> None:
+    """Rank and weigh matrices, with and without all of their rows matched, and a scan."""
+    rng = np.random.default_rng(3)
+    # the last is too wide for exact sums
+    costs, small, wide = rng.normal(size=(12, 12)), np.zeros((2, 3)), rng.normal(size=(50, 50))
+    scene = simulate("crowd", 5, targets=20, scans=1, width=1_000.0)
+    for problem in (costs, small, wide, AssignmentProblem.from_matrix(costs, unassigned=0.5), build_problem(scene, 0)):
+        kbest(problem, 4)
+        marginals(problem, time_limit=1.0)
 
 
 def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:
