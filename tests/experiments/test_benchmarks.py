@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from experiments.benchmarks import goals, markdown, ranking, rows
-from experiments.benchmarks.__main__ import FAMILIES, main
-from experiments.benchmarks.families import Case, Entry, Instance, cases, on_one_core
+from experiments.benchmarks.__main__ import main
+from experiments.benchmarks.families import Case, Entry, Instance, on_one_core
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all, run_case, timed
 from experiments.common.instances import FIRST_SEED, synthetic
@@ -61,71 +61,6 @@ def test_speed_goal_needs_median_and_never_slower() -> None:
     assert verdict(goals.judge([ROW, PEER, *other, unproven]), "exact: 30 times").met
 
 
-def test_goals_of_proofs_on_ghosts() -> None:
-    def at(size: str, **changes: object) -> Row:
-        return replace(ROW, family="ghost", size=size, **changes)  # type: ignore[arg-type]
-
-    def peer(size: str, name: str, **changes: object) -> Row:
-        return replace(at(size), solver=name, peer=True, **changes)  # type: ignore[arg-type]
-
-    twenty = [at("20", seconds=0.02), peer("20", "highs", seconds=0.3), peer("20", "scip", seconds=0.1)]
-    found = goals.judge(twenty)
-    assert verdict(found, "exact: faster than every peer").met
-    assert not verdict(goals.judge([*twenty, peer("20", "cp_sat", seconds=0.01)]), "exact: faster").met
-    # a peer without a proof took at least its limit
-    forty = [at("40", seconds=2.0, extra=1e-3), peer("40", "highs", status="feasible", limit=60.0, seconds=60.0)]
-    found = goals.judge(forty)
-    assert verdict(found, "exact: 5 times as fast as HiGHS").met and verdict(found, "exact: at most 3 s").met
-    assert not verdict(goals.judge([replace(forty[0], status="feasible"), forty[1]]), "exact: 5 times").met
-    # a wide gap does not count for the three seconds
-    wide = goals.judge([at("40", seconds=9.0, extra=1e-2), at("40", seed=1001, seconds=1.0, extra=1e-3)])
-    assert verdict(wide, "exact: at most 3 s").met
-    sixty = [at("60", seed=s, status="optimal" if s % 2 else "feasible", seconds=9.0) for s in range(1, 6)]
-    assert verdict(goals.judge(sixty), "exact: proof in 60 s").met
-    assert not verdict(goals.judge(sixty[1:4]), "exact: proof in 60 s").met
-    gaps = (0.008, 0.009, 0.02)
-    hundred = goals.judge([at("100", seed=s, status="feasible", bound=-100 - gap) for s, gap in enumerate(gaps)])
-    assert verdict(hundred, "exact: gap at most 0.01 % in 30 s (median)").met
-    assert not verdict(hundred, "exact: gap at most 0.01 % in 30 s (each seed)").met
-
-
-def test_goals_of_wide_gaps_and_axial_problems() -> None:
-    wide = replace(ROW, family="wide gap", size="20", seconds=0.5)
-    scip = replace(wide, solver="scip_1", peer=True, seconds=1.4)
-    found = goals.judge([wide, scip, replace(scip, solver="cp_sat", seconds=0.1)])
-    assert verdict(found, "exact: faster than SCIP").met
-    assert not verdict(goals.judge([wide, replace(scip, seconds=0.4)]), "exact: faster than SCIP").met
-    gates = replace(wide, family="wide gates", size="1000")
-    for seconds, met in ((2.6, True), (2.4, False)):
-        found = goals.judge([gates, replace(gates, solver="highs", peer=True, seconds=seconds, cpu=seconds)])
-        assert verdict(found, "exact: 3 times as fast").met == met
-    known = replace(ROW, family="known optimum", size="n=50")
-    assert verdict(goals.judge([known]), "exact: proof in 20 s").met
-    assert not verdict(goals.judge([known, replace(known, seed=1001, status="feasible")]), "exact: proof").met
-    axial = replace(ROW, family="random axial", size="n=26")
-    assert "1 of 1, at most 0.01 s" in verdict(goals.judge([axial]), "exact: proof in 60 s").measured
-    for row in (known, axial):
-        assert verdict(goals.judge([row]), "exact: no slower than").met
-        assert not verdict(goals.judge([replace(row, seconds=7.0, cpu=7.0)]), "exact: no slower than").met
-    scan = replace(ROW, family="paper", size="3 radars", solver="aco")
-    assert verdict(goals.judge([replace(scan, seconds=9e-4)]), "aco: a scan in less than").met
-    assert not verdict(goals.judge([replace(scan, seconds=2e-3, cpu=2e-3)]), "aco: a scan in less than").met
-
-
-def test_a_limit_for_peers_and_chosen_seeds() -> None:
-    def make(seed: int):  # type: ignore[no-untyped-def]
-        yield Instance(*synthetic.planted(3, seed, targets=4))
-
-    peers = (Entry("highs", 5.0), Entry("highs", 60.0), Entry("sequential", 5.0))
-    case = Case("planted", "S=3", make, (*peers, Entry("exact", 5.0)), (7, 9))
-    short = case.changed(lambda entry: replace(entry, limit=4.0) if entry.peer else entry)
-    assert short.entries == (Entry("highs", 4.0), Entry("sequential", 4.0), Entry("exact", 5.0))
-    assert case.changed(lambda entry: None if entry.peer else entry).entries == (Entry("exact", 5.0),)
-    found = run_case(short, 1)
-    assert {row.seed for row in found} == {7} and {row.seed for row in run_case(short)} == {7, 9}
-    assert all(row.cpu > 0 for row in found if row.solver != "sequential")
-
-
 def test_several_processes_measure_the_same_on_one_core_each() -> None:
     def make(seed: int):  # type: ignore[no-untyped-def]
         yield Instance(*synthetic.planted(3, seed, targets=4))
@@ -145,61 +80,11 @@ def test_several_processes_measure_the_same_on_one_core_each() -> None:
     assert len(lines) == 5 and "again seed 7" in lines[3]
 
 
-def test_lagrangian_goal() -> None:
-    row = replace(ROW, solver="lagrangian@0.1%", cost=-99.95, seconds=0.01, status="feasible")
-    peer = replace(PEER, solver="cp_sat", seconds=0.6)
-    assert verdict(goals.judge([row, peer]), "lagrangian").met
-    assert not verdict(goals.judge([replace(row, bound=-101.0), peer]), "lagrangian").met
-    assert not verdict(goals.judge([row, replace(peer, seconds=0.4)]), "lagrangian").met
-
-
-def test_ghost_goals_compare_at_equal_and_at_long_time() -> None:
-    base = replace(ROW, family="ghost", size="60", proven=False)
-    ours = replace(base, solver="tabu", cost=-99.97, limit=5.0, seconds=5.0)
-    early = replace(base, solver="cp_sat", peer=True, cost=-99.0, limit=5.0, seconds=5.0, status="feasible")
-    late = replace(early, cost=-100.0, limit=60.0, seconds=60.0)
-    found = goals.judge([ours, early, late])
-    assert verdict(found, "tabu: in 5 s at or below any peer after 5 s").met
-    assert not verdict(found, "tabu: in 5 s at or below any peer after 60 s").met
-    level = [replace(row, seed=s, cost=-100.0) for s in (1, 2) for row in (ours, early, late)]
-    mixed = goals.judge([ours, early, late, *level])
-    assert verdict(mixed, "tabu: in 5 s at or below any peer after 60 s (median)").met
-    assert not verdict(mixed, "tabu: in 5 s at or below any peer after 60 s (each seed)").met
-    # a peer that was given 60 s but ended within 5 counts as one after 5 s
-    quick = goals.judge([ours, replace(late, seconds=3.0)])
-    assert not verdict(quick, "tabu: in 5 s at or below any peer after 5 s").met
-
-
-def test_shares() -> None:
-    base = replace(ROW, family="known optimum", size="n=20", solver="aco", cost=1.0, bound=1.0, reference=1.0)
-    tenth = [replace(base, seed=1000 + i, cost=1.0 if i else 1.1) for i in range(10)]
-    assert verdict(goals.judge(tenth), "aco").met
-    assert not verdict(goals.judge(tenth[:9]), "aco").met
-
-
 def test_rankings_are_ascending_from_the_optimum() -> None:
     ranking.check_ranked([1.0, 2.0, 2.0, 4.0], 1.0)
     for costs, best in (([1.0, 3.0, 2.0], 1.0), ([1.0, 2.0], 0.5), ([1.0, 2.0], 1.5)):
         with pytest.raises(AssertionError, match="kbest"):
             ranking.check_ranked(costs, best)
-
-
-@pytest.mark.slow
-def test_rankings_are_run_and_compared() -> None:
-    found = ranking.run(1, lambda text: None, spatial_k=4)
-    assert {row.solver: row.extra for row in found if row.size == ranking.SPATIAL} == {"kbest": 4, "exact": 1}
-    assert all(row.hit and row.cpu > 0 for row in found)
-
-
-def test_report_has_a_line_for_each_family_and_the_goals_missed() -> None:
-    text = markdown.render([ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], None)
-    assert "- **planted**: " in text
-    assert "| gated | 3x300 | 9,000 | 10 ms | 30 | - | - | 300 ms (highs) | - |" in text
-    assert "| planted | S=3 | 9,000 | - | - | 0 | - | - | - |" in text
-    assert "| gated | 2 of 2 |" in text
-    open_gap = markdown.render([replace(ROW, status="feasible", bound=-101.0), replace(PEER, status="feasible")], None)
-    assert "| gated | 3x300 | exact: the optimum, proven | worst excess 0 |" in open_gap
-    assert "| 10 ms, 0 of 1 proved, worst gap 1 % | - | - | - | 0 of 1 proved | - |" in open_gap
 
 
 def test_run_case_checks_and_compares() -> None:
@@ -232,14 +117,6 @@ def test_the_median_of_short_runs_counts(first: float, runs: int, counts: float)
     row = timed(run)
     assert len(done) == runs
     assert row == replace(ROW, seconds=counts, cpu=2.0 * counts)
-
-
-def test_cases_cover_the_families() -> None:
-    full = cases()
-    assert {case.family for case in full} == set(FAMILIES) - {"kbest"}
-    assert {c.size for c in full if c.family == "gated"} == {"3x100", "3x300", "3x1000", "4x300", "5x200"}
-    assert all(len(case.seeds) >= 5 for case in full if case.size != "n=100")
-    assert {int(case.size[2:]) for case in full if case.family == "random axial"} == set(range(4, 27, 2))
 
 
 def test_program_refuses_and_reports(
@@ -292,27 +169,6 @@ def test_tables_of_a_page_are_written_with_the_report(
     text = page.read_text()
     assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
     assert "| 3 sensors, 300 targets | 10 ms | 300 ms (HiGHS) | 2 % |" in text
-
-
-def test_the_readme_says_how_long_others_had() -> None:
-    base = replace(ROW, family="ghost", size="40", limit=5.0)
-    ours = [replace(base, solver=name) for name in ("exact", "aco", "genetic", "tabu")]
-    for limit in (7.0, 60.0):
-        peer = replace(ours[0], solver="highs", peer=True, limit=limit)
-        assert f"best other solver, {limit:g} s" in markdown.tables([*ours, peer])
-
-
-def test_a_brief_run_is_whole() -> None:
-    assert {(case.family, case.size): case.brief for case in cases()}["ghost", "20"] == 10
-    assert all(1 <= case.brief <= len(case.seeds) for case in cases())
-
-
-def test_a_report_written_again_keeps_its_head(tmp_path: Path) -> None:
-    path, report = tmp_path / "b.csv", tmp_path / "b.md"
-    rows.save(path, [ROW, PEER])
-    report.write_text(markdown.render([ROW, PEER], markdown.head(1.5, "make bench")))
-    assert main(["--report-only", "--csv", str(path)]) == 0
-    assert "\nWritten by `make bench` in 1.5 minutes, on " in report.read_text()
 
 
 def test_time_that_others_took_does_not_count():

@@ -1,17 +1,13 @@
 """The experiment on the clustering time window: its yardsticks are sound, and what it must show it shows, in small."""
 
-import math
-
 import numpy as np
 import pytest
 
-from assoc.metrics import ct_mt_it
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
 from experiments.common.claims import load_json
 from experiments.papers.clustering_time_window import __main__ as experiment
 from experiments.papers.clustering_time_window import (
-    false_start,
     own_tracker,
     pairs,
     published,
@@ -30,12 +26,6 @@ def test_the_papers_tables_agree_with_each_other():
     assert published.WITHOUT_WINDOW.mean(axis=0) == pytest.approx(published.OVERALL["without"], abs=2.5)
 
 
-def test_tens():
-    rates = np.arange(25.0)[:, None] * np.ones(3)
-    rates[3] = np.nan
-    assert published.by_tens(rates, 2)[:, 0] == pytest.approx([(45 - 3) / 9, np.arange(10, 25).mean()])
-
-
 def straight(count=20, speed=230.0, missing=()):
     """An aircraft eastward at 100 km, one exact plot in each turn of 10 s."""
     times = 10.0 * np.arange(count)
@@ -52,32 +42,6 @@ def test_the_baseline_follows_one_aircraft():
     assert (taken.tracks == 0).all()
     assert taken.confirmed.tolist() == [False, False] + [True] * (len(recording) - 2)
     assert tracker.mean[0] == pytest.approx([230 * 190 - 20e3, 1e5, 230.0, 0.0], rel=0.02, abs=10.0)
-
-
-@pytest.mark.parametrize(
-    ("settings", "tracks"),
-    [
-        ({"patience": 25.0}, 2),
-        ({"patience": 31.0}, 1),
-        ({"clock": 10.0, "deletion": "groups", "patience": 3}, 1),
-    ],
-)
-def test_the_baseline_deletes_by_its_rule(settings, tracks):
-    # two turns without a plot: 30 s; as empty windows are left out, groups do not show them
-    recording = straight(missing=(7, 8))
-    tracker = NearestNeighbourTracker(500.0, 5e-3, NearestSettings(speed=300.0, gate=40.0, **settings))
-    taken = run(tracker, clustering_time_window(recording, 10.0, by="time"))
-    assert len(np.unique(taken.tracks)) == tracks
-
-
-def test_the_thesis_tracker_forgets_lost_tracks():
-    recording = simulate_recording("rotating-radar", 5, duration=200.0).recording
-    groups = traffic.irregular_groups(recording, np.random.default_rng(0), traffic.MEAN_GROUP)
-    taken = [
-        run(traffic.METHODS[f"Reid's MHT, irregular groups{how}"][1](recording), groups) for how in ("", ", taking up")
-    ]
-    thesis, ours = (len(np.unique(one.tracks[one.confirmed])) for one in taken)
-    assert thesis > 1.5 * ours
 
 
 def test_window_and_stamps_are_worth_what_is_claimed():
@@ -119,52 +83,6 @@ def test_a_pair_keeps_its_tracks(kind):
         assert (pairs.switches(recording, changed), pairs.swaps(recording, changed)) == (switches, swaps)
 
 
-def test_a_false_start_is_where_it_should_be():
-    rng = np.random.default_rng(4)
-    plain = simulate_recording("rotating-radar", 3, aircraft=1, reach=150.0, duration=250.0).recording
-    without = false_start.with_false_start(plain, None, rng)
-    first = int(np.argmax(without.sources >= 0))
-    assert without.times[first] >= 19.0
-    for offset in ((0.0, 0.0), (1.0, 2.0)):
-        with_it = false_start.with_false_start(plain, offset, rng)
-        assert len(with_it) == len(without) + 1
-        added = next(k for k in range(len(with_it)) if with_it.times[k] not in without.times)
-        assert with_it.sources[added] == -1
-        # where the antenna is then, one turn before, and not farther off than asked for (and rounding)
-        off = with_it.times[added] / 9.5 - with_it.bearings[added] / (2 * math.pi)
-        assert abs(off - round(off)) < 2e-3
-        assert without.times[first] - with_it.times[added] == pytest.approx(9.5, abs=0.7)
-        apart = np.linalg.norm(with_it.positions[added] - without.positions[first]) / 1852
-        assert apart <= offset[1] + 1.5 and (offset[1] > 0 or apart == pytest.approx(0.0, abs=1e-6))
-
-
-def test_the_beginning_of_a_track():
-    recording = straight(20)
-    sources = np.append(-1, recording.sources)
-    longer = Recording(
-        np.append(-10.0, recording.times),
-        np.append(9e4, recording.ranges),
-        np.append(1.0, recording.azimuths),
-        sources=sources,
-    )
-    rows = np.arange(21)
-
-    def judged(tracks):
-        return false_start.beginning(longer, Taken(rows, rows, np.array(tracks), np.ones(21, dtype=bool)))
-
-    assert judged([-1] + [3] * 20) == (100.0, 100.0, 100.0)
-    assert judged([3] * 21) == (100.0, 0.0, 100.0)
-    assert judged([3, 3, 3] + [4] * 18) == pytest.approx((100 * 10 / 12, 100.0, 100.0))
-    assert judged([-1] * 21) == (0.0, 0.0, 0.0)
-
-
-def test_wilsons_interval():
-    low, high = pairs.wilson([True] * 95 + [False] * 5)
-    # from Wilson's formula as printed by Brown, Cai & DasGupta (2001), eq. 4
-    assert (low, high) == pytest.approx((88.83, 97.85), abs=0.01)
-    assert pairs.wilson([True] * 10)[1] == 100.0
-
-
 @pytest.mark.slow
 def test_the_experiment():
     # every method on one short recording
@@ -178,33 +96,6 @@ def test_the_experiment():
     # in so short a recording tracks are confirmed late; what compares still holds
     assert claims["CT gained by the window with constant step, MHT"].ours > 0
     assert claims["CT, groups 1 to 10, Reid's MHT, CTW"].paper == 70.3
-
-
-def test_plots_of_tracks_that_are_never_confirmed():
-    recording = straight(8)
-    # two false plots, each in a track of its own, and one in the aircraft's
-    sources = np.array([0, 0, -1, 0, -1, 0, -1, 0])
-    judged = Recording(recording.times, recording.ranges, recording.azimuths, sources=sources)
-    rows, tracks = np.arange(8), np.array([0, 0, 1, 0, 2, 0, 0, 0])
-    taken = Taken(np.zeros(8, int), rows, tracks, np.isin(tracks, [0]))
-    assert own_tracker.wrong(judged, taken) == pytest.approx((100 * 3 / 8, 100 / 6, 1, 3))
-
-
-def test_a_window_longer_than_a_turn_takes_aircraft_twice():
-    one = straight(60)
-    recording = Recording(9.5 * np.arange(60), one.ranges, one.azimuths, sources=one.sources)
-    twice = {
-        turn: sum(own_tracker._repeats(recording.sources[window.rows])
-                  for window in clustering_time_window(recording, turn, by="time"))
-        for turn in (9.5, 10.0)
-    }  # fmt: skip
-    assert twice == {9.5: 0, 10.0: 3}
-
-
-def test_bends_of_a_path():
-    square = np.array([(0, 0), (1, 0), (1, 1), (1, 1), (0, 1), (0, 0.0)])
-    assert own_tracker.bends(np.arange(6.0), square) == pytest.approx(90.0)
-    assert own_tracker.bends(np.arange(4.0), np.arange(8.0).reshape(4, 2)) == 0.0
 
 
 def test_clusters_by_a_spanning_tree():
@@ -232,21 +123,6 @@ def test_the_thesiss_own_tracker(tmp_path):
     assert ours["head-on: pairs without a switch, Reid's MHT, time stamps"] == 100
 
 
-def test_rates_need_sources():
-    taken = Taken(np.zeros(1, int), np.zeros(1, int), np.zeros(1, int), np.ones(1, bool))
-    found = taken.rates(straight(1))
-    assert (found.ct, found.it) == (100.0, 0.0)
-    assert found.mt == ct_mt_it([0], [0], [0], [True]).mt == 0.0
-
-
-def test_every_method_of_the_table_runs():
-    short = simulate_recording("rotating-radar", 3, duration=60.0).recording
-    windows = clustering_time_window(short, 9.5)
-    for name, (_, make) in traffic.METHODS.items():
-        taken = run(make(short), windows)
-        assert len(taken.rows) == sum(len(window) for window in windows), name
-
-
 def test_the_thesiss_tables_are_on_the_radars_grid():
     # three rows of its table 4.9 (aircraft 902): 117, 118 and 120 nautical miles at 220.8352 degrees, as in table 2.1
     places = np.array([(-54.6461, 63.22964), (-55.1132, 63.77006), (-56.0473, 64.85091)])
@@ -259,12 +135,6 @@ def test_the_thesiss_tables_are_on_the_radars_grid():
     assert tables.headings(square) % 360 == pytest.approx([0, 90, 180, 270])
 
 
-def test_plots_held_by_a_track_are_counted_once():
-    truth = np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])
-    assert tables.held(truth, truth) == (3, 0)
-    assert tables.held(truth, np.array([(1.0, 0.0), (1.0, 0.0), (5.0, 0.0)])) == (1, 2)
-
-
 def test_tables_become_a_recording_with_times():
     rows = [{"x_px": 0.0, "y_px": -y, "altitude_fl": 100.0} for y in (50.0, 50.8, 51.6, 58.0)]
     recording = tables.as_recording({7: rows})
@@ -272,11 +142,3 @@ def test_tables_become_a_recording_with_times():
     assert np.diff(recording.times) / traffic.ROTATION == pytest.approx([1, 1, 8], abs=0.02)
     assert recording.ranges / 1852 == pytest.approx(np.array([50.0, 50.8, 51.6, 58.0]) * 7 / 5)
     assert recording.bearings == pytest.approx([0.0] * 4, abs=1e-9)
-
-
-def test_the_tables_must_be_there(tmp_path, capsys):
-    with pytest.raises(SystemExit) as stop:
-        tables.program([str(tmp_path / "nowhere")])
-    assert stop.value.code == 2 and "expected a folder" in capsys.readouterr().err
-    with pytest.raises(SystemExit, match="expected a file t4_09_"):
-        tables.read(tmp_path, 9)

@@ -1,6 +1,5 @@
 """The experiments with filters as programs: their claims, JSON and figures, at their quick size."""
 
-import inspect
 import re
 from functools import partial
 
@@ -12,7 +11,6 @@ from experiments.common.claims import load_json
 from experiments.common.command import main
 from experiments.common.results import Results
 from experiments.filters import benchmark, manoeuvres
-from experiments.filters.b1 import Setting
 from experiments.papers.dubins_enkf import __main__ as dubins_enkf
 from experiments.papers.dubins_enkf import along_path, flight_paths
 from experiments.papers.fuzzy_ekf import __main__ as fuzzy_ekf
@@ -88,10 +86,6 @@ def test_b1_holds_at_full_size():
     assert len(claims) == 3 and all(claim.holds for claim in claims)
 
 
-def test_beta_of_b1():
-    assert Setting().beta == pytest.approx(100e3 * 0.0261799**2 / 30, rel=1e-4)
-
-
 @pytest.mark.slow
 def test_fuzzy_experiment(tmp_path):
     name, experiment, about = fuzzy_ekf.program.args
@@ -108,46 +102,6 @@ def test_fuzzy_experiment(tmp_path):
         by_name["C: RMSE, the paper's rules, tuned sets"].ours
         < by_name["C: RMSE, the paper's rules, sets chosen by eye"].ours
     )
-
-
-def test_quick_runs_have_the_same_rivals():
-    for turns, least in ((False, 19), (True, 49)):
-        assert len(list(fuzzy_ekf.fixed(turns))) == least
-    assert "quick" not in inspect.signature(fuzzy_ekf.fixed).parameters
-
-
-def test_new_manoeuvres_are_those_that_were_drawn():
-    import numpy as np
-
-    drawn = manoeuvres.random_flights(3, np.random.default_rng(20_261_122))
-    for own, one in zip(manoeuvres.NEW_SCENARIOS.values(), drawn, strict=True):
-        assert len(own.turns) == len(one.turns)
-        for turn, other in zip(own.turns, one.turns, strict=True):
-            assert (turn.start, turn.end, turn.g) == pytest.approx((other.start, other.end, other.g), abs=0.06)
-        assert own.position == pytest.approx(one.position, abs=6)
-        assert (own.speed, own.heading) == pytest.approx((one.speed, one.heading % (2 * np.pi)), abs=0.6)
-
-
-def test_scenarios_are_as_described():
-    import numpy as np
-
-    for name, g, speed in (("C", 1.0, 250.0), ("E", 4.0, 350.0)):
-        flight = manoeuvres.SCENARIOS[name]
-        track = flight.positions()
-        assert track.shape == (101, 3)
-        second = track[2:] - 2 * track[1:-1] + track[:-2]
-        k = int(flight.turns[0].start) + 5
-        assert np.linalg.norm(second[k]) == pytest.approx(g * 9.81, rel=0.01)
-        assert np.linalg.norm(np.diff(track, axis=0), axis=1) == pytest.approx(speed, rel=0.01)
-
-
-def test_tuning_never_sees_the_reports_flights():
-    import numpy as np
-
-    for flight in manoeuvres.random_flights(50, np.random.default_rng(20_000)):
-        assert all(
-            flight.position != one.position and flight.turns != one.turns for one in manoeuvres.SCENARIOS.values()
-        )
 
 
 @pytest.mark.slow

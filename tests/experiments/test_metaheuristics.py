@@ -1,6 +1,5 @@
 """The experiments on the parts and settings of the metaheuristics."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 import assoc
 from assoc.packing.run import Run
-from assoc.solvers.aco.parameters import AcoParameters
 from experiments.metaheuristics import ablation, parts, running, sweep
 from experiments.metaheuristics.problems import problem
 
@@ -90,17 +88,6 @@ def test_pheromone_fades_away_without_its_limit():
         assert (colony.pheromone[1] < 0.25) == fades and colony.pheromone[0] == pytest.approx(0.65)
 
 
-@pytest.mark.slow
-def test_ablation_reports_every_part(tmp_path, capsys):
-    file = tmp_path / "results.json"
-    words = ["--only", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
-    assert ablation.program([*words, "--json", str(file)]) == 0
-    capsys.readouterr()
-    found = {claim["quantity"] for claim in json.loads(file.read_text())["claims"]}
-    expected = {part.words for part in parts.PARTS if "genetic" in part.solvers}
-    assert {one.split("genetic, ")[1].rsplit(", above", 1)[0] for one in found if "genetic, " in one} == expected
-
-
 def test_figures_are_differences_from_the_whole():
     costs = {
         ("aco", parts.WHOLE): np.array([-100.0, -50.0]),
@@ -131,37 +118,3 @@ def test_sweep_measures_settings_of_small_problems(monkeypatch):
         assert claims["x: worst setting"] >= claims["x: rho 0.3, ants 15"] >= -1e-9
         # with everything at work small problems are solved
         assert how != "mmas, full" or claims["x: worst setting"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_defaults_are_the_advice():
-    defaults = AcoParameters()
-    assert {name: getattr(defaults, name) for name in sweep.ADVICE} == sweep.ADVICE
-
-
-def test_claims_of_a_case():
-    every = sweep.settings()
-    # the largest alpha is best on all problems but the second, where everything is worse
-    excess = np.array([[9.0 - one["alpha"], 3.0, 3.0 - one["alpha"], 3.0 - one["alpha"]] for one in every])
-    claims = {claim.quantity.split(": ")[1]: claim for claim in sweep.claims_of("x", excess)}
-    best = next(words for words in claims if words.startswith("best setting"))
-    # chosen on the first and the third, judged on the second and the fourth
-    assert "alpha 2" in best and claims[best].ours == pytest.approx(2.0)
-    assert claims["table 1's advice"].ours == pytest.approx(2.0)
-    assert claims["table 1's advice less the best setting"].ours == pytest.approx(0.0)
-    assert claims["worst setting"].ours == pytest.approx(4.5)
-    assert claims["alpha 1, beta 1"].ours == pytest.approx((8.0 + 3.0 + 2.0 + 2.0) / 4)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--only", "nothing"], "invalid choice: 'nothing'"),
-        (["--solvers", "exact"], "invalid choice: 'exact'"),
-        (["--count", "1"], "at least 2"),
-    ],
-)
-def test_bad_arguments(words, said, capsys):
-    with pytest.raises(SystemExit) as stop:
-        ablation.program(words)
-    assert stop.value.code == 2
-    assert said in capsys.readouterr().err

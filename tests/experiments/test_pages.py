@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.__main__ import programs
-from experiments.common.claims import Claim
-from experiments.common.results import RESULTS, Results, number
+from experiments.common.results import RESULTS, Results
 from experiments.pages import commands, verdicts
 from experiments.pages.__main__ import FOLDER, TABLES, main, refresh
 
@@ -74,17 +73,6 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
     assert f" {nearest.ours:.2f} ({verdicts.interval(nearest)}) against 4.03, {words} |" in row
 
 
-def test_verdicts_say_no_more_than_the_intervals():
-    def claim(ours, low, high, band):
-        return Claim(f"RMS of {ours:g}", "", None, ours, (low, high), band, source="table 1")
-
-    sure, crossing = claim(0.9, 0.85, 0.95, (None, 1.0)), claim(0.99, 0.97, 1.01, (None, 1.0))
-    assert verdicts.verdict(sure, crossing) == "holds"
-    assert verdicts.below_one([sure, crossing]) == "holds in 1 of 2" and verdicts.below_one([crossing]) == verdicts.NOT
-    assert verdicts.at_the_edge(sure, crossing) == "0.99 at the edge"
-    assert verdicts.at_the_edge(sure) == "none at the edge"
-
-
 def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, capsys):
     path = tmp_path / "x.md"
     path.write_text("old\n")
@@ -109,10 +97,3 @@ def test_result_files_are_small_dated_and_name_their_sources(path):
             assert re.search(r"(table|figure|equation|section|conclusion|abstract)s?\b", claim["source"]), claim
         if claim["band"] is not None:
             assert claim["source"], claim["quantity"]
-
-
-def test_numbers():
-    assert [number(one) for one in (2086.63, 88.54, 1.0, 0.00942, 521.13, 9.4079)] == [
-        "2,087", "88.5", "1.00", "0.00942", "521", "9.41",
-    ]  # fmt: skip
-    assert number(521.13, 4) == "521.1" and number(0.0) == "0.00" and number(-4.36) == "-4.36"

@@ -5,7 +5,7 @@ import pytest
 
 import assoc
 from assoc.problem import AssignmentProblem
-from experiments.common import contestants, peers
+from experiments.common import contestants
 from experiments.common.instances import synthetic
 from tests import oracles
 
@@ -45,13 +45,6 @@ def test_one_sensor_at_a_time_is_feasible_and_not_better() -> None:
     assert found >= 3
 
 
-def test_two_sensors_sequential_is_exact() -> None:
-    for problem in oracles.small_problems(60, seed=3, dummy=True):
-        if problem.num_sensors == 2 and (problem.costs[np.count_nonzero(problem.tuples, axis=1) == 1] == 0).all():
-            answer = contestants.run("sequential", problem, 1.0)
-            assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)
-
-
 @pytest.mark.parametrize("name", ["exact", "tabu", "annealing", "cp_sat_1"])
 def test_those_listened_to_tell_what_they_find(name: str) -> None:
     problem, heard = synthetic.axial_random(6, 0), []
@@ -85,29 +78,3 @@ def test_independent_sets_are_associations(name: str) -> None:
         answer = contestants.run(name, problem, 0.5)
         # a graph of some ten vertices: each of them finds its heaviest set, to the rounding of weights
         assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-4)
-
-
-@pytest.mark.parametrize("name", ["chils", "mmwis", "branch_reduce"])
-def test_a_graph_without_edges_is_taken_whole(name: str) -> None:
-    pytest.importorskip("chszlablib")
-    problem = AssignmentProblem([[1, 1], [2, 2]], [-3.0, -1.0], [2, 2])
-    answer = contestants.run(name, problem, 0.5)
-    assert (answer.cost, answer.proven) == (-4.0, True)
-
-
-def test_conflict_graph() -> None:
-    tuples = [[1, 1], [1, 2], [2, 2], [2, 1], [1, 0], [0, 1]]
-    problem = AssignmentProblem(tuples, [-3.0, -1.0, -2.0, 4.0, -0.5, 0.25], [2, 2])
-    vertices, weights, graph = peers.conflict_graph(problem)
-    # what a tuple saves against its false alarms: -0.25 + 3, -0.5 + 1, 2, and nothing
-    chosen = problem.tuples[vertices].tolist()
-    saved = dict(zip(map(tuple, chosen), weights / 1e6, strict=True))
-    assert saved == pytest.approx({(1, 1): 2.75, (1, 2): 0.5, (2, 2): 2.0}, abs=2e-6)
-    place = {tuple(row): i for i, row in enumerate(chosen)}
-    joined = {(i, j) for i, j in zip(*graph.nonzero(), strict=True)}
-    assert joined == {
-        (place[1, 1], place[1, 2]), (place[1, 2], place[1, 1]), (place[1, 2], place[2, 2]), (place[2, 2], place[1, 2]),
-    }  # fmt: skip
-    with pytest.raises(ValueError, match="dummies"):
-        peers.conflict_graph(synthetic.axial_random(3, 0))
-    assert not contestants.takes("chils", synthetic.axial_random(3, 0))

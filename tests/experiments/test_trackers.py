@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from assoc import simulation
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
-from experiments.common.claims import Claim, load_json, save_json
-from experiments.pages import tables as pages
+from experiments.common.claims import load_json
 from experiments.trackers import (
     as_they_are,
     asynchronous,
-    bearings,
     benchmark,
     biases,
     close_targets,
@@ -62,11 +59,6 @@ def test_the_labelled_filter_on_the_same_detections():
     np.testing.assert_allclose(theirs.gospa, ours.gospa, atol=4.0)
 
 
-def test_a_peer_stops_when_its_time_is_over():
-    one = plane.simulate(3, 0.2, 5, 1)
-    assert len(benchmark.judged(iter([(0.1, np.zeros((0, 2)))] * 5), one, 0.0).seconds) == 1
-
-
 def test_close_targets_and_the_oracle():
     scene = close_targets.simulate(close_targets.SETTINGS["formations"], 100, 6)
     oracle, mht = (judging.judge(name, scene) for name in ("oracle", "mht"))
@@ -86,48 +78,6 @@ def test_rows_of_sensors_as_they_are(row):
     for scene in (case.declared, case.known or case.declared):
         assert scene.num_scans >= 10 and len(np.unique(np.concatenate(scene.truth.target_ids))) >= 2
         assert sum(int((one >= 0).sum()) for scan in scene.truth.sources for one in scan) > 100
-
-
-def test_the_table_of_sensors_as_they_are(capsys):
-    arguments = ["--seeds", "1", "--only", "8 g", "ships, radar and AIS", "--trackers", "oracle"]
-    assert as_they_are.program(arguments) == 0
-    shown = [line for line in capsys.readouterr().out.splitlines() if "oracle  " in line]
-    assert [line.split("oracle")[0] for line in shown] == ["8 g, ", "ships, radar and AIS, "]
-    with pytest.raises(SystemExit):
-        as_they_are.program(["--only", "nothing"])
-
-
-def test_goals_hold_by_their_intervals():
-    values = np.array([0.9, 1.0, 1.1])
-    assert judging.goal("x", "", values, 1.3).holds is True
-    # the mean is below, a part of the interval is not
-    assert judging.goal("x", "", values, 1.2).holds is False
-    assert judging.goal("x", "", values, 1.2, surely=False).holds is True
-    assert judging.goal("x", "", values, 0.7, surely=False).holds is False
-    alone = judging.goal("x", "", values[:1], 0.95)
-    assert alone.interval is None and alone.holds is True and alone.source == judging.GOAL
-
-
-def test_the_table_of_goals(tmp_path):
-    """Of all files, in order; met or not as the claim says, whatever the figures."""
-    good = judging.goal("late", "m", np.array([1.0, 1.2]), 3.0)
-    bad = judging.goal("slow", "ms", np.array([30.0, 31.0]), 20.0)
-    save_json(tmp_path / "trackers.one.json", [Claim("other", "m", ours=5.0), good], "trackers.one", 0)
-    save_json(tmp_path / "trackers.two.json", [bad], "trackers.two", 0)
-    lines = pages.goals(("one", "two"), tmp_path).splitlines()
-    assert lines[0] == "1 of 2 goals are met."
-    assert lines[-2:] == [
-        "| `one` | late | 1.10 ± 1.3 m | at most 3 m | yes |",
-        "| `two` | slow | 30.5 ± 6.4 ms | at most 20 ms | **no** |",
-    ]
-
-
-def test_bearings_are_judged_on_the_ground():
-    scene = simulation.simulate("bearing-only", 200, targets=2, scans=12)
-    found = bearings.judge("nearest-neighbour", scene)
-    assert len(found.false) == len(found.tracked) == 12 and 0 <= found.late <= 2
-    nothing = bearings.judge("nearest-neighbour", scene.part(0, 2))
-    assert nothing.late >= 1 and nothing.tracked[0] == 0.0 and nothing.false[0] == 0
 
 
 @pytest.mark.slow
