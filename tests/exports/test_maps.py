@@ -2,8 +2,6 @@
 
 import json
 import math
-from importlib import import_module
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,9 +10,8 @@ import pytest
 
 from assoc.errors import AssocWarning, InvalidInputError
 from assoc.exports.maps import write_map
-from assoc.scene import Scene, Truth
+from assoc.scene import Scene
 from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
-from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker, track_scene
 
@@ -90,15 +87,6 @@ def test_tracks_have_coordinates_and_call_signs(scene, tmp_path):
     assert len(root.findall(".//k:Placemark", space)) == frame["track_id"].nunique()
 
 
-def test_only_known_heights_are_shown(tmp_path):
-    """Those known to 2 km; a track without them lies on the ground."""
-    frame = pd.DataFrame({"track_id": [1, 1, 2, 2, 3, 3], "time": [0.0, 1] * 3, "latitude": 1.0, "longitude": 3.0})
-    frame = frame.assign(altitude=[5e3, 5e3, 5e3, 5e3, np.nan, np.nan], sigma_z=[50, 60, 2500, 2600, 0, 0])
-    write_map(tmp_path / "a.kml", frame)
-    found = ElementTree.parse(tmp_path / "a.kml").findall(".//{*}altitudeMode")
-    assert [one.text for one in found] == ["absolute", "clampToGround", "clampToGround"]
-
-
 def test_a_map_over_the_date_line_and_of_a_point(tmp_path):
     frame = pd.DataFrame({"track_id": [1, 1, 1, 2], "time": [0.0, 1, 2, 0], "latitude": 1.0, "altitude": 5.0})
     frame["longitude"] = [179.9, -179.9, -179.8, 3.0]
@@ -110,18 +98,6 @@ def test_a_map_over_the_date_line_and_of_a_point(tmp_path):
         write_map(tmp_path / "b.kml", frame.drop(columns="latitude"))
     with pytest.raises(InvalidInputError, match="end in .geojson or .kml"):
         write_map(tmp_path / "b.shp", frame)
-
-
-@pytest.mark.parametrize(
-    ("origin", "message"),
-    [((47.0, 8.0, 0.0), r"latitude must be within \+-1.571 rad, got 47 \(degrees\?\)"), ((1.0, 2.0), "shape")],
-)
-def test_origins_that_are_none(origin, message):
-    sensor = PositionSensor(position=[0, 0, 0], noise=[1, 1], field_of_view=[[-1, 1]] * 2)
-    with pytest.raises(InvalidInputError, match=message):
-        Scene([sensor], [0.0], [[[]]], origin=origin)
-    with pytest.raises(InvalidInputError, match="names must be texts by target ids"):
-        Truth([[1]], [[[0, 0, 0]]], names={"a": "b"})
 
 
 def test_times_units_and_what_is_left_out(tmp_path):
@@ -170,27 +146,3 @@ def test_parquet(tmp_path):
     (tmp_path / "bad.parquet").write_bytes(b"nothing of that kind")
     with pytest.raises(InvalidInputError, match=r"bad.parquet: is not a Parquet file"):
         simulate("from-tracks", 1, file=str(tmp_path / "bad.parquet"))
-
-
-def test_the_programs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "flights.csv").write_text(FLIGHTS + "5,4b1,SWR1,47,8,\n")
-
-    def run(program, *words):
-        code = import_module(program).main([*words])
-        return SimpleNamespace(returncode=code, **capsys.readouterr()._asdict())
-
-    done = run("assoc.simulate", "from-tracks", "flights.csv", "-o", "scene.npz")
-    assert done.returncode == 0 and "rows left out, without altitude: 1" in done.out
-    done = run("assoc.track", "scene.npz", "-o", "tracks.csv", "--map", "tracks.kml")
-    assert done.returncode == 0, done.err
-    assert {"latitude", "longitude", "altitude", "target"} <= {*pd.read_csv(tmp_path / "tracks.csv").columns}
-    assert "SWR1" in (tmp_path / "tracks.kml").read_text()
-    simulate("three-radar", scans=4).save(tmp_path / "nowhere.npz")
-    done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--map", "x.geojson")
-    assert done.returncode == 2 and "give --origin LAT,LON" in done.err and not (tmp_path / "x.csv").exists()
-    done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--origin", "91,8")
-    assert done.returncode == 2 and "--origin: expected a latitude within" in done.err
-    done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--origin", "47.4,8.5", "--map", "x.geojson")
-    assert done.returncode == 0, done.err
-    assert pd.read_csv(tmp_path / "x.csv")["latitude"].between(47, 48).all()

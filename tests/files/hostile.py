@@ -3,8 +3,6 @@
 python -m tests.files.hostile [NAME ...]        a table: the file, its size, the peak, how the program ended
 """
 
-import bz2
-import gzip
 import lzma
 import os
 import sqlite3
@@ -59,18 +57,16 @@ def _zipped(path: Path) -> None:
         archive.writestr("x.csv", REPORTS + b"0,a,1,2,3\n" * 20_000_000)
 
 
-def _parquet(path: Path, name: str, rows: int, groups: int = 1) -> None:
+def _parquet(path: Path, name: str, rows: int) -> None:
     """Equal rows: almost nothing in the file, however many."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    rows = rows // groups
     numbers = pa.array(np.zeros(rows))
     names = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), [name])
     table = pa.table({"time": numbers, "id": names, "lat": numbers, "lon": numbers, "altitude": numbers})
     with parquet.ParquetWriter(path, table.schema) as writer:
-        for _ in range(groups):
-            writer.write_table(table)
+        writer.write_table(table)
 
 
 def _npz(format_name: str, arrays: dict[str, Any], kind: int = zipfile.ZIP_DEFLATED) -> Callable[[Path], object]:
@@ -139,15 +135,6 @@ def _counted(head: bytes, again: bytes, size: int) -> Callable[[Path], object]:
     return lambda path: path.write_bytes(lzma.compress(head.replace(b"N", b"%d" % count) + again * count))
 
 
-def _different(path: Path) -> None:
-    """Tuples that are all different, in as few bytes as may be."""
-    lines = b"".join(b"0 %d %d %d\n" % (i, j, k) for i in range(1, 71) for j in range(1, 71) for k in range(1, 71))
-    head = b"assoc-problem 1\nsizes 70 70 70\ndummies no\ntuples %d\n" % 70**3
-    path.write_bytes(lzma.compress(head + lines))
-    diagonal = "".join(f"{i} {i} {i}\n" for i in range(1, 71))
-    (path.parent / "diagonal.txt").write_text(f"assoc-solution 1\n{diagonal}")
-
-
 def _padded(path: Path) -> None:
     """Equal rows beside three megabytes that cannot be packed, so that many are allowed."""
     import pyarrow as pa
@@ -181,35 +168,14 @@ LIVE = "assoc.live {} --turns 4,5,5.5 -o /dev/null"
 
 HOSTILE = [
     Hostile("problem.txt.xz", packed(lzma, HEAD, b"0 1\n", 4.9e8), SOLVE),
-    Hostile("empty-lines.txt.xz", packed(lzma, HEAD, b"\n", 4.9e8), SOLVE),
-    Hostile("one-line.txt.xz", packed(lzma, HEAD, b"0 ", 4.9e8), SOLVE),
     Hostile("checked.txt.xz", packed(lzma, HEAD, b"0 1\n", 1.9e8), CHECK),
-    Hostile("checked-empty.txt.xz", packed(lzma, HEAD, b"\n", 1.9e8), CHECK),
     Hostile("proof.xz", packed(lzma, b'{"a": [1', b",[]", 1.5e8), "assoc.check {folder}/good.txt {}"),
-    Hostile("proof-of-numbers.xz", packed(lzma, b'{"a": [1', b",1", 1.5e8), "assoc.check {folder}/good.txt {}"),
     Hostile("solution.xz", packed(lzma, b"assoc-solution 1\n", b"1\n", 1.9e8), "assoc.check {folder}/good.txt {}"),
     Hostile("flights.csv.xz", packed(lzma, REPORTS, b"0,a,1,2,3\n", 1e9), FLIGHTS),
-    Hostile("flights.csv.gz", packed(gzip, REPORTS, b",,,,\n", 4e8), FLIGHTS),
-    Hostile("flights.csv.bz2", packed(bz2, REPORTS, b"0,a,1,2,3\n", 2e8), FLIGHTS),
     Hostile("flights.csv.zip", _zipped, FLIGHTS),
-    Hostile("header.csv.xz", packed(lzma, REPORTS[:-1], b",a", 5e7), FLIGHTS),
     Hostile("flights.parquet", lambda path: _parquet(path, "a", 40_000_000), FLIGHTS),
     Hostile("long-names.parquet", lambda path: _parquet(path, "a" * 1_000_000, 5_000), FLIGHTS),
-    Hostile("groups.parquet", lambda path: _parquet(path, "a", 20_000_000, 200), FLIGHTS),
     # just within what is allowed
-    Hostile(
-        "within.txt.xz",
-        _counted(b"assoc-problem 1\nsizes 1\ndummies no\ntuples N\n", b"0 1\n", 15_900_000),
-        SOLVE,
-        code=0,
-    ),
-    Hostile("different.txt.xz", _different, "assoc.check {} {folder}/diagonal.txt", code=0),
-    Hostile(
-        "within.json.xz",
-        _counted(b'{"format": N, "trees": [', b"1e999,", 3_900_000),
-        "assoc.check {folder}/good.txt {}",
-    ),
-    Hostile("within.csv.xz", _counted(REPORTS, b",,,,\n", 15_900_000), FLIGHTS),
     Hostile("within-named.csv.xz", _counted(REPORTS, b"0,a,1,2,3\n", 15_900_000), FLIGHTS, code=0),
     Hostile("within.parquet", _padded, FLIGHTS, code=0),
     Hostile(

@@ -110,11 +110,3 @@ def test_known_cases():
     # half of the targets found, and both found 50 m off: at ten of nineteen thresholds
     assert hota(truth, line([5]), CUTOFF).hota == pytest.approx(np.sqrt(0.5))
     assert hota(truth, line([5, 6], offset=50.0), CUTOFF).hota == pytest.approx(10 / 19)
-
-
-def test_nothing_is_not_a_number_and_all_missed_is_zero():
-    nothing = Trajectories([], [], np.zeros((0, 3)))
-    assert np.isnan(hota(nothing, nothing, CUTOFF).hota)
-    assert hota(line([0]), nothing, CUTOFF).hota == hota(nothing, line([0]), CUTOFF).hota == 0.0
-    assert hota(line([0]), line([0], offset=200.0), CUTOFF).hota == 0.0
-    assert repr(hota(line([0]), line([3]), CUTOFF)) == "Hota(1.000, detection 1.000, association 1.000)"

@@ -26,7 +26,6 @@ from assoc.metrics import (
 )
 from assoc.metrics.ct_mt_it import RatesSoFar
 from assoc.metrics.plot_identity import IdentitiesSoFar
-from assoc.metrics.trajectories import last_at_each_instant
 
 
 def along_lines(spans):
@@ -49,22 +48,6 @@ def test_a_switch_a_gap_and_a_false_track():
     assert (found.mostly_tracked, found.mostly_lost, found.targets) == (2, 0, 2)
 
 
-def test_a_target_keeps_its_track_while_that_is_near():
-    truth = along_lines([(0, 0, 0, 3)])
-    places = np.concatenate([truth.positions + [0, 200.0, 0], (truth.positions + [0, 10.0, 0])[1:]])
-    tracks = Trajectories([0, 1, 2, 1, 2], [1, 1, 1, 2, 2], places)
-    found = identity(truth, tracks, 300.0)
-    assert (found.switches, found.matches, found.false) == (0, 3, 2)
-    assert found.motp == pytest.approx(200.0)
-
-
-def test_as_many_pairs_as_possible():
-    # the closest pair first would leave one target without a track
-    truth = Trajectories([0, 0], [0, 1], [[0, 0, 0], [10, 0, 0]])
-    tracks = Trajectories([0, 0], [0, 1], [[9, 0, 0], [-9.5, 0, 0]])
-    assert identity(truth, tracks, 9.9).matches == 2
-
-
 @settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_pairs_are_as_many_as_brute_force_finds(seed):
@@ -82,16 +65,6 @@ def test_pairs_are_as_many_as_brute_force_finds(seed):
     assert found.matches == best[0]
     if found.matches:
         assert found.motp == pytest.approx(-best[1] / best[0])
-
-
-def test_nothing_to_compare():
-    none = Trajectories([], [], [])
-    some = along_lines([(0, 0, 0, 3)])
-    assert math.isnan(identity(none, none, 1.0).mota)
-    assert identity(none, some, 1.0).false == 3
-    assert identity(some, none, 1.0).mota == 0.0
-    assert math.isnan(track_rmse(some, none, 1.0)[0])
-    assert summarise(none, none, 1.0).gospa == 0.0
 
 
 def test_label_switches():
@@ -128,39 +101,6 @@ def test_identity_switches_of_plots():
     for wrong in ([1], [[1, 2]]):
         with pytest.raises(InvalidInputError, match="have one shape"):
             identity_after_each([1, 2], wrong)
-
-
-def test_tracks_of_one_identity():
-    sources = np.array([1, 2] * 12)
-    every = np.ones(24, dtype=bool)
-    true = np.array([5, 6] * 12)
-    assert tracks_of_one_identity(sources, true, every) == (2, 2)
-    # a garbled code, a false plot and a plot of nobody change nothing
-    garbled = sources.copy()
-    garbled[[8, 13]] = 3, -1
-    assert tracks_of_one_identity(garbled, true, every) == (2, 2)
-    # two tracks swap their aircraft: neither keeps one
-    swapped = np.where(np.arange(24) < 12, true, 11 - true)
-    assert tracks_of_one_identity(sources, swapped, every) == (0, 2)
-    # ... but only what is confirmed counts, and tracks of false plots have no identity
-    assert tracks_of_one_identity(sources, swapped, np.arange(24) < 12) == (2, 2)
-    assert tracks_of_one_identity(np.full(24, -1), true, every) == (0, 0)
-    assert tracks_of_one_identity(sources, np.full(24, -1), every) == (0, 0)
-    with pytest.raises(InvalidInputError, match="one shape"):
-        tracks_of_one_identity(sources, true[:3], every)
-
-
-def test_ct_mt_it_by_hand():
-    # two windows, aircraft 0 and 1, one false plot in each; track 5 is confirmed from its second plot on
-    windows = [0, 0, 0, 1, 1, 1, 1]
-    sources = [0, 1, -1, 0, 1, -1, 1]
-    tracks = [5, 6, 7, 5, -1, 6, 5]
-    confirmed = [False, False, False, True, False, True, True]
-    found = ct_mt_it(windows, sources, tracks, confirmed)
-    # window 1: aircraft 0 is right; the second plot of aircraft 1 is in a track that is aircraft 0's;
-    # the false plot is in a confirmed track of aircraft 1
-    assert found.per_window == pytest.approx(np.array([[0, 0, 100], [100 / 3, 100 / 3, 200 / 3]]))
-    assert (found.ct, found.mt, found.it) == pytest.approx((100 / 6, 100 / 6, 250 / 3))
 
 
 def test_ct_mt_it_against_a_plain_reading():
@@ -212,21 +152,6 @@ def test_plots_in_parts_count_as_all_at_once():
     whole = ct_mt_it(windows, sources, tracks, confirmed)
     np.testing.assert_array_equal(rates.result().per_window, whole.per_window)
     assert kept.result() == tracks_of_one_identity(sources, tracks, confirmed)
-
-
-def test_association_accuracy():
-    #            group 0      group 1   none
-    labels = [0, 0, 0, 1, 1, -1, -1]
-    sources = [4, 4, 5, 5, -1, -1, 4]
-    found = association_accuracy(sources, labels)
-    assert found.pair_precision == pytest.approx(1 / 4)
-    assert found.pair_recall == pytest.approx(1 / 4)
-    assert found.purity == pytest.approx(3 / 5)
-    assert found.false_alarms_recognised == pytest.approx(1 / 2)
-    assert found.targets_recognised == pytest.approx(4 / 5)
-    split = association_accuracy(sources, labels, instants=[0, 1, 0, 0, 0, 0, 0])
-    assert split.pair_precision == 0.0
-    assert math.isnan(association_accuracy([], []).purity)
 
 
 @settings(max_examples=60)
@@ -283,13 +208,6 @@ def test_targets_in_several_scans_of_one_time_count_once():
     found = Trajectories.from_scene(scene)
     assert found.ids.tolist() == [1, 2, 1]
     assert found.positions.tolist() == [[1.0] * 3, [1.0] * 3, [0.0] * 3]
-
-
-def test_the_last_row_at_each_instant():
-    times, ids = np.array([0.0, 0.0, 1.0, 0.0, 1.0]), np.array([3, 4, 3, 3, 4])
-    assert last_at_each_instant(times, ids).tolist() == [1, 2, 3, 4]
-    assert last_at_each_instant(np.zeros(0), np.zeros(0, dtype=np.int64)).tolist() == []
-    assert last_at_each_instant(np.zeros(1), np.array([7])).tolist() == [0]
 
 
 def _sensors():

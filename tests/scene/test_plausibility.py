@@ -10,14 +10,10 @@ import pytest
 
 import assoc
 from assoc.errors import AssocWarning, InvalidInputError
-from assoc.plotting.report import write_association_report
-from assoc.recordings import clustering_time_window, radar_of
 from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D
-from assoc.simulation import names, recording_names, simulate, simulate_recording
-from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
-from assoc.tracking.offline.plots import step_windows
-from tests.running import program
+from assoc.simulation import simulate
+from assoc.tracking import MultiSensorTracker, track_scene
 from tests.sizes import sample
 
 FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(
@@ -36,11 +32,6 @@ SCENARIOS = [
     ("rotating-radars", {}),
     ("from-tracks", {"scans": 8}),
 ]
-
-
-def test_the_list_of_scenarios_is_whole():
-    assert {name for name, _ in SCENARIOS} == {*names()}
-    assert recording_names() == ["rotating-radar"]
 
 
 # the bearings take as long as all others together
@@ -64,15 +55,6 @@ def test_no_warning_on_any_scenario(name, values, seed, tmp_path):
             assoc.associate(again)
             tracker = MultiSensorTracker(again.sensors, region=again.region)
             track_scene(tracker, again, scans=range(min(again.num_scans, 8)))
-
-
-def test_no_warning_on_a_scenarios_plots():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        recording = simulate_recording("rotating-radar", 1).recording
-        tracker = TrackOrientedMHT([radar_of(recording)])
-        for _ in step_windows(tracker, clustering_time_window(recording)[:5]):
-            pass
 
 
 def test_no_warning_at_the_edges_of_what_is_sound():
@@ -141,35 +123,12 @@ def test_few_measurements_in_other_units(few, message):
     assert len(caught) == 1
 
 
-def test_positions_in_degrees_or_kilometres():
-    rng = np.random.default_rng(1)
-    sensor = PositionSensor(position=[0, 0, 0], noise=[50, 50], field_of_view=[[-1e5, 1e5]] * 2)
-    places = rng.uniform([7, 46], [9, 48], size=(10, 4, 2))
-    with pytest.warns(AssocWarning) as caught:
-        Scene([sensor], np.arange(10), [[one] for one in places])
-    expected = r"PositionSensor \(sensor 0\): its x \(.* m\) all lie closer together than their noise \(50 m\)"
-    assert len(caught) == 2 and re.match(expected, str(caught[0].message))
-
-
 def test_sensors_in_degrees():
     with pytest.warns(AssocWarning, match="noise of azimuth is 5 rad: degrees"):
         BearingSensor(position=[0, 0, 0], noise=[5.0])
     view = [[0, 1e5], [-1, 1], [0, 60]]
     with pytest.warns(AssocWarning, match="field_of_view of elevation is 0 to 60 rad"):
         Radar3D(position=[0, 0, 0], noise=[50, 0.01, 0.01], field_of_view=view)
-
-
-def test_costs_of_which_none_is_negative():
-    costs = np.random.default_rng(2).uniform(0, 9, size=27)
-    problem = assoc.AssignmentProblem(np.argwhere(np.ones((3, 3, 3))) + 1, costs, [3, 3, 3])
-    with pytest.warns(AssocWarning, match="none of the 27 tuples costs less .* negative log likelihood ratios"):
-        found = assoc.assign(problem)
-    assert found.status == "optimal" and (np.count_nonzero(found.tuples, axis=1) == 1).all()
-    with pytest.warns(AssocWarning, match="none of the 2 tuples"):
-        assoc.assign(assoc.AssignmentProblem([[1, 1], [2, 2]], [3.0, 5.0], [2, 2]))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assoc.assign(assoc.AssignmentProblem(problem.tuples[:27], np.append(costs[:-1], -1.0), [3, 3, 3]))
 
 
 def test_dates_become_seconds():
@@ -199,28 +158,3 @@ def test_dates_that_are_refused(times, message):
     scene = simulate("three-radar", scans=3)
     with pytest.raises(InvalidInputError, match=message):
         Scene(scene.sensors, times, scene.measurements)
-
-
-def test_dates_elsewhere_are_refused():
-    with pytest.raises(InvalidInputError, match=r"position must be numbers, got datetime64\[s\]"):
-        BearingSensor(position=np.zeros(3, "datetime64[s]"), noise=[0.1])
-
-
-@pytest.mark.slow
-def test_programs_say_it_in_a_line(tmp_path):
-    with pytest.warns(AssocWarning):
-        changed(simulate("three-radar", scans=6), [0.001, 1.0, 1.0]).save(tmp_path / "km.npz")
-    for name, *words in (["solve", "km.npz", "--jobs", "2", "--report", "a.html"],
-                         ["track", "km.npz", "-o", "tracks.csv", "--report", "b.html"]):  # fmt: skip
-        done = program(f"assoc.{name}", *words, cwd=tmp_path)
-        lines = done.stderr.splitlines()
-        assert done.returncode == 0 and len(lines) == 3
-        assert all(one.startswith(f"assoc.{name}: warning: Radar3D 'radar ") for one in lines)
-    for page in ("a.html", "b.html"):
-        text = (tmp_path / page).read_text()
-        assert "<b>3 warnings</b>" in text and text.count("lie outside of its field of view") == 3
-    # a sound one says nothing of warnings
-    simulate("three-radar", scans=2).save(tmp_path / "sound.npz")
-    sound = Scene.load(tmp_path / "sound.npz")
-    write_association_report(tmp_path / "c.html", assoc.associate(sound), sound)
-    assert "warned" not in (tmp_path / "c.html").read_text().split("</style>")[1].split("<script")[0]

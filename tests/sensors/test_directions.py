@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from assoc import Scene, associate
+from assoc import Scene
 from assoc.costs import positions_and_covariances, tuple_costs
 from assoc.sensors import DirectionSensor
-from assoc.tracking import TRACKERS
-from assoc.tracking.filter_choice import two_speeds
-from tests.tracking.stepping import stepped
 
 SITES = [[0, 0, 0], [900, 0, 50], [200, 1000, 20]]
 NOISE = np.array([[4e-6, 1e-6], [1e-6, 2e-6]])
@@ -48,19 +45,3 @@ def test_positions_and_costs_are_those_of_least_squares():
         np.testing.assert_allclose(spread[k], np.linalg.inv(best.jac.T @ best.jac), rtol=0.02, atol=0.01)
         expected = best.cost - hit * np.count_nonzero(row) - math.log(0.1) * np.count_nonzero(row == 0)
         assert costs[k] == pytest.approx(expected, abs=0.01)
-
-
-def test_directions_find_targets_and_tracks():
-    scene, paths = scene_of()
-    found = associate(scene).scans[0].positions
-    assert np.linalg.norm(found[:, None] - paths[0], axis=2).min(axis=0).max() < 10.0
-    tracker = TRACKERS["multi-sensor"].for_scene(scene, two_speeds(5.0))
-    stepped(tracker, scene)
-    last = np.array([track.position for track in tracker.tracks if track.confirmed])
-    assert len(last) == 3 and np.linalg.norm(last[:, None] - paths[-1], axis=2).min(axis=0).max() < 10.0
-
-
-def test_a_scene_file(tmp_path):
-    scene, _ = scene_of(2)
-    scene.save(tmp_path / "scene.npz")
-    assert Scene.load(tmp_path / "scene.npz").sensors == scene.sensors

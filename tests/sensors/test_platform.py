@@ -8,13 +8,10 @@ import pytest
 
 from assoc import AssocWarning, InvalidInputError, Scene, associate, build_problem, sensors
 from assoc.costs import positions_and_covariances
-from assoc.plotting import plot_scene
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
-from assoc.simulation import observe
-from assoc.tracking import TRACKERS, smoothed
+from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import two_speeds
 from tests.sizes import sample
-from tests.tracking.stepping import stepped
 
 TURN = [-math.pi, math.pi]
 # a ship on a circle, its bow along the circle
@@ -72,19 +69,6 @@ def test_measurements_are_relative_to_the_carrier(name):
         assert standing.in_view(found).all()
         density = sensor.false_alarm_rate / sensor.volume
         assert standing.false_alarm_rate / standing.volume == pytest.approx(density)
-
-
-def test_simulated_sensors_on_a_platform_see_what_those_standing_there_see():
-    on_board = [replace(sensor, platform=SHIP, detection_probability=0.999) for sensor in KINDS.values()]
-    times, still = np.arange(5.0, 45.0, 10.0), np.array([[300.0, 200, 50], [-700.0, 300, 10]])
-    scene = observe(on_board, times, [np.arange(2)] * 4, [still] * 4, np.random.default_rng(3))
-    for k, time in enumerate(times):
-        for sensor, z, source in zip(on_board, scene.measurements[k], scene.truth.sources[k], strict=True):
-            assert set(source.tolist()) >= {0, 1} and sensor.in_view(z).all()
-            for target in range(2):
-                exact = relative(sensor, SHIP, time, still[target], np.zeros(3))
-                off = sensor.residual(z[source == target], exact[None]) / np.sqrt(np.diagonal(sensor.covariance))
-                assert np.abs(off).max() < 4.5
 
 
 def boats(time):
@@ -153,29 +137,6 @@ def test_a_moving_sensors_scan_costs_that_of_one_standing_there():
     assert np.linalg.norm(fused[:2] - boats(time)[0, :2]) < 15.0
     targets = associate(scene).scans[7].positions[:, :2]
     assert np.linalg.norm(targets[:, None] - boats(time)[:, :2], axis=2).min(axis=0).max() < 20.0
-
-
-def test_smoothed_tracks_of_a_ship():
-    scene = scene_of(["radar2d", "position"])
-    tracker = TRACKERS["multi-sensor"].for_scene(scene, two_speeds(2.0, 2))
-    decisions = [step.final for step in stepped(tracker, scene)]
-    table = smoothed(tracker, scene, [one for final in decisions for one in final])
-    times, _, places = table.arrays()
-    last = places[times == scene.times[-1]]
-    assert np.linalg.norm(last[:, None, :2] - boats(scene.times[-1])[:, :2], axis=2).min(axis=0).max() < 10.0
-
-
-def test_pictures_are_drawn_where_sensors_stand():
-    axes = pytest.importorskip("matplotlib.pyplot").figure().gca()
-    scene = scene_of(["radar2d", "position"])
-    plot_scene(scene, scan=4, ax=axes)
-    drawn = {line.get_label(): line.get_xydata() for line in axes.lines}
-    (radar,) = [points for label, points in drawn.items() if label.startswith("sensor 1")]
-    factor = 1.0 if np.abs(radar).max() > 50 else 1e-3
-    apart = np.linalg.norm(radar[:, None] - factor * boats(scene.times[4])[:, :2], axis=2)
-    assert apart.min(axis=0).max() < 30.0 * factor
-    standing = factor * np.array([sensor.at(scene.times[4]).position[:2] for sensor in scene.sensors])
-    np.testing.assert_allclose(drawn["sensors"], standing)
 
 
 def test_scene_files(tmp_path):

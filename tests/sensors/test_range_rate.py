@@ -20,11 +20,6 @@ def states(count=40, seed=0):
     return np.hstack([rng.uniform(-1e4, 1e4, (count, 3)), rng.normal(0, 200, (count, 3))])
 
 
-def test_receding_is_positive():
-    z = RADAR.measure(RADAR.position + [[3e3, 4e3, 0.0]] * 2, np.array([[6.0, 8.0, 5.0], [-8.0, 6.0, 0.0]]))
-    np.testing.assert_allclose(z[:, [0, 3]], [[5e3, 10.0], [5e3, 0.0]], atol=1e-12)
-
-
 def test_jacobian_is_the_derivative_of_the_measurement():
     x = states()
     H = RADAR.jacobian(x[:, :3], x[:, 3:])
@@ -55,38 +50,6 @@ def test_compiled_model_is_the_sensor(axes):
     v = np.array([1.0, 4.0, 5.0, 6.0])
     wrap(RADAR3D, v)
     np.testing.assert_allclose(v, [1.0, 4.0 - 2 * math.pi, 5.0, 6.0])
-
-
-def test_what_is_refused():
-    with pytest.raises(InvalidInputError, match="a range rate needs the targets' velocities"):
-        RADAR.measure(np.zeros((1, 3)))
-    with pytest.raises(InvalidInputError, match=r"field_of_view must have shape \(4, 2\)"):
-        Radar3D(position=np.zeros(3), noise=[50, 1e-3, 2e-3, 0.5], field_of_view=VIEW[:3])
-    with pytest.raises(InvalidInputError, match=r"noise must have shape \(3,\) or \(3, 3\) or \(4,\) or \(4, 4\)"):
-        Radar3D(position=np.zeros(3), noise=np.ones(5), field_of_view=VIEW)
-
-
-def test_the_part_that_tells_positions():
-    plain = Radar3D(position=[100, -200, 30], noise=[50, 1e-3, 2e-3], field_of_view=VIEW[:3])
-    assert RADAR.position_part == plain and plain.position_part is plain
-    assert RADAR.measures_velocity and not plain.measures_velocity
-    x = states()
-    np.testing.assert_array_equal(RADAR.measure(x[:, :3], x[:, 3:])[:, :3], plain.measure(x[:, :3]))
-
-
-def test_a_target_on_the_radar_gives_numbers():
-    place, velocity = RADAR.position[None], np.ones((1, 3))
-    assert np.isfinite(RADAR.measure(place, velocity)).all() and np.isfinite(RADAR.jacobian(place, velocity)).all()
-
-
-def test_scenes_are_saved_with_range_rates(tmp_path):
-    x = states(5)
-    scene = Scene([RADAR, RADAR.position_part], [0.0], [[RADAR.measure(x[:, :3], x[:, 3:]), np.zeros((0, 3))]])
-    scene.save(tmp_path / "scene.npz")
-    again = Scene.load(tmp_path / "scene.npz")
-    assert again.sensors[0] == RADAR and again.sensors[1] == RADAR.position_part
-    np.testing.assert_array_equal(again.measurements[0][0], scene.measurements[0][0])
-    assert "range rate 0.5 m/s" in scene._repr_html_()
 
 
 def test_folded_rates_and_the_notch():

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from assoc.errors import InvalidInputError
-from assoc.sensors import KINDS, BearingSensor, DirectionSensor, PositionSensor, Radar2D, Radar3D
-from assoc.sensors.base import wrap_angle
+from assoc.sensors import BearingSensor, DirectionSensor, PositionSensor, Radar2D, Radar3D
 
 CIRCLE = [-math.pi, math.pi]
 SENSORS = {
@@ -74,27 +73,6 @@ def test_residuals_of_angles_are_wrapped(a, b):
     assert math.isclose(math.sin(difference), math.sin(a - b), abs_tol=1e-9)
 
 
-def test_wrapping_keeps_pi():
-    np.testing.assert_allclose(
-        wrap_angle(np.array([math.pi, -math.pi, 3 * math.pi, 0.0])), [math.pi, math.pi, math.pi, 0]
-    )
-
-
-def test_field_of_view_may_pass_through_pi():
-    sensor = BearingSensor(position=[0, 0, 0], noise=[0.1], field_of_view=[[3, 4]])
-    assert sensor.volume == pytest.approx(1)
-    z = np.array([[3.1], [-3.1], [4 - 2 * math.pi], [2.9], [0.0], [-2.0]])
-    assert sensor.in_view(z).tolist() == [True, True, True, False, False, False]
-    assert SENSORS["bearing"].volume == pytest.approx(2 * math.pi)
-
-
-def test_volume_and_view_of_a_radar():
-    radar = SENSORS["radar3d"]
-    assert radar.volume == pytest.approx(1e5 * 2 * math.pi)
-    z = np.array([[5e4, 3.0, 0.5], [-1, 0, 0.5], [2e5, 0, 0.5], [5e4, 0, -0.1]])
-    assert radar.in_view(z).tolist() == [True, False, False, False]
-
-
 def test_noise_is_standard_deviations_or_a_covariance():
     np.testing.assert_allclose(SENSORS["radar3d"].covariance, np.diag([2500, 1e-6, 4e-6]))
     np.testing.assert_allclose(SENSORS["plane"].covariance, [[2, 1], [1, 3]])
@@ -104,47 +82,23 @@ def test_noise_is_standard_deviations_or_a_covariance():
     assert np.array_equal(dataclasses.replace(SENSORS["plane"], noise=turned).covariance, turned)
 
 
-def test_sensors_are_values():
-    radar = SENSORS["radar3d"]
-    assert radar == dataclasses.replace(radar, noise=np.diag([2500, 1e-6, 4e-6]))
-    assert radar != dataclasses.replace(radar, false_alarm_rate=2.0)
-    assert hash(radar) == hash(dataclasses.replace(radar))
-    zero, minus = (dataclasses.replace(radar, position=[x, 0, 0]) for x in (0.0, -0.0))
-    assert zero == minus and hash(zero) == hash(minus)
-    with pytest.raises(ValueError, match="read-only"):
-        radar.position[0] = 1
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        radar.name = "other"
-    assert repr(radar) == "Radar3D 'north'((100, -200, 30) m, P_d 0.9, 1 false alarms per scan)"
-    assert all(KINDS[s.kind] is type(s) for s in SENSORS.values())
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"detection_probability": 0.0}, "detection_probability must be strictly between"),
-        ({"detection_probability": 1.0}, "detection_probability"),
-        ({"detection_probability": float("nan")}, "detection_probability"),
         ({"detection_probability": "0.9"}, "detection_probability must be one number"),
         ({"false_alarm_rate": 0.0}, "false_alarm_rate must be above 0"),
-        ({"false_alarm_rate": float("inf")}, "false_alarm_rate"),
         ({"noise": [50, -1e-3, 1e-3]}, "noise must be positive"),
-        ({"noise": [50, 0, 1e-3]}, "noise must be positive"),
         ({"noise": [50, 1e-3]}, r"noise must have shape \(3,\) or \(3, 3\) or \(4,\) or \(4, 4\), got \(2,\)"),
-        ({"noise": [50, float("nan"), 1e-3]}, "noise must be finite"),
-        ({"noise": np.diag([1, 1, -1])}, "positive definite"),
         ({"noise": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "positive definite"),
         ({"noise": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "symmetric"),
-        ({"noise": "loud"}, "noise must be numbers"),
         ({"noise": [1e-30] * 3}, "too small"),
         ({"position": [0, 0]}, r"position must have shape \(3,\)"),
-        ({"position": [0, 0, float("inf")]}, "position must be finite"),
         ({"position": [0, 0, 1e15]}, "position must be within"),
         ({"field_of_view": [[0, 1], [0, 1]]}, "field_of_view must have shape"),
         ({"field_of_view": [[1, 0], CIRCLE, [0, 1]]}, "field_of_view of range must have lower < upper"),
         ({"field_of_view": [[0, 1], [0, 7], [0, 1]]}, "more than a full circle"),
         ({"field_of_view": None}, "field_of_view is missing"),
-        ({"name": 7}, "name must be text"),
     ],
 )
 def test_bad_sensors_are_refused_in_one_line(changes, words):

@@ -68,14 +68,6 @@ def test_noise_has_the_stated_covariance(scene, s):
     assert stats.kstest(z[:, 0], "norm").pvalue > 1e-3
 
 
-def test_angles_stay_wrapped_and_order_tells_nothing(scene):
-    bearings = np.concatenate([scene.measurements[k][2] for k in range(SCANS)])
-    assert (bearings > -math.pi).all() and (bearings <= math.pi).all()
-    # were detections listed first, a false alarm would hardly ever be the first of its scan
-    first = np.mean([scene.truth.sources[k][3][0] == -1 for k in range(SCANS)])
-    assert abs(first - RATE / (RATE + TARGETS * DETECTION)) < 0.1
-
-
 def test_what_is_out_of_view_is_not_detected():
     sensor = BearingSensor(
         position=[0, 0, 0],
@@ -122,17 +114,6 @@ def test_field_of_view_is_the_smallest_box_around_the_region(seed):
         name="",
     )
     assert radar.in_view(radar.measure(points)).all()
-
-
-def test_azimuths_from_the_edge_of_a_field():
-    field = np.array([[0.0, 100.0], [0.0, 100.0], [0.0, 1.0]])
-    assert azimuth_interval(np.zeros(3), field) == pytest.approx((0.0, math.pi / 2))
-    assert azimuth_interval(np.array([100.0, 0.0, 0.0]), field) == pytest.approx((math.pi / 2, math.pi))
-    assert azimuth_interval(np.array([50.0, 0.0, 0.0]), field) == pytest.approx((0.0, math.pi))
-    assert azimuth_interval(np.array([50.0, 50.0, 0.0]), field) == (-math.pi, math.pi)
-    # behind the field the interval passes through pi
-    low, high = azimuth_interval(np.array([200.0, 50.0, 0.0]), field)
-    assert (low, high) == pytest.approx((math.pi - math.atan2(50, 100), math.pi + math.atan2(50, 100)))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
-from assoc.simulation import names, parameters, simulate
+from assoc.simulation import simulate
 from assoc.simulation.scenarios.bearing_only import BearingOnlyParameters, sensor_positions
 
 
@@ -71,15 +71,6 @@ def test_crowd_keeps_its_density_on_request():
     assert fixed.sensors[0].false_alarm_rate == pytest.approx(40.0)
 
 
-@pytest.mark.parametrize("sensor", ["position", "radar"])
-def test_nobody_leaves_the_crowds_region(sensor):
-    scene = simulate("crowd", targets=30, scans=5, interval=10.0, sensor=sensor)
-    for k in range(5):
-        where = scene.scan(k).truth_positions
-        assert ((where >= scene.region[:, 0]) & (where <= scene.region[:, 1])).all()
-        assert all(s.in_view(s.measure(where)).all() for s in scene.sensors)
-
-
 def test_bearing_only_has_the_stated_geometry():
     np.testing.assert_allclose(sensor_positions(BearingOnlyParameters()) / 1000, [[0, 0, 0], [50, -10, 0], [100, 0, 0]])
     scene = simulate("bearing-only", sensors=5, targets=12, scans=20, interval=30.0)
@@ -89,26 +80,14 @@ def test_bearing_only_has_the_stated_geometry():
         assert ((where >= scene.region[:, 0]) & (where <= scene.region[:, 1])).all()
 
 
-@pytest.mark.parametrize("name", names())
-def test_every_parameter_is_described(name):
-    from dataclasses import fields
-
-    assert all(field.metadata["help"] for field in fields(parameters(name)))
-
-
 @pytest.mark.parametrize(
     ("name", "values", "message"),
     [
         ("four-radar", {}, "unknown name 'four-radar'"),
         ("three-radar", {"colour": 1}, "colour: no parameter"),
         ("three-radar", {"detection_probability": 1.0}, "detection_probability: expected .* between 0 and 1"),
-        ("three-radar", {"detection_probability": 0.0}, "detection_probability"),
         ("three-radar", {"noise": -1.0}, "noise: expected a number above 0"),
-        ("three-radar", {"noise": float("nan")}, "noise: expected a number above 0"),
         ("three-radar", {"scans": 0}, "scans: expected a whole number from 1"),
-        ("three-radar", {"scans": 2.5}, "scans: expected a whole number"),
-        ("three-radar", {"false_alarms": 0.0}, "false_alarms: expected a number above 0"),
-        ("crowd", {"targets": True}, "targets: expected a whole number"),
         ("crowd", {"sensor": "sonar"}, "sensor: expected 'position' or 'radar'"),
         ("bearing-only", {"sensors": 1}, "sensors: expected a whole number from 2"),
         ("from-tracks", {}, "file: scenario 'from-tracks' needs a value"),
@@ -117,9 +96,3 @@ def test_every_parameter_is_described(name):
 def test_refusals(name, values, message):
     with pytest.raises(InvalidInputError, match=message):
         simulate(name, **values)
-
-
-@pytest.mark.parametrize("seed", [-1, 1.5, True, "3"])
-def test_bad_seed(seed):
-    with pytest.raises(InvalidInputError, match="seed: expected a whole number >= 0"):
-        simulate("crowd", seed)

@@ -9,12 +9,6 @@ from assoc.simulation.scenarios.three_radar import TRAJECTORIES
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 
 
-def test_straight_line():
-    line = Trajectory([1.0, 2.0, 3.0], [10.0, -20.0, 0.5])
-    np.testing.assert_allclose(line.positions(np.array([0.0, 2.0])), [[1, 2, 3], [21, -38, 4]])
-    np.testing.assert_allclose(line.velocities(np.array([0.0, 2.0])), [[10, -20, 0.5]] * 2)
-
-
 def test_manoeuvres_against_numerical_integration():
     manoeuvres = (Manoeuvre(2.0, 5.0, (1.0, -2.0, 0.3)), Manoeuvre(4.0, np.inf, (-3.0, 0.0, 0.1)))
     target = Trajectory([5.0, 6.0, 7.0], [1.0, 2.0, 3.0], manoeuvres)

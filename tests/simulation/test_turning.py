@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from assoc.errors import InvalidInputError
 from assoc.scene.own_times import looked_at
 from assoc.simulation import simulate
 
@@ -71,26 +70,3 @@ def test_false_alarms_are_as_many_a_turn_as_the_sensor_says(scene, s):
     count = 20.0 * 300.0 / TURNS[s]
     assert abs((sources < 0).sum() - count) < 4 * math.sqrt(count)
     assert scene.sensors[s].in_view(z[sources < 0]).all()
-
-
-def test_one_radar_may_be_given_its_turn_as_a_number():
-    made, same = (simulate("rotating-radars", 1, turns=turns, duration=20.0) for turns in (4, "4"))
-    assert len(made.sensors) == 1
-    for one, other in zip(made.measurements, same.measurements, strict=True):
-        np.testing.assert_array_equal(one[0], other[0])
-    with pytest.raises(InvalidInputError, match="turns: expected seconds for a turn of each radar"):
-        simulate("rotating-radars", 1, turns=[4, 5])
-
-
-def test_recorded_traffic_under_turning_radars(tmp_path):
-    file = tmp_path / "tracks.csv"
-    rows = [f"{1.6e9 + t},a,48.{t:03d},2.5,9000" for t in range(0, 100, 5)]
-    file.write_text("time,id,lat,lon,altitude\n" + "\n".join(rows))
-    made = simulate("from-tracks", 0, file=str(file), turns="4,5", radars=2, interval=4.0)
-    assert made.sectors is not None and made.truth.target_ids[3].tolist() == [0]
-    assert 20 < sum(int((s == 0).sum()) for scan in made.truth.sources for s in scan) < 45
-    with pytest.raises(InvalidInputError, match="interval: expected at most the shortest turn, 4 s, got 10 s"):
-        simulate("from-tracks", 0, file=str(file), turns="4,5", radars=2)
-    for changes in ({"turns": "4,5,6"}, {"turns": "4,x"}, {"turns": "4,-5"}, {"turns": "2,5"}):
-        with pytest.raises(InvalidInputError, match="turn"):
-            simulate("from-tracks", 0, **({"file": str(file), "radars": 2, "interval": 4.0} | changes))

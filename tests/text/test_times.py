@@ -1,7 +1,6 @@
 """Times as people read them, in every place that shows them."""
 
 import io
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -9,8 +8,6 @@ import pytest
 
 from assoc._cli.track.plot_lines import TrackWriter
 from assoc._text.times import decimals, moment
-from assoc.plotting.live import LivePage
-from assoc.simulation import simulate
 from assoc.tracking import Picture, Track, TrackTable
 
 NOON = 1_626_098_402.5
@@ -58,15 +55,3 @@ def test_live_tracks_have_fractions_and_places_on_earth():
         # 224 km away the plane is 4 km above the ground
         assert np.isnan(live.altitude[0]) if len(positions) == 2 else live.altitude[0] == pytest.approx(324, abs=1)
         assert "2021-07-12 14:00:02.5Z" in repr(track(NOON))
-
-
-def test_the_page_shows_heights_above_the_earth():
-    scene = replace(simulate("three-radar", 1, scans=1), origin=(0.8, 0.1, 400.0))
-    for heights in (True, False):
-        page = LivePage(scene, heights=heights)
-        try:
-            number, x, _, height, *_, latitude, longitude = page._row(track(NOON), None, ())
-        finally:
-            page.close()
-        assert (number, x) == (7, 1e5) and 45 < latitude < 49 and 5 < longitude < 9
-        assert height is None if not heights else height == pytest.approx(324, abs=1)
