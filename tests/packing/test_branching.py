@@ -4,27 +4,20 @@ import numpy as np
 import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.depth_first import Limits, search_depth_first
-from assoc.packing.branching.node import branch, drop, new_work, open_node
-from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import (
     NEITHER,
     TOGETHER,
     answer,
-    any_open_pair,
     decide,
     doubtful_pairs,
-    is_dropped,
     new_trials,
 )
-from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound, first_solution
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.packing.simplex.basis import primal_values
 from assoc.packing.simplex.dual import Effort
-from assoc.packing.simplex.program import all_allowed, program_of
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
@@ -85,42 +78,6 @@ def test_only_better_solutions_are_looked_for():
         assert search.done and search.columns is None
 
 
-def test_without_memory_the_deepest_node_is_given_up():
-    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
-    nodes = OpenNodes(plain_root(packing, np.zeros(packing.num_rows)))
-    nodes.arrays.bound[0] = -7.0
-    nodes.grow(lambda needed: False)
-    assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
-
-
-def test_without_memory_for_its_tables_a_search_gives_up_its_root():
-    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
-    search = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, memory_allows=lambda needed: False)
-    search.run(10)
-    assert search.done and search.out_of_memory and search.nodes == 0 and search.lower_bound == -np.inf
-
-
-def test_nodes_that_hold_nothing_better_need_no_room():
-    """Nodes that can be pruned are closed even without room for children, not given up."""
-    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
-    root = plain_root(packing, dual_bound(packing))
-    stack = OpenNodes(root).arrays
-    stack.bound[:] = -7.0
-    work = new_work(packing.arrays, root.program, root.slack)
-    full = stack.first.size - 1
-    num_open, weight, count, nodes = search_depth_first(work, stack, full, -7.0, Limits(1e-9, np.inf, 10, np.inf))
-    assert (num_open, weight, count, nodes) == (0, -7.0, -1, 0)
-
-
-def test_a_bound_that_is_no_number_drops_no_column():
-    packing = prepare(axial_problem(np.random.default_rng(79), (4, 4, 4))).packing
-    root = plain_root(packing, dual_bound(packing))
-    work = new_work(packing.arrays, root.program, root.slack)
-    work.duals[:] = np.nan
-    assert drop(work, packing.num_columns, np.nan, 1.0) == packing.num_columns
-    assert work.node.columns.all() and np.array_equal(work.node.slack, packing.slack)
-
-
 @pytest.mark.parametrize("granularity", [0.0, 1.0])
 def test_where_nothing_is_left_to_cover_nothing_is_chosen(granularity):
     """Dives can end with such a packing; whole-numbered weights then caused a division by zero."""
@@ -131,38 +88,6 @@ def test_where_nothing_is_left_to_cover_nothing_is_chosen(granularity):
         search = BranchAndBound(packing, np.zeros(0), incumbent, 1e-9)
         search.run(10)
         assert search.done and search.weight == weight and (search.columns is not None) is (weight == 0.0)
-
-
-@pytest.mark.slow
-def test_the_two_children_of_a_node_partition_its_solutions():
-    """Two rows of different sensors are together in one child, apart in the other: each solution is in one of them."""
-    for problem, _ in feasible(30, 75):
-        prepared = prepare(problem)
-        packing = prepared.packing
-        pairs = [(a, b) for cols in packing.cols.tolist() for a in cols for b in cols if 0 <= a < b]
-        if not pairs:
-            continue
-        one, two = pairs[len(pairs) // 2]
-        root = plain_root(packing, dual_bound(packing))
-        stack = OpenNodes(root).arrays
-        work = new_work(packing.arrays, root.program, root.slack)
-        num = open_node(work, stack, 0, -1)
-        assert num == packing.num_columns
-        assert branch(work, stack, 0, num, (one, two), True, -5.0) == 2
-        children = [set(stack.arena[stack.first[t] : stack.first[t] + stack.size[t]].tolist()) for t in range(2)]
-        # the likelier one is on top
-        for columns, joined in zip(children, (False, True), strict=True):
-            assert columns == {j for j in range(num) if not is_dropped(packing.cols, j, one, two, joined)}
-        assert (stack.bound[:2] == -5.0).all()
-        assert not stack.slack[1, [one, two]].any() and np.array_equal(stack.slack[0], packing.slack)
-        for solution in all_covers(packing):
-            together = any({one, two} <= set(packing.cols[j].tolist()) for j in solution)
-            inside = [
-                set(solution) <= columns and must_be_covered(packing, stack.slack[t], solution)
-                for t, columns in enumerate(children)
-            ]
-            # both uncovered, or in two columns: apart
-            assert inside == [not together, together]
 
 
 def test_a_verdict_on_a_pair_is_true():
@@ -200,20 +125,6 @@ def test_a_verdict_on_a_pair_is_true():
             if set(cover) <= left and must_be_covered(packing, side.slack, cover):
                 assert packing.weights[list(cover)].sum() >= cutoff - 1e-9
     assert asked > 15 and verdicts > 3
-
-
-def test_an_open_pair_is_answered_both_ways_by_columns():
-    rng = np.random.default_rng(78)
-    for _ in range(20):
-        packing = prepare(gated_problem(rng, (3, 3, 3), 0.3)).packing
-        allowed = all_allowed(program_of(packing.arrays), packing.slack)
-        one, two = any_open_pair(packing.cols, allowed, np.empty(packing.num_rows, dtype=np.int32))
-        rows = [set(cols) - {-1} for cols in packing.cols.tolist()]
-        if one >= 0:
-            uses = [len({one, two} & own) for own in rows]
-            assert 2 in uses and 1 in uses
-        else:
-            assert all(a == b or not a & b for a in rows for b in rows)
 
 
 def must_be_covered(packing, slack, solution):

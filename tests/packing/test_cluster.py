@@ -11,7 +11,6 @@ from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.methods import EXACT_METHODS
-from experiments.common.instances.synthetic import axial_known_optimum, axial_random
 from tests.oracles import brute_force, gated_problem, small_problems
 from tests.packing.test_dimensionwise import feasible
 from tests.sizes import few_or_all
@@ -58,13 +57,3 @@ def test_small_clusters_never_lie():
         problem = gated_problem(rng, (5, 6, 4), 0.3, ("mixed", "ties")[number % 2])
         found = _searched(problem, 30, 6, rng)
         assert found >= brute_force(problem) - 1e-9
-
-
-@pytest.mark.slow
-def test_axial_ones_to_the_optimum():
-    rng = np.random.default_rng(2)
-    known, optimum = axial_known_optimum(12, 100)
-    assert _searched(known, 200, 30, rng) == pytest.approx(optimum)
-    # costs are integers, so that a bound above 4 would prove an optimum of 5
-    found = _searched(axial_random(26, 101), 400, 60, rng)
-    assert found <= 10.0

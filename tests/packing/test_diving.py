@@ -1,12 +1,9 @@
 """Dives: covers from the linear program, drawn by pheromone and LP value, and far better than greedy ones."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import assoc
-from assoc._system import memory
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import plain_root
 from assoc.packing.local_search import LocalSearch
@@ -16,23 +13,19 @@ from assoc.packing.run import Run
 from assoc.packing.simplex.dual import OPTIMAL
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.simulation import simulate
-from assoc.solvers.aco.colony import Colony
-from assoc.solvers.aco.parameters import AcoParameters
 from assoc.solvers.exact.search import bound_by_linear_program
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.methods import EXACT_METHODS
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
-from experiments.common.instances.synthetic import axial_known_optimum, wide_gates
+from experiments.common.instances.synthetic import axial_known_optimum
 from tests.packings import optimum
 from tests.solvers.pieces import (
     columns_of,
     component,
     cover_of,
-    open_problem,
     random_covers,
-    search_of,
     with_greedy_cover,
 )
 
@@ -180,41 +173,6 @@ def test_the_core_is_what_the_program_with_cuts_would_take():
     assert least[0] < -1.0 and least[1] > -1e-6
 
 
-def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
-    def dives(problem, refinement="full"):
-        return search_of(component(problem), 0, refinement).escapes
-
-    assert component(open_problem()).packing.num_rows < 30 and not dives(open_problem())
-    assert dives(ghosts()) and not dives(ghosts(), "local")
-    assert not LocalSearch(component(ghosts()), Run(0)).escapes, "nothing was handed in"
-    assert [Diver.pays(SimpleNamespace(num_rows=rows)) for rows in (30, 900, 901)] == [True, True, False]
-    large = wide_gates(280, 2)
-    assert dives(large)
-    monkeypatch.setattr(memory, "available", lambda here=True: 50e6)
-    assert not dives(large)
-
-
-@pytest.mark.parametrize("over", [1, 2])
-def test_a_program_that_takes_too_long_is_given_up(over):
-    """It is tried again where something else took the time; without it, covers are random and dives end."""
-    one = component(ghosts())
-    ends, shares = [-1.0] * over + [np.inf] * 5, []
-    left = SimpleNamespace(
-        remaining=lambda: 1.0,
-        deadline=lambda share=1.0: np.inf if share == 1.0 else shares.append(share) or ends.pop(0),
-        rng=np.random.default_rng(0),
-        methods=EXACT_METHODS,
-        memory_allows=lambda needed: True,
-    )
-    search = LocalSearch(one, left)
-    assert search.escapes
-    cover_of(one.packing, columns_of(search.escape(0)))
-    assert shares == [0.25] * 2
-    assert search.escapes is (over == 1)
-    search.escape(1)
-    assert len(shares) == 2
-
-
 class Watched(LocalSearch):
     """A search that keeps the number and beta of each dive."""
 
@@ -227,34 +185,6 @@ def watched():
     found = Watched(component(ghosts()), Run(0, methods=EXACT_METHODS), clusters=1)
     found.dived = []
     return found
-
-
-def test_the_colony_dives():
-    """The number of divers in a cycle; also zero."""
-    for divers in (2, 0):
-        search = watched()
-        colony = Colony(search.component, AcoParameters(divers=divers, beta=0.5, ants=3), lambda *_: None)
-        for _ in range(2):
-            colony.iterate(search)
-        assert search.dived == [(number, 0.5) for number in range(2 * divers)]
-
-
-def test_dives_are_of_four_strictnesses():
-    """Each twice that of the dive before."""
-
-    def covers(number, beta):
-        found = []
-        for seed in range(8):
-            problem = assoc.build_problem(simulate("bearing-only", seed=2, targets=24, scans=1), 0)
-            search = search_of(component(problem), seed, "full")
-            assert search.escapes
-            found.append(columns_of(search.escape(number, None, beta)))
-        return found
-
-    strict = [covers(number, 1 / 16) for number in range(4)]
-    assert len({str(found) for found in strict}) > 1
-    assert covers(4, 1 / 16) == strict[0]
-    assert [covers(0, 2**number / 16) for number in range(1, 4)] == strict[1:]
 
 
 @pytest.mark.parametrize("searcher", [Breeding, TabuSearch])
@@ -357,18 +287,6 @@ def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced
             shares.append(plain.share)
         assert shares == sorted(shares, reverse=limit < 0.5)
         assert shares[-1] == limit
-
-
-def test_the_more_is_left_to_branch_and_bound_the_better(priced, plain):
-    """Where the program's values hardly decide, draws are poor, and branch and bound makes good what they leave."""
-    trail, found = np.ones(priced.packing.num_columns), []
-    for share in (diving._LOWEST, diving._HIGHEST):
-        weights = []
-        for seed in range(30):
-            plain.share = share
-            weights.append(priced.weight_of(plain.dive(trail, 0.25, np.random.default_rng(seed), np.inf, np.inf)))
-        found.append(np.mean(weights) - priced.bound)
-    assert found[1] < 0.75 * found[0]
 
 
 def _left(core, j):

@@ -3,15 +3,11 @@
 import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching import kept_bases
-from assoc.packing.branching.kept_bases import keep_basis, kept_memory, no_kept_bases, take_kept
-from assoc.packing.branching.node import branch, new_work, open_node, relax, work_memory
+from assoc.packing.branching.kept_bases import keep_basis, no_kept_bases, take_kept
+from assoc.packing.branching.node import branch, new_work, open_node, relax
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root
-from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.prepare import prepare
 from assoc.packing.simplex.basis import new_basis, refactor
-from tests.oracles import axial_problem
 from tests.packing.test_trial import packings, part, solved
 
 
@@ -134,35 +130,3 @@ def test_a_search_that_goes_on_at_the_first_side_keeps_the_basis_of_the_other_on
     branch(work, stack, 1, num, tuple(pairs[-1]), False, -np.inf)
     open_node(work, stack, 0, -1)
     assert work.basis.age[0] == 7
-
-
-def test_large_bases_are_not_kept():
-    """The search is the same, only slower; and memory is bounded."""
-    assert kept_memory(1e5) == 8.0 * kept_bases._ELEMENTS
-    problem = axial_problem(np.random.default_rng(26), (9, 9, 9))
-    packing = prepare(problem).packing
-    weights = []
-    for elements in (kept_bases._ELEMENTS, 0):
-        found = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9)
-        found.run(1)
-        assert not found.done
-        found._work = found._work._replace(kept=no_kept_bases(found._work.program, elements))
-        assert (found._work.kept.age.size == 0) is (elements == 0)
-        found.run(100_000)
-        assert found.done and found.nodes > 3
-        weights.append(found.weight)
-    assert abs(weights[0] - weights[1]) < 1e-12
-
-
-def test_the_memory_that_is_asked_for_is_enough():
-    for packing in packings(2, 27):
-        root = plain_root(packing, dual_bound(packing))
-        work = new_work(packing.arrays, root.program, root.slack)
-
-        def bytes_of(record):
-            return sum(one.nbytes if isinstance(one, np.ndarray) else bytes_of(one) for one in record)
-
-        taken = sum(bytes_of(record) for record in (work.kept, work.trials, work.basis, work.node))
-        # memory that grows only with the rows is small and not counted
-        asked = work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
-        assert taken <= asked + 1000.0 * packing.num_rows

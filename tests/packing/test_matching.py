@@ -5,14 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 import assoc
 from assoc.errors import InfeasibleError
-from assoc.packing.bounds.matched import matched
 from assoc.packing.kernels.matching import match
-from assoc.packing.prepare import prepare
 
 
 def _sparse(matrix, keep):
@@ -81,21 +77,6 @@ def test_against_scipy(data):
     _check(matrix, keep, row_slack, column_slack)
 
 
-def test_larger_sparse_ones():
-    rng = np.random.default_rng(2)
-    feasible = 0
-    for n, m, degree, must in [(60, 80, 5, 0.0), (150, 150, 8, 0.0), (120, 200, 12, 1.0), (200, 120, 6, 0.2)]:
-        keep = rng.random((n, m)) < degree / m
-        row_slack = np.where(rng.random(n) < must, np.inf, 0.0)
-        feasible += _check(rng.normal(-2, 3, (n, m)), keep, row_slack, np.zeros(m))
-    # dense ones, with ties, with rows and columns that must be matched, and one that cannot be
-    matrix = np.outer(np.arange(150.0), np.arange(160.0)) % 97.0
-    keep = rng.random(matrix.shape) < 0.95
-    for row_slack, column_slack in [(np.inf, 0.0), (4.0, 0.0), (np.inf, np.inf), (3.0, np.inf)]:
-        feasible += _check(matrix, keep, np.full(150, row_slack), np.full(160, column_slack))
-    assert feasible >= 5
-
-
 def test_parallel_edges():
     found = match([0, 3], [0, 0, 0], [3.0, -1.0, 2.0], [0.0], [0.0])
     assert found.row_edge.tolist() == [1]
@@ -159,36 +140,6 @@ def test_a_component_of_two_sides_needs_no_branching():
     assert answer.status == "optimal" and answer.iterations == 0
 
 
-def test_what_two_sensors_decide_is_matched():
-    """Three sensors, but no tuple of three: a component whose rows have two sides, or not."""
-    problem = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [0, 2, 1], [2, 2, 0]], [-3.0, -4.0, -3.0, -1.0], (2, 2, 1))
-    assert matched(prepare(problem).packing).weight == -6.0
-    odd = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [-3.0, -4.0, -3.0], (1, 1, 1))
-    assert matched(prepare(odd).packing) is None and assoc.assign(odd).cost == -4.0
-
-
-def test_lists_that_cannot_be_matched():
-    problem = assoc.AssignmentProblem([[1, 1], [2, 1], [3, 2], [3, 3]], [1.0, 1.0, 1.0, 1.0], (3, 3), dummy=False)
-    with pytest.raises(InfeasibleError, match="no choice of tuples"):
-        assoc.assign(problem)
-
-
-def test_many_rows_of_few_edges_like_scipy():
-    rng = np.random.default_rng(8)
-    count = 2500
-    other = np.concatenate([rng.integers(0, count, (count, 9)), rng.permutation(count)[:, None]], axis=1)
-    row, column = np.unique(np.stack([np.repeat(np.arange(count), 10), other.ravel()], axis=1), axis=0).T
-    costs = 0.1 + rng.random(row.size)
-    indptr = np.searchsorted(row, np.arange(count + 1))
-    assert row.size > 20_000
-    found = match(indptr, column, costs, np.full(count, np.inf), np.full(count, np.inf))
-    matrix = csr_array((costs, (row, column)), shape=(count, count))
-    chosen = min_weight_full_bipartite_matching(matrix)
-    assert found.cost == pytest.approx(matrix[chosen].sum(), rel=1e-12)
-    assert found.row_duals.sum() + found.column_duals.sum() == pytest.approx(found.cost, rel=1e-9)
-    assert (costs - found.row_duals[row] - found.column_duals[column]).min() > -1e-9
-
-
 def _costs(kind, n, rng):
     """Random costs, whole numbers, or few different ones."""
     matrix = rng.random((n, n))
@@ -211,18 +162,6 @@ def test_an_auction_leaves_optimal_duals(kind):
     if kind in ("whole", "few"):
         assert (found.row_duals == np.round(found.row_duals)).all()
         assert (found.column_duals == np.round(found.column_duals)).all()
-
-
-def test_an_auction_ends_where_there_is_no_matching():
-    rng = np.random.default_rng(6)
-    n = 200
-    keep = rng.random((n, n)) < 0.05
-    # eleven rows for ten columns
-    keep[:11] = False
-    keep[:11, :10] = True
-    forced = np.full(n, np.inf)
-    with pytest.raises(InfeasibleError):
-        match(*_sparse(rng.random((n, n)), keep), forced, forced)
 
 
 @pytest.mark.parametrize("n, share", [(90, 1.0), (90, 0.8), (240, 1.0), (240, 0.9), (240, 0.2)])

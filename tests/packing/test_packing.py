@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from tests.oracles import small_problems
@@ -86,14 +85,6 @@ def check_components(packing):
         assert listed == [j for j, one in enumerate(sets) if r in one]
 
 
-def test_columns_and_rows_keep_their_order_within_a_component():
-    for problem in small_problems(60, seed=9):
-        packing = prepare(problem).packing
-        for c in range(packing.num_components):
-            for origin, start in ((packing.origin, packing.col_start), (packing.row_origin, packing.row_start)):
-                assert (np.diff(origin[start[c] : start[c + 1]]) > 0).all()
-
-
 def test_components_are_packings_of_their_own():
     for problem in small_problems(60, seed=10):
         whole = prepare(problem).packing
@@ -118,23 +109,6 @@ def test_restrict_keeps_the_columns_asked_for_and_the_rows_that_must_be_covered(
         moved = np.where(part.cols >= 0, part.row_origin[part.cols], -1)
         assert (moved == whole.cols[part.origin]).all()
         check_components(part)
-
-
-def test_renumbered_rows_give_the_same_packing_but_for_the_order():
-    rng = np.random.default_rng(6)
-    for problem in small_problems(60, seed=12):
-        whole = prepare(problem).packing
-        if whole.num_columns == 0:
-            continue
-        number = rng.permutation(whole.num_rows).astype(np.int32)
-        slack = np.empty(whole.num_rows, dtype=np.bool_)
-        slack[number] = whole.slack
-        cols = np.where(whole.cols >= 0, number[whole.cols], -1).astype(np.int32)
-        other = assemble(cols, whole.weights, slack, np.arange(whole.num_columns, dtype=np.int32))
-        check_components(other)
-        sizes = [sorted(np.diff(one.row_start).tolist()) for one in (whole, other)]
-        assert sizes[0] == sizes[1]
-        assert (other.weights == whole.weights[other.origin]).all()
 
 
 def test_a_problem_is_prepared_once():

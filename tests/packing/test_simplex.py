@@ -9,10 +9,9 @@ from scipy.optimize import linprog
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values, refactor, residual
-from assoc.packing.simplex.dual import CUT, INFEASIBLE, OPTIMAL, STOPPED, Effort, solve_dual
+from assoc.packing.simplex.dual import CUT, OPTIMAL, STOPPED, Effort, solve_dual
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, program_of, weight_limit
-from assoc.problem import AssignmentProblem
 from tests.oracles import axial_problem, gated_problem
 from tests.packings import matrix_of, optimum, relaxed
 from tests.sizes import few_or_all
@@ -90,27 +89,6 @@ def test_warm_from_the_basis_at_hand(count):
     assert warm < 0.6 * cold and none
 
 
-def test_norms_that_are_no_lengths_hide_nothing():
-    """Norms spoilt by rounding may cost steps, but must not lead to a false optimum."""
-    rng = np.random.default_rng(85)
-    for spoiled in (np.nan, np.inf, 0.0):
-        for number in range(10):
-            packing = random_packing(rng, number)
-            expected = optimum(packing)
-            program = program_of(packing.arrays)
-            allowed = all_allowed(program, packing.slack)
-            basis, duals = new_basis(program), np.zeros(packing.num_rows)
-            make_feasible(program, allowed, duals)
-            begin_from_duals(program, allowed, duals, basis)
-            basis.norms[:] = spoiled
-            with np.errstate(all="ignore"):
-                solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))
-            duals = basis.duals.copy()
-            make_feasible(program, allowed, duals)
-            bound = certified(program, allowed, duals)
-            assert close(packing, np.inf if bound >= weight_limit(program) else bound, expected)
-
-
 @few_or_all("count", 25, 1000)
 def test_dives_end_nowhere_else_than_at_an_optimum(count):
     """Chains of hundreds of short calls on one basis: optimal solutions are feasible and weigh their bound."""
@@ -146,15 +124,6 @@ def test_dives_end_nowhere_else_than_at_an_optimum(count):
     assert solves > 15 * count
 
 
-def test_many_columns_are_looked_at_in_rounds():
-    rng = np.random.default_rng(83)
-    for problem in (axial_problem(rng, (14, 14, 14), 1.0, "positive"), axial_problem(rng, (30, 40), 1.0, "mixed")):
-        packing = prepare(problem).packing
-        assert packing.num_columns > 2 * 20 * packing.num_rows or problem.num_sensors == 2
-        for start in (None, dual_bound(packing)):
-            assert close(packing, LinearProgram(packing).solve(duals=start).bound, optimum(packing))
-
-
 def test_whenever_it_stops_the_bound_holds():
     rng = np.random.default_rng(84)
     stopped = cut = 0
@@ -174,16 +143,6 @@ def test_whenever_it_stops_the_bound_holds():
         late = LinearProgram(packing).solve(deadline=time.monotonic() - 1.0)
         assert late.status == STOPPED and late.bound <= expected + 1e-9 * max(1.0, abs(expected))
     assert stopped > 20 and cut > 5
-
-
-def test_no_solution():
-    """Three measurements that must be used and two tuples for them; and the cutoff that a search would ask for."""
-    packing = prepare(AssignmentProblem([[1, 1], [2, 1], [2, 2]], [1.0, 2.0, 3.0], [2, 2], dummy=False)).packing
-    masked = np.array([True, True, False])
-    relaxed = LinearProgram(packing).solve(columns=masked)
-    assert relaxed.status == INFEASIBLE and relaxed.bound == np.inf
-    # the bound is at least the cutoff
-    assert LinearProgram(packing).solve(columns=masked, cutoff=100.0).bound >= 100.0
 
 
 def test_a_certificate_holds_for_any_multipliers():

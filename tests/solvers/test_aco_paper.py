@@ -109,11 +109,6 @@ def test_it_ends_when_all_ants_walk_the_same_tour():
     assert (cut.iterations, cut.stopped_by) == (whole.iterations - 1, "iterations")
 
 
-def test_one_ant_agrees_with_itself_at_once():
-    solution = assoc.assign(PROBLEMS["four"], "aco", mode="paper", ants=1)
-    assert solution.iterations == 1
-
-
 def test_the_first_cycle_follows_visibility_alone():
     """So all tours are greedy ones, but for the node on which each starts."""
     problem = PROBLEMS["mixed"]
@@ -136,18 +131,6 @@ def test_what_no_ant_can_complete_is_completed_or_refused():
     problem = assoc.AssignmentProblem([[1, 1], [2, 1]], [1.0, 1.0], [2, 2], dummy=False)
     with pytest.raises(InfeasibleError):
         assoc.assign(problem, "aco", mode="paper")
-
-
-def test_tours_are_complete_where_sensors_have_unequal_numbers_and_no_dummies():
-    problem = PROBLEMS["unequal"]
-    for visibility in ("exponential", "reciprocal"):
-        history = assoc.solvers.pheromone(problem, seed=1, mode="paper", visibility=visibility, scale=2.0)
-        assert history.tuples.tolist() == problem.tuples.tolist() and not np.isnan(history.pheromone).any()
-        assert len(history.solution.tuples) == 4
-        # found by ants, not by what completes a problem that they cannot
-        assert len(history.solution.trace) > 1
-        first = history.pheromone[0] - 0.3 * history.visibility[0]
-        assert np.count_nonzero(first > 1e-12) >= 4
 
 
 def test_ants_that_do_not_walk_for_want_of_time_end_the_search():

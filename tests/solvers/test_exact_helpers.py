@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assoc import assign
 from assoc.costs import build_problem
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.component import split_components
@@ -33,18 +32,6 @@ def test_they_join_a_long_search_of_a_small_component(age, joins):
         weight += component.weight
         joined |= task.improver is not None
     assert weight == pytest.approx(-315.9909, abs=1e-4) and joined == joins
-
-
-@pytest.mark.slow
-def test_a_long_search_says_from_the_beginning_what_it_knows():
-    """The first solution and bound come in the first tenth of a search of forty nodes, and better ones after them."""
-    trace = assign(build_problem(ghost(60, 7001), 0), "exact", nodes=40).trace
-    first, last = trace[0], trace[-1]
-    assert np.isfinite([first.cost, first.lower_bound]).all()
-    assert first.seconds < 0.1 * last.seconds
-    assert first.cost > last.cost and first.lower_bound < last.lower_bound
-    silences = np.diff([point.seconds for point in trace])
-    assert len(trace) > 4 and silences.max() < 0.7 * last.seconds
 
 
 def test_bounds_of_many_components_are_added_up_exactly():

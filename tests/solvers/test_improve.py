@@ -255,12 +255,6 @@ def _optimal_columns(one):
     return search.columns
 
 
-@pytest.mark.parametrize("columns, most", [(30, 50), (5_000, 4), (10**6, 1)])
-def test_few_nodes_at_a_time_where_each_takes_long(columns, most):
-    """Ctrl-C does not interrupt kernels."""
-    assert short_branching.nodes_at_once(columns) == most
-
-
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
 def test_a_seed_is_not_used_up(solver):
     """The same SeedSequence again, or a generator whose state was set: the same search, with several workers, too."""

@@ -6,11 +6,10 @@ import pytest
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.prepare import prepare
-from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from assoc.solvers.lagrangian.arranged import arrange
 from assoc.solvers.lagrangian.relaxation import relax
-from experiments.common.instances.synthetic import axial_known_optimum, planted
+from experiments.common.instances.synthetic import planted
 from tests.oracles import (
     axial_problem,
     brute_force,
@@ -84,14 +83,6 @@ def test_relaxation_is_above_the_multipliers_it_starts_from():
         assert moved.sum() <= duals.sum() + subgradient @ ((moved - duals) * upper) + 1e-7
 
 
-@pytest.mark.parametrize("sensors", [3, 4, 5, 6])
-def test_planted_optimum(sensors):
-    problem, optimum = planted(sensors, 100, 8)
-    solution = assign(problem, "lagrangian")
-    assert solution.cost == pytest.approx(optimum, abs=1e-6)
-    assert solution.status == "optimal"
-
-
 def test_proof_by_multipliers():
     for problem in small_problems(100, seed=33, dummy=True):
         solution = assign(problem, "lagrangian", iterations=1)
@@ -102,23 +93,6 @@ def test_proof_by_multipliers():
             price += np.concatenate([[0.0], duals])[problem.tuples[:, s]]
         assert (problem.costs - price >= -1e-9).all()
         assert sum(d.sum() for d in solution.duals) <= solution.cost + 1e-9
-
-
-def test_known_optimum_axial():
-    problem, optimum = axial_known_optimum(12, 100)
-    solution = assign(problem, "lagrangian")
-    assert solution.cost == pytest.approx(optimum)
-    assert solution.lower_bound <= optimum
-
-
-def test_one_and_two_sensors():
-    assert assign(AssignmentProblem([[1], [2]], [-1.0, 2.0], [2]), "lagrangian").cost == 1.0
-    rng = np.random.default_rng(9)
-    for _ in range(20):
-        problem = gated_problem(rng, (6, 5), 0.5)
-        solution = assign(problem, "lagrangian")
-        assert solution.status == "optimal"
-        assert solution.cost == pytest.approx(brute_force(problem), abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Two lists, from a matrix of costs or from pairs: the exact solver's answers by one matching."""
 
-import pickle
 from fractions import Fraction
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.optimize import linear_sum_assignment
 
 import assoc
 from assoc import AssignmentProblem, assign
-from assoc.errors import AssocWarning
 from assoc.packing.kernels.matching import match_proved
 
 KINDS = ("uniform", "negative", "ties", "whole numbers", "products", "all equal")
@@ -87,18 +85,6 @@ def test_what_rounding_leaves_open_is_solved_from_the_tuples():
     assert match_proved(*edges(matrix)).bound < -0.1 and problem._listed is not None
 
 
-def test_a_matrix_is_listed_when_it_is_asked_for():
-    matrix = matrix_of("uniform", (5, 7))
-    problem = AssignmentProblem.from_dense(matrix, dummy=False)
-    again = pickle.loads(pickle.dumps(problem))
-    assert problem.num_tuples == 35 and problem._listed is None
-    assert repr(problem) == repr(listed(matrix))
-    for other in (problem, again):
-        assert np.array_equal(other.tuples, listed(matrix).tuples) and other.tuples.dtype == np.int32
-        assert np.array_equal(other.costs, matrix.ravel())
-        assert not other.tuples.flags.writeable and not other.costs.flags.writeable
-
-
 @pytest.mark.parametrize("solver", ["greedy", "lagrangian", "milp"])
 def test_other_solvers_list_the_pairs(solver):
     matrix = matrix_of("uniform", (8, 9))
@@ -106,22 +92,6 @@ def test_other_solvers_list_the_pairs(solver):
     assert assign(dense, solver).cost == assign(tuples, solver).cost
     start = assign(tuples, "greedy")
     assert assign(dense, start=start).cost == pytest.approx(assign(tuples).cost)
-
-
-def test_a_matrix_is_the_problems_own():
-    matrix = matrix_of("uniform", (6, 6))
-    problem = AssignmentProblem.from_dense(matrix, dummy=False)
-    before = assign(problem).cost
-    kept = matrix.copy()
-    matrix[:] = 0.0
-    assert assign(problem).cost == before
-    for given_ in (kept, kept.astype(np.float32).T, np.asfortranarray(kept), kept[:, ::-1]):
-        given_.flags.writeable = False
-        untouched = given_.copy()
-        with pytest.warns(AssocWarning, match="taken as by scipy's"):
-            solution = assign(given_)
-        assert solution.cost == pytest.approx(given_[linear_sum_assignment(given_)].sum())
-        assert np.array_equal(given_, untouched)
 
 
 def test_a_callback_sees_the_answer_and_a_proof_is_written(tmp_path):

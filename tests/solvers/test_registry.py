@@ -1,15 +1,13 @@
 """A solver of one's own: registered once, it is one of them; its answers are checked and certified."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.solvers import Outcome, Parameters, registry
-from tests.running import printed
+from assoc.solvers import Outcome, Parameters
 
 
 @dataclass(frozen=True)
@@ -123,50 +121,6 @@ def test_what_is_no_outcome_is_one_line(registered, start, outcome, message):
     assert "\n" not in str(caught.value)
 
 
-def test_convention():
-    """Each name is a folder whose parameters.py loads no compiler and whose solve.py solves."""
-    folder = Path(assoc.solvers.__file__).parent
-    folders = {one.name for one in folder.iterdir() if (one / "__init__.py").exists()}
-    assert folders == set(registry.names())
-    code = (
-        "import sys\nfrom importlib import import_module\nfrom assoc.solvers import registry\n"
-        "for name in registry.names():\n"
-        "    kind = registry.parameters(name)\n"
-        "    assert kind.__module__ == f'assoc.solvers.{name}.parameters', kind\n"
-        "assert not {'numba', 'scipy', 'ortools'} & set(sys.modules)\n"
-        "for name in registry.names():\n"
-        "    module = import_module(f'assoc.solvers.{name}.solve')\n"
-        "    assert registry.solver(name) is module.solve and not hasattr(module, 'parameters')\n"
-        "assert 'ortools' not in sys.modules\n"
-    )
-    printed("-W", "error", "-c", code)
-
-
-def test_what_solvers_of_ones_own_are_written_with():
-    assert {"Cover", "Outcome", "Packing", "Parameters", "Run"} <= set(dir(assoc.solvers))
-    for name in assoc.solvers.__all__:
-        assert getattr(assoc.solvers, name) is not None
-    with pytest.raises(AttributeError, match="no attribute 'Part'"):
-        assoc.solvers.Part  # noqa: B018
-
-
-def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():
-    def disturbed(packing, parameters, run):
-        try:
-            raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
-        except SystemError as inner:
-            raise SystemError("returned a result with an exception set") from inner
-
-    def broken(packing, parameters, run):
-        raise SystemError("something else")
-
-    problem = assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1])
-    for solve, error in ((disturbed, KeyboardInterrupt), (broken, SystemError)):
-        registry.register(solve.__name__, LastParameters, solve)
-        with pytest.raises(error):
-            assoc.assign(problem, solve.__name__)
-
-
 @pytest.mark.parametrize(
     "solver, name, values",
     [
@@ -186,12 +140,3 @@ def test_parameters_of_metaheuristics_out_of_range(solver, name, values):
     for value in values:
         with pytest.raises(assoc.InvalidInputError, match=f"{name}: expected"):
             assoc.assign(problem, solver, **{name: value})
-
-
-def test_memory_of_a_population_is_that_of_all_workers():
-    parameters = assoc.solvers.parameters("genetic")
-    one, several = (parameters(population=1000, workers=workers).memory(10, 10) for workers in (1, 8))
-    assert several[0] >= 8 * one[0] and "workers = 8" in several[1] and several[2].endswith("or fewer workers")
-    for solver in ("aco", "tabu"):
-        parameters = assoc.solvers.parameters(solver)
-        assert parameters().memory(10, 10) is None and parameters(workers=1000).memory(10, 10)[0] > 1e9

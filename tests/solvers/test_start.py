@@ -60,31 +60,6 @@ def test_it_is_the_incumbent_of_the_search():
         assert max(costs) <= best.cost + 1e-6, solver
 
 
-def test_a_solver_of_ones_own_gets_it(problem):
-    best = assoc.assign(problem, "exact")
-    seen = []
-
-    def nothing(packing, parameters, run):
-        seen.append(run.start)
-        return Outcome(np.zeros(0, dtype=int), 1)
-
-    registry.register("nothing", registry.parameters("greedy"), nothing)
-    assert assoc.assign(problem, "nothing").cost > best.cost
-    assert assoc.assign(problem, "nothing", start=best).cost == pytest.approx(best.cost)
-    assert seen[0] is None and len(seen[1]) == np.count_nonzero((best.tuples > 0).sum(axis=1) > 1)
-
-
-def test_a_solution_of_the_same_tuples_at_other_costs(problem):
-    """What was the optimum yesterday is a start today, and its tuples may not be worth it any more."""
-    rng = np.random.default_rng(0)
-    other = assoc.AssignmentProblem(problem.tuples, problem.costs + rng.normal(0, 5, problem.num_tuples), problem.sizes)
-    start = assoc.assign(problem)
-    warm = assoc.assign(other, "aco", start=start)
-    assert warm.cost == pytest.approx(assoc.assign(other).cost)
-    costly = assoc.AssignmentProblem(problem.tuples, np.abs(problem.costs), problem.sizes)
-    assert assoc.assign(costly, "tabu", start=start).cost == pytest.approx(assoc.assign(costly).cost)
-
-
 def test_what_is_no_solution_is_refused(problem, axial):
     best = assoc.assign(problem)
 
@@ -149,17 +124,3 @@ def test_costs_are_compared_to_the_last_digit(solver, seed):
     start = assoc.assign(given, advise=False)
     parameters = {} if solver == "greedy" else {"iterations": 2}
     assert assoc.assign(given, solver, start=start, advise=False, **parameters).cost <= start.cost
-
-
-def test_costs_that_differ_by_less_than_a_rounding_are_told_apart():
-    """Both sums are -1 as floats."""
-    costs = [-1.0, -(2.0**-54), -1.0, -(2.0**-55)]
-    problem = assoc.AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], costs, [2, 2])
-    best = replace(assoc.assign(problem), tuples=np.array([[1, 1], [2, 2]]))
-
-    def dearer(packing, parameters, run):
-        return Outcome(np.flatnonzero(packing.origin >= 2), 1)
-
-    registry.register("dearer", registry.parameters("greedy"), dearer)
-    assert assoc.assign(problem, "dearer").tuples.tolist() == [[1, 2], [2, 1]]
-    assert assoc.assign(problem, "dearer", start=best).tuples.tolist() == [[1, 1], [2, 2]]
