@@ -28,8 +28,3 @@ def test_the_grid_is_whole_and_its_optimum_that_of_the_candidates(name):
         for key, cost in zip(map(tuple, few.tuples.tolist()), few.costs.tolist(), strict=True):
             assert cost == pytest.approx(known[key], abs=1e-6)
         assert assoc.assign(whole).cost == pytest.approx(assoc.assign(few).cost, abs=1e-6)
-
-
-def test_a_grid_too_large_is_refused():
-    with pytest.raises(assoc.LimitExceededError, match="leave out all_tuples"):
-        assoc.build_problem(SCENES["three-radar"], 0, all_tuples=True, max_tuples=10)

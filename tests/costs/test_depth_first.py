@@ -9,7 +9,7 @@ import pytest
 from assoc.costs.tracks import depth_first
 from assoc.costs.tracks.scores import score_terms
 from assoc.costs.tracks.tuples import grow_track_tuples
-from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.errors import InvalidInputError
 from assoc.filters import (
     ConstantVelocity,
     ExtendedKalmanFilter,
@@ -123,26 +123,6 @@ def test_the_same_tuples_at_the_same_costs_as_sensor_by_sensor(sensors, modes):
         np.testing.assert_allclose(one.costs, other.costs, rtol=1e-9, atol=1e-9)
     # compiled once for all sensors and numbers of models
     assert len(getattr(depth_first.grow, "signatures", ())) <= 1
-
-
-def test_where_no_sensor_has_measured_anything_tracks_are_alone():
-    one = filters(ExtendedKalmanFilter, 2)
-    states = predicted(one, np.random.default_rng(0), 3)
-    found = grown(one, states, [np.zeros((0, sensor.dim)) for sensor in MIXED], MIXED)
-    assert found.track.tolist() == [0, 1, 2]
-    assert not found.rows.any()
-    assert found.costs == pytest.approx(-score_terms(MIXED).miss.sum())
-    assert not len(grown(one, states[:0], scan(MIXED, states, np.random.default_rng(1)), MIXED).track)
-
-
-def test_too_many_tuples_are_refused_with_an_estimate():
-    one, rng = filters(ExtendedKalmanFilter, 2), np.random.default_rng(0)
-    states = predicted(one, rng)
-    z = scan(PLACES, states, rng)
-    whole = len(grown(one, states, z, PLACES).track)
-    assert len(grown(one, states, z, PLACES, max_tuples=whole).track) == whole
-    with pytest.raises(LimitExceededError, match=rf"about .* more than max_tuples = {whole - 1};"):
-        grown(one, states, z, PLACES, max_tuples=whole - 1)
 
 
 def test_a_track_without_a_covariance_is_named():

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from assoc.costs import build_problem, positions_and_covariances, tuple_costs
-from assoc.errors import InvalidInputError
-from assoc.sensors import PositionSensor, Radar3D, Sensor
+from assoc.sensors import Radar3D, Sensor
 from assoc.simulation.observation import observe
-from assoc.tracking import MultiSensorTracker
 
 
 class Lidar(Sensor):
@@ -54,38 +52,3 @@ def test_the_same_problem(own):
     np.testing.assert_allclose(tuple_costs(mine, 0, tuples), tuple_costs(radars, 0, tuples), atol=1e-5)
     for found, wanted in zip(*(positions_and_covariances(scene, 0, tuples) for scene in (mine, radars)), strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=0.05)
-
-
-def test_the_same_tracks():
-    tracks = []
-    for scene in scenes(own=(1,), steps=8):
-        tracker = MultiSensorTracker.for_scene(scene, adapt=True)
-        for k in range(scene.num_scans):
-            tracker.step(scene.times[k], scene.measurements[k])
-        sure = [track for track in tracker.tracks if track.confirmed]
-        tracks.append([(track.track_id, *track.position, *track.velocity) for track in sure])
-    assert len(tracks[0]) == 4
-    np.testing.assert_allclose(tracks[1], tracks[0], atol=0.05)
-
-
-def test_what_leaves_the_region_open_is_found_in_it_and_own_velocities_are_refused():
-    class Slant(Lidar):
-        components, angular = ("range", "azimuth"), (False, True)
-
-        def measure(self, positions, velocities=None):
-            return super().measure(positions)[:, :2]
-
-    class Moving(Lidar):
-        measures_velocity = True
-
-    two = {name: OPTIONS[name][:2] for name in ("noise", "field_of_view")}
-    there = PositionSensor(position=np.zeros(3), noise=[30.0] * 3, field_of_view=REGION)
-    x = np.array([[4e3, -3e3, 6e3]])
-    scan = [[Slant(position=PLACES[0], **two).measure(x), x + 10.0]]
-    scene = type(scenes()[0])([Slant(position=PLACES[0], **two), there], [0.0], scan, region=REGION)
-    np.testing.assert_allclose(positions_and_covariances(scene, 0, np.array([[1, 1]]))[0], x, atol=40.0)
-    alone = positions_and_covariances(scene, 0, np.array([[1, 0]]))[0]
-    assert REGION[2][0] <= alone[0, 2] <= REGION[2][1] and np.linalg.norm(alone[0, :2] - x[0, :2]) < 3e3
-    moving = type(scene)([Moving(position=PLACES[0], **OPTIONS), there], [0.0], [[np.zeros((0, 3)), x]], region=REGION)
-    with pytest.raises(InvalidInputError, match="range rates of a Radar3D alone"):
-        build_problem(moving, 0)

@@ -76,38 +76,6 @@ def test_candidates_are_all_tuples_of_negative_cost(seed):
     np.testing.assert_allclose([found[one] for one in wanted], list(wanted.values()), rtol=1e-9)
 
 
-def test_without_range_rates_the_speed_has_no_effect():
-    scene = simulation.simulate("three-radar", 1, scans=3)
-    one, other = (build_problem(scene, 1, speed=speed) for speed in (1.0, 900.0))
-    assert one.costs.tobytes() == other.costs.tobytes() and np.array_equal(one.tuples, other.tuples)
-
-
-def test_range_rates_tell_targets_apart():
-    """Two targets closer than the noise, in opposite directions: positions mix them up, range rates do not."""
-    right = dict.fromkeys((False, True), 0)
-    for seed in range(30):
-        scene, places, velocities = doppler_scene(seed)
-        rng = np.random.default_rng(seed)
-        places, velocities = places[:1] + np.array([[0.0] * 3, [30.0] * 3]), velocities[:1] * [[1.0], [-1.0]]
-        sensors = [
-            Radar3D(position=one.position, noise=[50, 2e-3, 2e-3, 1.0], field_of_view=one.field_of_view)
-            for one in scene.sensors
-        ]
-        for doppler in (False, True):
-            own = sensors if doppler else [one.position_part for one in sensors]
-            scan = []
-            for sensor in own:
-                exact = sensor.measure(places, velocities)
-                noise = np.diag([50, 2e-3, 2e-3, 1.0])[: sensor.dim, : sensor.dim]
-                scan.append(exact + rng.standard_normal(exact.shape) @ noise)
-            one = Scene(own, [0.0], [scan], region=REGION)
-            tuples = np.array([[a, b, c] for a in (1, 2) for b in (1, 2) for c in (1, 2)])
-            costs = tuple_costs(one, 0, tuples, speed=SPEED)
-            pairs = costs + costs[::-1]
-            right[doppler] += int(np.argmin(pairs[:4])) == 0
-    assert right[True] >= 20 and right[True] > right[False] + 8
-
-
 @pytest.mark.parametrize("speed", [0, -1.0, np.nan, "fast", [1, 2, 3, 4]])
 def test_a_bad_speed_is_refused(speed):
     scene = simulation.simulate("three-radar", 1, scans=2)

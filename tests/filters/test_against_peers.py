@@ -1,4 +1,4 @@
-"""Kalman filter, EKF and UKF give what filterpy and Stone Soup give, to 1e-9."""
+"""Kalman filter, EKF and UKF give what filterpy gives, to 1e-9; a motion model what Stone Soup gives."""
 
 import datetime
 import math
@@ -12,14 +12,11 @@ from assoc.filters import (
     ExtendedKalmanFilter,
     Gaussian,
     KalmanFilter,
-    LinearMeasurement,
-    LinearMotion,
     Singer,
     UnscentedKalmanFilter,
 )
 from assoc.sensors import Radar3D
 from tests.filters.common import PLACE
-from tests.sizes import sample
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -94,77 +91,6 @@ def test_filterpy_unscented():
         same(state, theirs.x, theirs.P)
         assert done.log_likelihood[0] == pytest.approx(theirs.log_likelihood, abs=1e-6)
         np.testing.assert_allclose(done.covariance[0], theirs.S, rtol=1e-9, atol=1e-12)
-
-
-@sample("kind", ["kalman", "ekf", "ukf"], every=3)
-def test_stone_soup(kind):
-    from stonesoup.models.measurement.linear import LinearGaussian
-    from stonesoup.models.measurement.nonlinear import CartesianToElevationBearingRange
-    from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel
-    from stonesoup.models.transition.linear import ConstantVelocity as Theirs
-    from stonesoup.predictor import kalman as predictors
-    from stonesoup.types.detection import Detection
-    from stonesoup.types.hypothesis import SingleHypothesis
-    from stonesoup.types.state import GaussianState
-    from stonesoup.updater import kalman as updaters
-
-    order = [0, 3, 1, 4, 2, 5]
-    transition = CombinedLinearGaussianTransitionModel([Theirs(3.0**2)] * 3)
-    sensor = PLACE if kind == "kalman" else RADAR
-    if kind == "kalman":
-        model = LinearGaussian(6, (0, 2, 4), sensor.covariance)
-    else:
-
-        class Exact(CartesianToElevationBearingRange):
-            """With derivatives in closed form, which Stone Soup's differences meet to 1e-8 only.
-
-            And with plain numbers as angles: its own are averaged on the circle, which differs by the cube of
-            their spread.
-            """
-
-            def function(self, state, noise=False, **others):
-                value = super().function(state, noise=noise, **others)
-                plain = np.asarray(value, dtype=float)
-                return type(value)(plain)
-
-            def jacobian(self, state, **_):
-                H = np.zeros((3, 6))
-                place = np.asarray(state.state_vector, dtype=float)[[0, 2, 4], 0]
-                H[:, [0, 2, 4]] = RADAR.jacobian(place[None])[0][::-1]
-                return H
-
-        model = Exact(6, (0, 2, 4), sensor.covariance[::-1, ::-1].copy())
-    ours_ordered = ConstantVelocity(3.0, kind="continuous")
-    # in Stone Soup's order of the state: another order means other sigma points
-    swap = np.ix_(order, order)
-    motion = LinearMotion(
-        lambda dt: ours_ordered.matrices(dt)[0][0][swap],
-        lambda dt: ours_ordered.matrices(dt)[1][0][swap],
-        6,
-        position=(0, 2, 4),
-    )
-    if kind == "ukf":
-        options = {"alpha": 0.8, "beta": 2.0, "kappa": 1.0}
-        ours = UnscentedKalmanFilter(motion, **options)
-        predictor = predictors.UnscentedKalmanPredictor(transition, **options)
-        updater = updaters.UnscentedKalmanUpdater(model, **options)
-    else:
-        ours = KalmanFilter(motion) if kind == "kalman" else ExtendedKalmanFilter(motion)
-        predictor = predictors.ExtendedKalmanPredictor(transition)
-        updater = updaters.ExtendedKalmanUpdater(model)
-    seen = LinearMeasurement(np.eye(6)[[0, 2, 4]], sensor.covariance) if kind == "kalman" else sensor
-    when = datetime.datetime(2026, 1, 1)
-    state = Gaussian(START.mean[0][order], START.covariance[0][swap])
-    theirs = GaussianState(state.mean[0][:, None], state.covariance[0], timestamp=when)
-    for z in measurements(sensor):
-        when += datetime.timedelta(seconds=1)
-        prediction = predictor.predict(theirs, timestamp=when)
-        vector = z[:, None] if kind == "kalman" else z[::-1, None]
-        detection = Detection(vector, timestamp=when, measurement_model=model)
-        theirs = updater.update(SingleHypothesis(prediction, detection))
-        state = ours.update(ours.predict(state, 1.0), z, seen).state
-        mean = np.asarray(theirs.state_vector, dtype=float).ravel()
-        same(state, mean, np.asarray(theirs.covar, dtype=float))
 
 
 def test_singers_model_is_that_of_stone_soup():

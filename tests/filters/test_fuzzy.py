@@ -8,19 +8,14 @@ import pytest
 from assoc.errors import InvalidInputError
 from assoc.filters import (
     Alarm,
-    ConstantVelocity,
     CoordinatedTurn,
     ExtendedKalmanFilter,
-    FunctionMotion,
     FuzzyAdaptiveEKF,
     FuzzyRules,
     FuzzyVariable,
-    Gaussian,
     paper_rules,
-    tuned_data,
 )
-from assoc.sensors import PositionSensor
-from tests.filters.common import FLAT, MOTION, RADAR, kalman_update, random_state
+from tests.filters.common import FLAT, MOTION, RADAR, random_state
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -80,19 +75,6 @@ def test_refusals():
         one.update(one.start(state), RADAR.measure(state.mean[:, :3]), RADAR)
 
 
-def test_without_rules_it_is_an_ekf():
-    state = random_state(5, np.random.default_rng(0))
-    plain, fuzzy = ExtendedKalmanFilter(MOTION), FuzzyAdaptiveEKF(MOTION, None)
-    a, b = state, fuzzy.start(state)
-    for _ in range(3):
-        z = RADAR.measure(state.mean[:, :3])
-        u, w = plain.update(plain.predict(a, 1.0), z, RADAR), fuzzy.update(fuzzy.predict(b, 1.0), z, RADAR)
-        a, b = u.state, w.state
-    np.testing.assert_allclose(a.mean, b.mean, rtol=1e-12)
-    np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-9)
-    assert len(b[1:3]) == 2
-
-
 def test_equations_32_to_36():
     """One step with the paper's rules: q scales Q of the next prediction, r scales R of this correction."""
     state = random_state(1, np.random.default_rng(1))
@@ -112,32 +94,6 @@ def test_equations_32_to_36():
     np.testing.assert_allclose(after.covariance[0], F @ P @ F.T + scale * Q, rtol=1e-9, atol=1e-9)
 
 
-def test_a_drift_of_the_innovations_raises_the_noise():
-    data = tuned_data()
-    motion = CoordinatedTurn(data["acceleration_noise"], data["rate_noise"])
-    fuzzy = FuzzyAdaptiveEKF.from_data(motion, data)
-    state = fuzzy.start(random_state(2, np.random.default_rng(2), 7))
-    for k in range(4):
-        state = fuzzy.predict(state, 1.0)
-        z = RADAR.measure(state.mean[:, :3])
-        if k == 3:
-            z[1] += 6 * np.sqrt(np.diag(fuzzy.expected(state, RADAR).covariance[1]))
-        state = fuzzy.update(state, z, RADAR).state
-    assert (state.process_scale[1] > 1.5 * state.process_scale[0]).all()
-    # turn rate and acceleration have rules of their own
-    assert state.process_scale[1, 6] != state.process_scale[1, 0]
-
-
-def test_two_sensors_in_turn():
-    fuzzy = FuzzyAdaptiveEKF(ConstantVelocity(1.0), paper_rules(), window=3)
-    state = fuzzy.start(random_state(1, np.random.default_rng(3)))
-    from tests.filters.common import BEARING
-
-    for sensor in (RADAR, BEARING, RADAR):
-        state = fuzzy.update(fuzzy.predict(state, 1.0), sensor.measure(state.mean[:, :3]), sensor).state
-    assert np.isfinite(state.mean).all()
-
-
 @pytest.mark.parametrize("immediate", [False, True])
 def test_two_sensors_at_one_time(immediate):
     """The second corrects what the first left: with scales of 1 it is the EKF."""
@@ -151,27 +107,6 @@ def test_two_sensors_at_one_time(immediate):
         a, b = fuzzy.update(a, z, sensor).state, ekf.update(b, z, sensor).state
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9, atol=1e-9)
-
-
-def test_calm_is_a_measurement_of_no_turn():
-    """A rule that infers one variance whatever the input: a Kalman update with z = 0 on the turn rate."""
-    motion = CoordinatedTurn(1.0, 0.01)
-    always = FuzzyRules(
-        FuzzyVariable({"any": (0.0, 0.0, 9.0, 9.0)}),
-        FuzzyVariable({"small": (1e-4, 2e-4, 2e-4, 3e-4)}),
-        [("any", "small")],
-    )
-    state = random_state(5, np.random.default_rng(1), 7)
-    state.mean[:, 6] = np.linspace(-0.05, 0.05, 5)
-    z = RADAR.measure(state.mean[:, :3])
-    plain, calm = FuzzyAdaptiveEKF(motion, None), FuzzyAdaptiveEKF(motion, None, calm=always)
-    before = plain.update(plain.start(state), z, RADAR).state
-    after = calm.update(calm.start(state), z, RADAR).state
-    for b in range(5):
-        H = np.eye(7)[6:]
-        mean, P, _, _ = kalman_update(before.mean[b], before.covariance[b], np.zeros(1), H @ before.mean[b], H, 2e-4)
-        np.testing.assert_allclose(after.mean[b], mean, rtol=1e-6, atol=1e-9)
-        np.testing.assert_allclose(after.covariance[b], P, rtol=1e-6, atol=1e-9)
 
 
 def growing(low, high, inputs):
@@ -204,55 +139,3 @@ def test_an_alarm_that_watches_the_turn_sees_what_the_gain_says_of_it():
         expected = rules(last.sum(axis=0) ** 2 / len(last))
         np.testing.assert_allclose(state.process_scale, np.repeat(expected[:, None], 7, axis=1), rtol=1e-6)
         state = fuzzy.predict(state, 1.0)
-
-
-def test_an_alarm_that_watches_the_turn_rate_lets_a_steady_turn_be():
-    """Believing that there is no turn ends where the estimate itself says that there is one."""
-    # log10 of variances: about 1e-5 whatever the input, and from 1e-6 to 1e-3
-    motion, firm, loose = CoordinatedTurn(1.0, 0.01), growing(-5.2, -5.0, [0.0, 1e3]), growing(-9.0, 0.0, [2.0, 10.0])
-    never = FuzzyAdaptiveEKF(motion, None, calm=firm, logarithmic=True)
-    others = [Alarm(1, [], loose, "turn rate")]
-    watched = FuzzyAdaptiveEKF(motion, None, calm=firm, logarithmic=True, others=others)
-    state = random_state(1, np.random.default_rng(5), 7)
-    state.covariance[:, 6], state.covariance[:, :, 6] = 0.0, 0.0
-    state.covariance[:, 6, 6] = 1e-5
-    z = RADAR.measure(state.mean[:, :3])
-    for rate, kept in ((0.08, True), (-0.08, True), (0.003, False)):
-        state.mean[:, 6] = rate
-        after = [one.update(one.start(state), z, RADAR).state.mean[0, 6] / rate for one in (never, watched)]
-        assert after[0] < 0.6 and (after[1] > 0.98 if kept else after[1] == after[0])
-    with pytest.raises(InvalidInputError, match="watches must be one of innovations, turn, turn rate, got 'rate'"):
-        Alarm(1, [], watches="rate")
-    with pytest.raises(InvalidInputError, match="window must be 1 for a turn rate, got 3"):
-        Alarm(3, [], watches="turn rate")
-
-
-@pytest.mark.slow
-def test_a_turn_alarm_of_a_model_without_a_turn_rate_says_nothing():
-    """Nothing is measured of the last component: no division by zero, and no alarm."""
-    rules = growing(1.0, 9.0, [0.0, 30.0])
-    motion = FunctionMotion(lambda x, dt: x, np.eye(4), 4, position=(0, 1))
-    fuzzy = FuzzyAdaptiveEKF(motion, rules, others=[Alarm(2, [rules], watches="turn")])
-    plane = PositionSensor(position=np.zeros(3), noise=np.ones(2), field_of_view=np.array([[-1e3, 1e3]] * 2))
-    state = fuzzy.update(fuzzy.start(Gaussian(np.zeros(4), np.eye(4))), np.zeros((1, 2)), plane).state
-    np.testing.assert_allclose(state.process_scale, rules(np.zeros(1))[0])
-
-
-def test_of_several_windows_the_larger_counts():
-    sets = FuzzyVariable.from_centres(["low", "high"], [1.0, 4.0], 1.0)
-    scale = FuzzyVariable.from_centres(["one", "ten"], [1.0, 10.0], 0.5)
-    rules = FuzzyRules(sets, scale, [("low", "one"), ("high", "ten")])
-    singles = [FuzzyAdaptiveEKF(MOTION, rules, window=w) for w in (1, 4)]
-    both = FuzzyAdaptiveEKF(MOTION, rules, others=[Alarm(4, [rules])])
-    start = random_state(6, np.random.default_rng(2))
-    measured = [RADAR.measure(start.mean[:, :3] + np.array([300.0 * k, 0, 0])) for k in range(5)]
-    states = [one.start(start) for one in (*singles, both)]
-    for z in measured:
-        # the noise plays no part between corrections: all see the same innovations
-        states = [one.update(s, z, RADAR).state for one, s in zip((*singles, both), states, strict=True)]
-        short, long, larger = (s.process_scale for s in states)
-        assert np.array_equal(larger, np.maximum(short, long))
-    with pytest.raises(InvalidInputError, match="others: each must have 1 rules"):
-        FuzzyAdaptiveEKF(MOTION, rules, others=[Alarm(4, [])])
-    with pytest.raises(InvalidInputError, match="window"):
-        Alarm(0, [rules])

@@ -1,7 +1,5 @@
 """Many steps in one call, thousands of steps, and all of it without the compiler."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -25,7 +23,6 @@ from assoc.filters import (
 )
 from assoc.filters.kernels import gaussian, points
 from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
-from tests.running import printed
 from tests.sizes import sample
 
 MIXED = [
@@ -75,18 +72,6 @@ def test_read_only_measurements_compile_no_kernel_again(name):
     assert kinds[0] == kinds[1]
 
 
-def results():
-    found = {}
-    for name, (one, sensor) in every_filter().items():
-        start, places = problem(one)
-        z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
-        done = one.run(one.start(start), z, sensor, 1.0)
-        found[name] = [part.tolist() for part in done[:4]]
-        found[name] += [one.log_likelihood(done.state, z[-1], sensor).tolist()]
-        found[name] += [one.step(done.state[:1], 1.0, z[-1, :1], sensor).state.mean.tolist()]
-    return found
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", every_filter())
 @pytest.mark.parametrize("dt", [1.0, [1.0, 0.5, 2.0, 1.0]])
@@ -110,25 +95,6 @@ def test_a_run_is_its_steps(name, dt):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", every_filter())
-@pytest.mark.parametrize("count", [1, 3])
-def test_a_step_is_a_prediction_and_an_update(name, count):
-    (one, sensor), (again, _) = every_filter()[name], every_filter()[name]
-    start, places = problem(one, 3, count)
-    z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
-    a, b = one.start(start), again.start(start)
-    for k, dt in enumerate((1.0, 0.5, 1.0)):
-        quick, slow = one.step(a, dt, z[k], sensor), again.update(again.predict(b, dt), z[k], sensor)
-        a, b = quick.state, slow.state
-        assert type(a) is type(b) and len(a) == count
-        for part in ("innovation", "covariance", "nis", "log_likelihood"):
-            assert np.array_equal(getattr(quick, part), getattr(slow, part)), part
-        assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
-    assert quick.innovation.shape == (count, 3) and quick.covariance.shape == (count, 3, 3)
-    assert quick.nis.shape == quick.log_likelihood.shape == (count,)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "sensor",
     [BEARING, LinearMeasurement(np.eye(2, 6, 3), np.eye(2)), FunctionMeasurement(lambda x: x[:, :1], np.eye(1))],
@@ -145,63 +111,6 @@ def test_a_step_with_other_sensors(sensor):
         assert ekf.step(state, dt, RADAR.measure(state.mean[:, :3]), RADAR).innovation.shape == (1, 3)
 
 
-@pytest.mark.slow
-def test_refusals_of_a_step():
-    ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
-    z = RADAR.measure(start.mean[:, :3])
-    assert np.array_equal(ekf.step(start, 1.0, z[0], RADAR).state.mean, ekf.step(start, 1.0, z, RADAR).state.mean)
-    for measured, dt, message in (
-        (z * np.nan, 1.0, "measured must be finite, row 0"),
-        (z[:, :2], 1.0, r"measured must have shape \(1, 3\)"),
-        ("abc", 1.0, "measured must be numbers"),
-        (z, -1.0, "dt must be a number >= 0"),
-        (z, np.nan, "dt must be a number >= 0"),
-    ):
-        with pytest.raises(InvalidInputError, match=message):
-            ekf.step(start, dt, measured, RADAR)
-    with pytest.raises(InvalidInputError, match="state must have 6 components, got 7"):
-        ekf.step(random_state(1, np.random.default_rng(0), 7), 1.0, z, RADAR)
-    start.covariance[:] *= -1
-    with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
-        ekf.step(start, 1.0, z, RADAR)
-    start.mean[:] = np.inf
-    with pytest.raises(InvalidInputError, match="mean of target 0 gives no finite measurement"):
-        ekf.step(start, 1.0, z, RADAR)
-    with pytest.raises(AttributeError, match="has no attribute 'gain'"):
-        _ = ekf.step(random_state(1, np.random.default_rng(0)), 1.0, z, RADAR).gain
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("dt", [np.int64(1), np.float32(1), np.array(1.0), np.ones(2), (1, 1)])
-def test_a_run_takes_any_number_for_its_step(dt):
-    ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
-    z = np.stack([RADAR.measure(start.mean[:, :3])] * 2)
-    assert np.array_equal(ekf.run(start, z, RADAR, dt).mean, ekf.run(start, z, RADAR, 1.0).mean)
-
-
-@pytest.mark.slow
-def test_refusals_of_a_run():
-    ekf, start = ExtendedKalmanFilter(MOTION), random_state(2, np.random.default_rng(0))
-    z = np.stack([RADAR.measure(start.mean[:, :3])] * 3)
-    broken = z.copy()
-    broken[1, 1, 0] = np.nan
-    for measured, dt, message in (
-        (broken, 1.0, "measured must be finite"),
-        (z[:, :1], 1.0, r"measured must have shape \(K, 2, 3\)"),
-        (z[:0], 1.0, "K > 0"),
-        (z, [1.0], "dt must be one number or 3"),
-        (z, "one", "dt must be numbers"),
-        (z, None, "dt must be finite"),
-        (z, -1.0, "dt must be a number >= 0"),
-    ):
-        with pytest.raises(InvalidInputError, match=message):
-            ekf.run(start, measured, RADAR, dt)
-    far = start[:1]
-    far.mean[0, 0] = np.inf
-    with pytest.raises(InvalidInputError, match="target 0 .* at step 0"):
-        ekf.run(far, z[:, :1], RADAR, 1.0)
-
-
 @pytest.mark.parametrize("dt", [-1.0, np.nan, np.inf, "1"])
 @sample("name", every_filter(), every=5)
 def test_time_does_not_run_backwards(name, dt):
@@ -215,17 +124,6 @@ def test_time_does_not_run_backwards(name, dt):
     state = one.start(random_state(2, np.random.default_rng(0), one.motion.dim))
     with pytest.raises(InvalidInputError, match="dt must be a number >= 0"):
         one.predict(state, dt)
-
-
-def test_a_sensor_that_was_refused_once_is_refused_again():
-    start = random_state(1, np.random.default_rng(0))
-    for one, sensor, message in (
-        (KalmanFilter(MOTION), RADAR, "must be linear"),
-        (ModifiedEKF(MOTION), BEARING, "must be a Radar3D"),
-    ):
-        for _ in range(2):
-            with pytest.raises(InvalidInputError, match=message):
-                one.update(start, sensor.measure(start.mean[:, :3]), sensor)
 
 
 @pytest.mark.parametrize("name", every_filter())
@@ -248,15 +146,6 @@ def test_covariances_stay_positive_definite_for_many_steps(name):
             unit = P / np.outer(scale, scale)
             assert np.linalg.eigvalsh(unit).min() > 1e-12 and np.abs(unit - unit.T).max() < 1e-12
             assert np.sqrt(np.trace(P[:3, :3])) < 300
-
-
-@pytest.mark.slow
-def test_without_the_compiler_it_is_the_same():
-    code = "import json; from tests.filters.test_long_steps import results; print(json.dumps(results()))"
-    plain, compiled = json.loads(printed("-c", code, NUMBA_DISABLE_JIT=1)), results()
-    for name, parts in compiled.items():
-        for a, b in zip(plain[name], parts, strict=True):
-            np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max(), err_msg=name)
 
 
 @pytest.mark.parametrize("name", every_filter())

@@ -1,8 +1,5 @@
 """IMM, ensemble, smoother, motion models, the UAV and consistency: each against something independent."""
 
-import dataclasses
-import pickle
-
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec, solve_ivp
@@ -23,18 +20,12 @@ from assoc.filters import (
     Jerk,
     KalmanFilter,
     LinearMeasurement,
-    ModifiedEKF,
-    Padded,
     Singer,
     UnmannedAircraft,
     UnscentedKalmanFilter,
-    bounds,
-    nees,
-    paper_rules,
     transition_from_sojourns,
 )
 from assoc.filters.base import predict_each
-from assoc.filters.batches import arrays_of, placed
 from assoc.filters.imm import Mixture, _mixed
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
@@ -76,25 +67,6 @@ def test_one_cycle_of_the_imm_in_plain_numpy():
         np.testing.assert_allclose(state.covariances[0], covs, rtol=1e-6, atol=1e-6)
 
 
-def test_an_imm_of_equal_models_is_one_model():
-    rng = np.random.default_rng(1)
-    start = random_state(4, rng)
-    one = ExtendedKalmanFilter(MOTION)
-    imm = InteractingMultipleModel([one, one], [[0.8, 0.2], [0.4, 0.6]])
-    np.testing.assert_allclose(imm.weights, [2 / 3, 1 / 3])
-    a, b = start, imm.start(start)
-    for k in range(4):
-        z = RADAR.measure(start.mean[:, :3] + k * start.mean[:, 3:]) + 1e-3
-        a, b = one.predict(a, 1.0), imm.predict(b, 1.0)
-        np.testing.assert_allclose(imm.expected(b, RADAR).covariance, one.expected(a, RADAR).covariance, rtol=1e-9)
-        u, w = one.update(a, z, RADAR), imm.update(b, z, RADAR)
-        np.testing.assert_allclose(u.nis, w.nis, rtol=1e-9)
-        a, b = u.state, w.state
-    np.testing.assert_allclose(b.mean, a.mean, rtol=1e-12)
-    np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-8, atol=1e-6)
-    assert np.array_equal(b[1:3].weights, b.weights[1:3])
-
-
 @pytest.mark.parametrize("modes", [2, 3])
 def test_four_seconds_are_four_seconds_however_they_are_cut(modes):
     if modes == 2:
@@ -125,32 +97,6 @@ def test_transitions_of_another_interval_and_of_mean_times():
     np.testing.assert_allclose(slow.transition_over(8.0), np.linalg.matrix_power(slow.transition, 2), rtol=1e-12)
     made = InteractingMultipleModel(models, transition_from_sojourns([30.0, 5.0], 2.0), interval=2.0)
     np.testing.assert_allclose(made.rates, [[-1 / 30, 1 / 30], [1 / 5, -1 / 5]], rtol=1e-9)
-
-
-def test_modes_that_never_change():
-    models = [UnscentedKalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
-    with pytest.raises(InvalidInputError, match="weights must be given"):
-        InteractingMultipleModel(models, np.eye(2))
-    # a mode that nothing speaks for goes on by itself, and the other is alone
-    imm = InteractingMultipleModel(models, np.eye(2), [1.0, 0.0])
-    start = random_state(1, np.random.default_rng(9))
-    state, alone = imm.start(start), start
-    for _ in range(2):
-        state, alone = imm.predict(state, 1.0), models[0].predict(alone, 1.0)
-        z = RADAR.measure(alone.mean[:, :3]) + 1e-3
-        state, alone = imm.update(state, z, RADAR).state, models[0].update(alone, z, RADAR).state
-    np.testing.assert_allclose(state.mean, alone.mean, rtol=1e-12)
-    assert abs(state.means[0, 1] - state.means[0, 0]).max() < 100
-
-
-def test_both_ways_to_ask_a_mixture_for_likelihoods_agree():
-    models = [ExtendedKalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
-    imm = InteractingMultipleModel(models, [[0.9, 0.1], [0.1, 0.9]])
-    state = imm.predict(imm.start(random_state(2, np.random.default_rng(9))), 5.0)
-    z = RADAR.measure(state.mean[:, :3]) + [200.0, 0.0, 0.0]
-    both = imm.compare(state, z, RADAR)
-    assert np.array_equal(both[0], imm.log_likelihood(state, z, RADAR))
-    assert np.array_equal(both[1], imm.distances(state, z, RADAR))
 
 
 @pytest.mark.parametrize("wrong", [[[0.2, 0.8], [0.9, 0.1]], [[0.5, 0.5], [0.5, 0.5]], [[0.0, 1.0], [1.0, 0.0]]])
@@ -209,47 +155,6 @@ def test_smoothing_is_batch_least_squares(kind):
         np.testing.assert_allclose(state.covariance[0], part, rtol=1e-5, atol=1e-4)
 
 
-def test_smoothing_helps_every_filter_and_keeps_to_its_lag():
-    rng = np.random.default_rng(3)
-    runs = 60
-    F = MOTION.matrices(1.0)[0][0]
-    start = random_state(1, rng)[np.zeros(runs, dtype=int)]
-    truth = [start.mean + rng.standard_normal((runs, 6)) @ np.linalg.cholesky(start.covariance[0]).T]
-    root = np.kron(np.array([[0.5], [1.0]]), np.eye(3)) * 2.0
-    for _ in range(12):
-        truth.append(truth[-1] @ F.T + rng.standard_normal((runs, 3)) @ root.T)
-    z = [RADAR.measure(x[:, :3]) + rng.standard_normal((runs, 3)) * RADAR.noise for x in truth]
-    imm = InteractingMultipleModel(
-        [ExtendedKalmanFilter(Padded(MOTION, 0.01)), ExtendedKalmanFilter(CoordinatedTurn(2.0, 0.01))],
-        [[0.9, 0.1], [0.1, 0.9]],
-    )
-    for filter_ in (
-        ExtendedKalmanFilter(MOTION),
-        ModifiedEKF(MOTION),
-        EnsembleKalmanFilter(MOTION, 200, 5),
-        FuzzyAdaptiveEKF(MOTION, paper_rules(), immediate=True),
-        imm,
-    ):
-        first = start
-        if filter_.motion.dim == 7:
-            P = np.zeros((runs, 7, 7))
-            P[:, :6, :6], P[:, 6, 6] = start.covariance, 1e-4
-            first = Gaussian(np.concatenate([start.mean, np.zeros((runs, 1))], axis=1), P)
-        smoother = FixedLagSmoother(filter_, 3)
-        window = smoother.start(first)
-        past = []
-        for k in range(1, 13):
-            window = smoother.predict(window, 1.0)
-            # a step without a measurement belongs to it
-            if k != 6:
-                window, _ = smoother.update(window, z[k], RADAR)
-            past.append(window.state.mean[:, :3])
-        smoothed = window.smoothed()
-        assert len(smoothed) == 4
-        better = ((smoothed[0].mean[:, :3] - truth[9][:, :3]) ** 2).sum(axis=1).mean()
-        assert better < 0.9 * ((past[8] - truth[9][:, :3]) ** 2).sum(axis=1).mean()
-
-
 def test_a_large_ensemble_is_a_kalman_filter():
     start = random_state(1, np.random.default_rng(4))
     kalman, enkf = KalmanFilter(MOTION), EnsembleKalmanFilter(MOTION, 100_000, 7)
@@ -264,18 +169,6 @@ def test_a_large_ensemble_is_a_kalman_filter():
     assert np.abs((u.state.mean - w.state.mean)[0] / scale).max() < 0.02
     assert np.abs((u.state.covariance - w.state.covariance)[0] / np.outer(scale, scale)).max() < 0.03
     assert w.log_likelihood[0] == pytest.approx(u.log_likelihood[0], abs=0.05)
-
-
-def test_one_seed_one_ensemble():
-    start = random_state(2, np.random.default_rng(5))
-    z = RADAR.measure(start.mean[:, :3])
-
-    def run(seed):
-        one = EnsembleKalmanFilter(MOTION, 50, seed)
-        return one.update(one.predict(one.start(start), 1.0), z, RADAR).state.members
-
-    assert np.array_equal(run(1), run(1))
-    assert not np.array_equal(run(1), run(2))
 
 
 def test_coordinated_turn_against_integration():
@@ -351,17 +244,6 @@ def test_the_aircraft_is_the_papers_in_body_axes():
     assert done.state.mean[0, 2] == pytest.approx(5.5)
 
 
-def test_consistency_of_an_exact_filter():
-    low, high = bounds(6, 200)
-    assert low < 6 < high
-    state = random_state(1, np.random.default_rng(8))[np.zeros(200, dtype=int)]
-    L = np.linalg.cholesky(state.covariance[0])
-    truth = state.mean + np.random.default_rng(9).standard_normal((200, 6)) @ L.T
-    assert low < nees(state, truth).mean() < high
-    with pytest.raises(InvalidInputError, match="truth must have shape"):
-        nees(state, truth[:3])
-
-
 @pytest.mark.parametrize(
     "kind",
     [
@@ -430,57 +312,6 @@ def test_modes_as_one_batch_and_one_by_one_agree(sensor):
     np.testing.assert_allclose(again.log_likelihood, full.log_likelihood, rtol=1e-9)
 
 
-class _Doubting(ExtendedKalmanFilter):
-    """A user's filter, whose noise is `factor` times the sensor's."""
-
-    def __init__(self, motion, factor):
-        super().__init__(motion)
-        self.factor = factor
-
-    def correct(self, state, measured, o, scale=None):
-        return super().correct(state, measured, o, np.full(len(state), self.factor))
-
-
-class _DoubtingUnscented(UnscentedKalmanFilter):
-    def __init__(self, motion, factor):
-        super().__init__(motion)
-        self.factor = factor
-
-    def update(self, state, measured, sensor):
-        return super().update(state, measured, dataclasses.replace(sensor, noise=sensor.noise * self.factor**0.5))
-
-
-@pytest.mark.parametrize("kind", [_Doubting, _DoubtingUnscented])
-def test_modes_of_ones_own_classes_correct_as_they_say(kind):
-    models = [kind(MOTION, 1.0), kind(MOTION, 4.0)]
-    imm = InteractingMultipleModel(models, np.array([[0.9, 0.1], [0.2, 0.8]]))
-    states = imm.start(random_state(3, np.random.default_rng(1)))
-    z = RADAR.measure(states.mean[:, :3] + 20.0)
-    found = imm.update(states, z, RADAR).state
-    for j, model in enumerate(models):
-        alone = model.update(states.component(j), z, RADAR)
-        np.testing.assert_allclose(found.means[:, j], alone.state.mean, rtol=1e-12)
-    assert imm.positions_alone(states)[0] is imm
-
-
-def test_errors_of_a_mixture_name_the_target():
-    imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
-    states = imm.start(random_state(3, np.random.default_rng(2)))
-    z = RADAR.measure(states.mean[:, :3])
-    z[2, 0] = np.nan
-    with pytest.raises(InvalidInputError, match="row 2 is not"):
-        imm.update(states, z, RADAR)
-
-
-def test_an_update_goes_to_another_process():
-    imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
-    states = imm.start(random_state(3, np.random.default_rng(3)))
-    done = imm.update(states, RADAR.measure(states.mean[:, :3]), RADAR)
-    sent = pickle.loads(pickle.dumps(done))
-    for name in ("innovation", "covariance", "nis", "log_likelihood"):
-        np.testing.assert_array_equal(getattr(sent, name), getattr(done, name))
-
-
 def test_a_mixture_on_both_sides_of_the_azimuth_pi():
     """West of a radar azimuths jump; the mixture's spread is that of its mirror image in the east."""
     imm = InteractingMultipleModel([ExtendedKalmanFilter(MOTION)] * 2, np.array([[0.9, 0.1], [0.2, 0.8]]))
@@ -492,24 +323,6 @@ def test_a_mixture_on_both_sides_of_the_azimuth_pi():
     west, east = found
     assert abs(west.mean[0, 1] % (2.0 * np.pi) - np.pi + east.mean[0, 1]) < 1e-9
     np.testing.assert_allclose(np.diagonal(west.covariance[0]), np.diagonal(east.covariance[0]), rtol=1e-9)
-
-
-def test_parts_are_placed_where_they_belong():
-    """States of several kinds of history, each row by row as in the part that it comes from."""
-    rng = np.random.default_rng(3)
-    fuzzy = FuzzyAdaptiveEKF(MOTION, paper_rules())
-    fresh = fuzzy.start(random_state(5, rng))
-    seen = fuzzy.update(fresh, PLACE.measure(fresh.mean[:, :3]), PLACE).state
-    for parts in (
-        [(np.array([4, 0]), fresh, [1, 2]), (np.array([1, 3, 2]), seen, [0, 4, 2])],
-        [(np.array([1, 3, 2]), seen, [0, 4, 2]), (np.array([4, 0]), fresh, [1, 2])],
-    ):
-        whole = arrays_of(placed(5, ((rows, states[chosen]) for rows, states, chosen in parts)))
-        for rows, states, chosen in parts:
-            for name, value in arrays_of(states[chosen]).items():
-                width = tuple(slice(size) for size in value.shape[1:])
-                assert np.array_equal(whole[name][rows][:, *width], value), name
-                assert whole[name][rows].sum() == pytest.approx(value.sum())
 
 
 @pytest.mark.parametrize("models", [2, 3])

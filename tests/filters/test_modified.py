@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, ModifiedEKF
-from assoc.sensors import BearingSensor, Radar2D, Radar3D
+from assoc.filters import ConstantVelocity, Gaussian, ModifiedEKF
+from assoc.sensors import BearingSensor, Radar3D
 
 MOTION = ConstantVelocity(0.01)
 
@@ -67,17 +67,6 @@ def test_debiased_mean_and_covariance_against_samples(elevation):
     assert np.var(plain[:, 0]) > 1.2 * sensor.covariance[0, 0]
 
 
-def test_it_is_an_ekf_where_the_curvature_is_small():
-    sensor = radar(30.0, 1e-5)
-    state = Gaussian([30e3, 20e3, 5e3, 0, 0, 0], np.diag([10.0, 10, 10, 1, 1, 1]))
-    z = sensor.measure(state.mean[:, :3]) + sensor.noise
-    for simplified in (False, True):
-        a = ModifiedEKF(MOTION, simplified).update(state, z, sensor)
-        b = ExtendedKalmanFilter(MOTION).update(state, z, sensor)
-        np.testing.assert_allclose(a.state.mean, b.state.mean, atol=1e-2)
-        np.testing.assert_allclose(a.state.covariance, b.state.covariance, rtol=1e-4, atol=1e-6)
-
-
 def test_formulas_of_both_forms():
     """Straight from the corrected equations, one target."""
     sensor = radar(30.0, 0.02)
@@ -107,37 +96,6 @@ def test_formulas_of_both_forms():
         np.testing.assert_allclose(done.covariance[0], prior + np.diag(R), rtol=1e-9)
         assert one.log_likelihood(state, z, sensor)[0, 0] == pytest.approx(done.log_likelihood[0])
         assert one.distances(state, z, sensor)[0, 0] == pytest.approx(done.nis[0])
-
-
-def test_a_radar_without_elevations():
-    """The terms of the elevation fall away; the error is below an EKF's, with a third of the plots missed, too."""
-    reach = [[0.0, 1e6], [-math.pi, math.pi]]
-    sensor = Radar2D(position=np.zeros(3), noise=[30.0, 0.026], field_of_view=reach)
-    high = Gaussian([60e3, 50e3, 40e3, 0, 0, 0], np.diag([4e6, 4e6, 1e6, 1.0, 1.0, 1.0]))
-    z = sensor.measure(high.mean[:, :3]) + np.array([[20.0, 0.03]])
-    H, r, t, st = sensor.jacobian(high.mean[:, :3])[0], np.hypot(np.hypot(60e3, 50e3), 40e3), 0.03, 0.026
-    c2, prior = (60e3**2 + 50e3**2) / r**2, H @ high.covariance[0, :3, :3] @ H.T
-    wide = prior + np.diag([900.0 + r**2 * c2**2 * (st**4 / 2 + st**2 * prior[1, 1]), st**2])
-    simple = prior + np.diag([900.0 + r**2 * st**4 / 2, st**2])
-    for simplified, part, stated in ((False, c2, wide), (True, 1.0, simple)):
-        one = ModifiedEKF(MOTION, simplified)
-        done = one.update(high, z, sensor)
-        np.testing.assert_allclose(done.innovation[0], [20.0 - r / 2 * part * (t**2 - st**2), 0.03], rtol=1e-9)
-        np.testing.assert_allclose(done.covariance[0], stated, rtol=1e-9, atol=1e-12)
-        assert one.log_likelihood(high, z, sensor)[0, 0] == pytest.approx(done.log_likelihood[0])
-    rng, flat = np.random.default_rng(0), ConstantVelocity(0.01, dimensions=2)
-    mean, sigma = np.tile([70e3, 70e3, -150.0, -200.0], (100, 1)), np.array([3e3, 3e3, 300.0, 300.0])
-    truth, began = mean + rng.normal(0, sigma, (100, 4)), Gaussian(mean, np.diag(sigma**2))
-    filters = ModifiedEKF(flat), ExtendedKalmanFilter(flat)
-    states = [one.start(began) for one in filters]
-    for k in range(40):
-        truth = flat.propagate(truth, 1.0)
-        z = sensor.measure(np.pad(truth[:, :2], ((0, 0), (0, 1)))) + rng.standard_normal((100, 2)) * sensor.noise
-        states = [one.predict(state, 1.0) for one, state in zip(filters, states, strict=True)]
-        if k % 3:
-            states = [one.update(state, z, sensor).state for one, state in zip(filters, states, strict=True)]
-    modified, plain = (np.sqrt(((state.mean - truth)[:, :2] ** 2).sum(axis=1).mean()) for state in states)
-    assert modified < 0.8 * plain
 
 
 def test_other_sensors_are_refused():

@@ -26,10 +26,6 @@ RADAR = Radar3D(
 )
 
 
-class OwnRadar(Radar3D):
-    """A user's own class, which has no compiled model."""
-
-
 def measured(state, rng, sensor=RADAR):
     z = sensor.measure(state.mean[:, :3], state.mean[:, 3:6])
     return z + rng.standard_normal(z.shape) * sensor.noise
@@ -66,55 +62,6 @@ def test_filters_of_points_agree(make):
     found = other.update(other.start(state), z, RADAR).state
     sigma = np.sqrt(np.einsum("bii->bi", wanted.covariance))
     assert (np.abs(found.mean - wanted.mean) < 0.35 * sigma).all()
-
-
-def test_a_class_of_ones_own_is_filtered_alike():
-    rng = np.random.default_rng(2)
-    state, ekf = random_state(5, rng), ExtendedKalmanFilter(MOTION)
-    own = OwnRadar(position=RADAR.position, noise=RADAR.noise, field_of_view=RADAR.field_of_view)
-    z = measured(state, rng)
-    one, other = ekf.update(state, z, RADAR), ekf.update(state, z, own)
-    np.testing.assert_allclose(one.state.mean, other.state.mean, rtol=1e-9)
-    np.testing.assert_allclose(one.log_likelihood, other.log_likelihood, rtol=1e-9)
-
-
-def test_planar_states():
-    motion = ConstantVelocity(2.0, dimensions=2)
-    rng = np.random.default_rng(3)
-    deep = random_state(5, rng)
-    read = [0, 1, 3, 4]
-    state = Gaussian(deep.mean[:, read], deep.covariance[:, read][:, :, read])
-    places, speeds = np.zeros((5, 3)), np.zeros((5, 3))
-    places[:, :2], speeds[:, :2] = state.mean[:, :2], state.mean[:, 2:]
-    h, H = RADAR.measure(places, speeds), RADAR.jacobian(places, speeds)[:, :, read]
-    z = h + 0.5 * RADAR.noise
-    done = ExtendedKalmanFilter(motion).update(state, z, RADAR)
-    for b in range(5):
-        mean, *_ = kalman_update(state.mean[b], state.covariance[b], z[b], h[b], H[b], RADAR.covariance)
-        np.testing.assert_allclose(done.state.mean[b], mean, rtol=1e-9, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_runs_are_steps():
-    rng = np.random.default_rng(4)
-    state, ekf = random_state(3, rng), ExtendedKalmanFilter(MOTION)
-    z = np.stack([measured(state, rng) for _ in range(4)])
-    history = ekf.run(state, z, RADAR, 0.1)
-    for k in range(4):
-        state = ekf.step(state, 0.1, z[k], RADAR).state
-        np.testing.assert_allclose(history.mean[k], state.mean, rtol=1e-12)
-
-
-def test_range_rate_tells_the_velocity_along_the_line_of_sight():
-    state = random_state(1, np.random.default_rng(5))
-    state = Gaussian(state.mean, np.diag([100.0, 100, 100, 50, 50, 50])[None] ** 2)
-    z = RADAR.measure(state.mean[:, :3], state.mean[:, 3:])
-    P = ExtendedKalmanFilter(MOTION).update(state, z, RADAR).state.covariance[0]
-    away = state.mean[0, :3] - RADAR.position
-    along = away / np.linalg.norm(away)
-    assert math.sqrt(along @ P[3:, 3:] @ along) < 0.9
-    across = np.cross(along, [0, 0, 1.0])
-    assert math.sqrt(across @ P[3:, 3:] @ across) > 30
 
 
 def test_what_is_refused():

@@ -32,12 +32,6 @@ def test_the_jacobian_against_differences():
         assert MOTION.jacobian(STATES, dt) == pytest.approx(expected, abs=1e-7)
 
 
-def test_velocities_have_no_part():
-    other = STATES.copy()
-    other[:, 3:] += 5.0
-    assert MOTION.propagate(other, 0.1) - MOTION.propagate(STATES, 0.1) == pytest.approx(other - STATES)
-
-
 def test_right_above_the_radar_is_refused():
     with pytest.raises(InvalidInputError, match="right above the radar"):
         MOTION.propagate(np.array([[0.0, 0, 5, 0, 0, 0]]), 0.1)

@@ -1,12 +1,8 @@
 """ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
 
-import contextlib
 import io
 import math
 import struct
-import subprocess
-import sys
-import tarfile
 
 import numpy as np
 import pandas as pd
@@ -14,14 +10,13 @@ import pytest
 
 pytest.importorskip("asterix", reason="libasterix is not installed: pip install 'assoc[asterix]'")
 
-from assoc import asterix2csv, track
+from assoc import asterix2csv
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
-from assoc.integrations.asterix.blocks import EDITIONS, edition, library, value
+from assoc.integrations.asterix.blocks import edition, library, value
 from assoc.integrations.asterix.parts import AsterixPlots
 from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
-from assoc.recordings import write_plots as write_table
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import joined
 from assoc.simulation import simulate_recording
@@ -90,33 +85,6 @@ def test_parts_of_a_file_are_the_whole(tmp_path):
     assert sum(reader.notes.values()) == len(np.array_split(np.arange(len(made)), 40)[0])
     assert any("came more than 300 s late" in what for what in reader.notes)
     assert (np.diff(joined(parts, {}, "").times) >= 0).all()
-
-
-def test_single_wrong_times_make_no_other_plot_late(tmp_path):
-    made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording
-    wrong = made.take(np.array([100, 101]))
-    wrong = Recording(wrong.times + 30_000.0, wrong.ranges, wrong.azimuths, wrong.identities, wrong.altitudes)
-    pieces = []
-    for part in (made.take(np.arange(150)), wrong, made.take(np.arange(150, len(made)))):
-        write_plots(tmp_path / "piece.ast", part, (1, 1))
-        pieces.append((tmp_path / "piece.ast").read_bytes())
-    (tmp_path / "plots.ast").write_bytes(b"".join(pieces))
-    reader = AsterixPlots(tmp_path / "plots.ast", at_once=400)
-    parts = [*reader]
-    assert reader.notes == {"plots left out whose time no other supports": 2}
-    assert len(parts) > 2 and sum(map(len, parts)) == len(made)
-    whole = read_asterix(tmp_path / "plots.ast").plots[1, 1]
-    assert len(whole) == len(made) and abs(np.ptp(whole.times) - np.ptp(made.times)) < 0.02
-
-
-def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):
-    """Octal digits of a table become the 12 bits that ASTERIX has, and come back from both."""
-    for name, told in (("squawk", "1234"), ("mode3_oct", "1234"), ("mode3", "668"), ("mode3_dec", "668")):
-        (tmp_path / "plots.csv").write_text(f"time,range,bearing,{name}\n1,10,20,{told}\n")
-        write_plots(tmp_path / "plots.ast", read_plots(tmp_path / "plots.csv"))
-        assert read_asterix(tmp_path / "plots.ast").plots[0, 1].identities.tolist() == [0o1234]
-        write_table(tmp_path / "again.csv", read_asterix(tmp_path / "plots.ast").plots[0, 1])
-        assert read_plots(tmp_path / "again.csv").identities.tolist() == [0o1234]
 
 
 def test_a_table_of_records(plots, file, tmp_path, capfd):
@@ -236,34 +204,6 @@ def test_tracks_there_and_back(tmp_path):
     assert not (tmp_path / "far.ast").exists()
 
 
-def test_tracks_of_which_not_all_is_known(tmp_path):
-    frame = pd.DataFrame(
-        [[1, 0.0, 1e3, 2e3, np.nan, 50.0, -50.0, 1.27], [2, 1.0, 1e3, 2e3, 1905.0, np.nan, np.nan, np.nan]],
-        columns=["track_id", "time", *"xyz", "vx", "vy", "vz"],
-    )
-    write_tracks(tmp_path / "tracks.ast", frame)
-    back = read_tracks(tmp_path / "tracks.ast")
-    pd.testing.assert_frame_equal(back[frame.columns], frame, check_dtype=False, atol=1e-9)
-
-
-def test_a_file_cut_in_the_middle_gives_what_is_whole(plots, file, tmp_path):
-    whole = file.read_bytes()
-    (tmp_path / "cut.ast").write_bytes(whole[: len(whole) - 7])
-    content = read_asterix(tmp_path / "cut.ast")
-    (kept,) = content.plots.values()
-    assert 0 < len(kept) < len(plots) and content.notes["bytes that are no whole data block"] > 0
-    assert "no whole data block" in kept.summary()
-
-
-def test_a_block_that_cannot_be_decoded_is_passed_over(plots, file, tmp_path):
-    bad = b"\x30\x00\x08\xff\xff\xff\xff\x01"
-    unknown = b"\x05\x00\x04\x00"
-    (tmp_path / "mixed.ast").write_bytes(bad + unknown + file.read_bytes())
-    content = read_asterix(tmp_path / "mixed.ast")
-    assert len(content.plots[25, 201]) == len(plots)
-    assert content.notes == {"data blocks of category 048 that cannot be decoded": 1, "data blocks of category 005": 1}
-
-
 def test_hostile_files(file, tmp_path):
     rng = np.random.default_rng(5)
     whole = bytearray(file.read_bytes()[:2000])
@@ -294,26 +234,6 @@ def test_hostile_files(file, tmp_path):
         read_asterix(file, origin=(52.0, 13.0, 40.0))
 
 
-def test_bits_of_items_that_no_edition_defines(tmp_path):
-    """Random records of all categories: the decoder fails in its own ways, the reader says what it left out."""
-    rng = np.random.default_rng([1, 7])
-    path, undecoded = tmp_path / "random.ast", 0
-    for _ in range(200):
-        bodies = [rng.bytes(int(rng.integers(2, 60))) for _ in range(8)]
-        kinds = rng.choice(list(EDITIONS), len(bodies)).tolist()
-        path.write_bytes(
-            b"".join(struct.pack(">BH", kind, len(body) + 3) + body for kind, body in zip(kinds, bodies, strict=True))
-        )
-        for read in (read_asterix, read_tracks):
-            with contextlib.suppress(InvalidInputError):
-                read(path)
-        notes = {}
-        with contextlib.suppress(InvalidInputError):
-            read_records(path, notes)
-        undecoded += sum(count for what, count in notes.items() if "cannot be decoded" in what)
-    assert undecoded > 100
-
-
 def packet(payload, port=8600):
     udp = struct.pack(">HHHH", port, port, 8 + len(payload), 0) + payload
     ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, 20 + len(udp), 0, 0, 1, 17, 0, bytes(4), bytes(4)) + udp
@@ -334,65 +254,6 @@ def test_blocks_in_the_packets_of_a_pcap(plots, file, tmp_path):
         (tmp_path / "plots.pcap").write_bytes(head + body)
         content = read_asterix(tmp_path / "plots.pcap")
         assert len(content.plots[25, 201]) == len(plots) and content.notes == {"packets that are not UDP": 1}
-
-
-def test_bad_arguments(plots, tmp_path):
-    with pytest.raises(InvalidInputError, match="source"):
-        write_plots(tmp_path / "x.ast", plots, (1, 256))
-    far = Recording([0.0], [1e6], [0.0])
-    with pytest.raises(InvalidInputError, match="256 nmi"):
-        write_plots(tmp_path / "x.ast", far)
-    # 7700 as digits of a CSV file: 12 bits would make 3604 of it
-    digits = Recording([0.0], [1e4], [0.0], identities=[7700])
-    with pytest.raises(InvalidInputError, match="identities of category 048 have 12 bits, got 7700"):
-        write_plots(tmp_path / "x.ast", digits)
-    high = Recording([0.0], [1e4], [0.0], altitudes=[70_000.0])
-    with pytest.raises(InvalidInputError, match="an altitude of 70000 m, expected at most 62415"):
-        write_plots(tmp_path / "x.ast", high)
-    wide = Recording([0.0], [1e4], [0.0], addresses=[2**24])
-    with pytest.raises(InvalidInputError, match="addresses of category 048 have 24 bits, got 16777216"):
-        write_plots(tmp_path / "x.ast", wide)
-    assert not (tmp_path / "x.ast").exists()
-
-
-@pytest.mark.slow
-def test_a_recording_of_real_radars(tmp_path):
-    """The sample of another decoder (GPL: fetched here, never shipped): 126 plots of 7 radars."""
-    words = ["pip", "download", "--quiet", "--no-deps", "--no-binary", ":all:", "-d", str(tmp_path), "asterix_decoder"]
-    try:
-        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, timeout=600)
-    except subprocess.TimeoutExpired:
-        pytest.skip("the sample cannot be reached")
-    archives = list(tmp_path.glob("asterix_decoder-*.tar.gz"))
-    if done.returncode or not archives:
-        pytest.skip("the sample cannot be reached")
-    with tarfile.open(archives[0]) as archive:
-        member = next(one for one in archive if one.name.endswith("/asterix/sample_data/cat_034_048.pcap"))
-        (tmp_path / "sample.pcap").write_bytes(archive.extractfile(member).read())
-    found = read_asterix(tmp_path / "sample.pcap")
-    assert sum(len(one) for one in found.plots.values()) == 126 and len(found.plots) == 7
-    assert found.radars[25, 12].rotation == pytest.approx(4.945, abs=0.001)
-    latitude, longitude, height = found.radars[25, 12].place
-    assert math.degrees(latitude) == pytest.approx(43.571, abs=0.001) and height == 780.0
-    assert math.degrees(longitude) == pytest.approx(16.406, abs=0.001)
-
-
-def test_the_program_takes_them(file, plots, tmp_path, capsys):
-    words = ["-o", str(tmp_path / "tracks.csv"), "--window", "ctw-time", "--rotation", "9.5"]
-    assert track.main([str(file), *words, "--range-noise", "500", "--bearing-noise", "0.1"]) == 0
-    assert f"{len(plots)} plots over" in capsys.readouterr().out
-    write_plots(tmp_path / "other.ast", plots, (25, 202))
-    (tmp_path / "two.ast").write_bytes(file.read_bytes() + (tmp_path / "other.ast").read_bytes())
-    assert track.main([str(tmp_path / "two.ast"), *words]) == 2
-    assert "--radar: the file holds plots of 25/201, 25/202; name one" in capsys.readouterr().err
-    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "25/202", "--range-noise", "500",
-                       "--bearing-noise", "0.1"]) == 0  # fmt: skip
-    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "1/1"]) == 2
-    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "one"]) == 2
-    (tmp_path / "cut.ast").write_bytes(file.read_bytes()[:40])
-    capsys.readouterr()
-    assert track.main([str(tmp_path / "cut.ast"), *words]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def test_plots_of_older_radars(tmp_path):

@@ -55,17 +55,6 @@ def test_a_scene_survives_the_way_there_and_back():
     np.testing.assert_allclose(costs[0], costs[1])
 
 
-def test_measurements_keep_times_of_their_own():
-    scene = simulate("rotating-radars", 0, aircraft=3, duration=12.0)
-    back = scene_from_detections(SceneDetectionReader(scene), adapted(scene), region=scene.region)
-    elapsed = back.times - scene.times
-    np.testing.assert_allclose(elapsed, elapsed[0], atol=1e-6)
-    for k in range(scene.num_scans):
-        here, there = scene.scan(k), back.scan(k)
-        for ours, when, other in zip(here.measurements, here.times, there.times, strict=True):
-            np.testing.assert_allclose(when[np.argsort(ours[:, 2])] + elapsed[0], other, atol=2e-6)
-
-
 def test_detections_say_where_they_come_from():
     scene = three_radars(3)
     for k, (time, found) in enumerate(SceneDetectionReader(scene)):
@@ -137,15 +126,6 @@ def test_truth_and_scans_put_together_from_sets_of_one_time():
                     np.testing.assert_allclose(sensor.measure(place[target][None])[0], measured)
     result = assoc.associate(scene)
     assert result.totals()["share_correct"] == 1.0
-
-
-def test_nothing_and_time_running_backwards_are_refused():
-    sensors = [adapt(planar_model(0.0, 0.0), max_range=1e4)]
-    with pytest.raises(InvalidInputError, match="the reader yielded none"):
-        scene_from_detections([], sensors)
-    times = [datetime(2026, 1, 2), datetime(2026, 1, 1)]
-    with pytest.raises(InvalidInputError, match="2026-01-01 00:00:00 comes after"):
-        scene_from_detections([(time, set()) for time in times], sensors)
 
 
 def test_without_stone_soup_the_error_names_the_command():

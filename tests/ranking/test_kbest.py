@@ -1,36 +1,26 @@
 """The k best against full enumeration, by every method."""
 
-import itertools
 import time
 
 import numpy as np
 import pytest
 
 import assoc
-from assoc.costs import build_problem
-from assoc.errors import AssocWarning, InfeasibleError, InvalidInputError
+from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.counts import Splitting
-from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.component_ranking import ComponentRanking
 from assoc.ranking.kbest import kbest, rank
-from assoc.ranking.merging import merge
 from assoc.ranking.murty.murty import Murty
-from assoc.solvers.assign import assign
-from experiments.common.instances import scenes
-from experiments.common.instances.synthetic import axial_random, planar_random
 from tests.oracles import (
     all_solutions,
     axial_problem,
     check_answer,
-    disconnected_problem,
-    gated_problem,
     small_problems,
 )
-from tests.packings import all_covers, finished, weights_of
+from tests.packings import all_covers, weights_of
 from tests.sizes import few_or_all
 from tests.solvers.test_against_brute_force import blackman_popoli
 
@@ -108,27 +98,6 @@ def test_a_huge_cost_that_no_good_solution_has_blurs_no_ties():
         assert found[0].status == "optimal"
 
 
-def test_two_sensors():
-    rng = np.random.default_rng(1)
-    for number in range(250):
-        style = ("mixed", "positive", "negative", "ties")[number % 4]
-        density = float(rng.choice([0.3, 0.6, 1.0]))
-        k = int(rng.choice([1, 3, 12, 60, 2000]))
-        if number % 2:
-            sizes = tuple(int(n) for n in rng.integers(0, 5, 2))
-            problem = gated_problem(rng, sizes, density, style, listed_singletons=0.5, duplicates=0.2)
-        else:
-            problem = axial_problem(rng, tuple(int(n) for n in rng.integers(1, 6, 2)), density, style)
-        check(problem, k)
-
-
-def test_two_sensors_against_permutations():
-    costs = np.random.default_rng(2).random((8, 8))
-    expected = sorted(sum(costs[i, j] for i, j in enumerate(order)) for order in itertools.permutations(range(8)))
-    found = kbest(AssignmentProblem.from_dense(costs, dummy=False), 500)
-    assert np.allclose([s.cost for s in found], expected[:500], rtol=0.0, atol=1e-12)
-
-
 def test_murty_finds_them_in_order():
     """Even before sorting: this reveals a bound that is too large."""
     rng = np.random.default_rng(3)
@@ -150,14 +119,6 @@ def test_murty_finds_them_in_order():
         assert costs == pytest.approx(sorted(costs), abs=1e-12)
         if costs:
             assert murty.rest >= costs[-1] - 1e-12
-
-
-def test_textbook():
-    """Blackman & Popoli; a commercial k-best misses the third."""
-    found = kbest(blackman_popoli(), 8)
-    expected = [-34.7, -31.7, -31.1, -29.1, -28.6, -28.0, -27.6, -26.9]
-    assert [s.cost for s in found] == pytest.approx(expected, abs=1e-9)
-    assert found[0].tuples.tolist() == [[1, 1, 1], [2, 2, 2]]
 
 
 @pytest.mark.slow
@@ -196,90 +157,6 @@ def test_branching_instead_of_enumeration(count, budget):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2001, 2033, 2037])
-def test_scenes_full_of_ghosts_in_parts_and_without(seed):
-    packing = prepare(build_problem(scenes.ghost(20, seed), 0)).packing.component(0)
-    lists = []
-    for after in (1, 10**9):
-        ranking = ComponentRanking(packing, dual_bound(packing), 20, np.inf, 1e-12, splitting=Splitting(after))
-        lists.append(finished(ranking).solutions())
-        assert (ranking.parts_begun > 0) == (after == 1)
-    (one, first), (two, second) = lists
-    assert one == pytest.approx(two, abs=1e-11)
-    # solutions that tie with the last one may differ
-    sure = np.count_nonzero(one < one[-1] - 1e-9)
-    assert sure >= 8 and {frozenset(s) for s in first[:sure]} == {frozenset(s) for s in second[:sure]}
-
-
-@pytest.mark.slow
-def test_components_that_need_branching_within_a_problem():
-    rng = np.random.default_rng(4)
-    for number in range(40):
-        if number % 2:
-            try:
-                check(disconnected_problem(rng, 2), (3, 30)[number % 4 // 2], budget=-3)
-            except MemoryError:
-                pass
-        else:
-            check(axial_problem(rng, (4, 4, 4), 0.7, "ties"), (3, 30)[number % 4 // 2], budget=-3)
-
-
-def test_wide_integrality_gap():
-    """Dense random costs, where the multipliers' bound is far from the optimum: the first is that of `exact`."""
-    problem = axial_random(8, seed=5)
-    found = kbest(problem, 15)
-    assert found[0].cost == assign(problem, "exact").cost
-    assert len(found) == 15
-    # every other of the k best without a tuple of the best is the best of the problem without that tuple
-    without = []
-    for index in found[0].indices:
-        keep = np.arange(problem.num_tuples) != index
-        smaller = AssignmentProblem(problem.tuples[keep], problem.costs[keep], problem.sizes, dummy=False)
-        without.append(assign(smaller, "exact").cost)
-    assert found[1].cost == pytest.approx(min(without))
-
-
-def test_merge():
-    rng = np.random.default_rng(6)
-    for _ in range(100):
-        lists = [np.sort(rng.integers(0, 9, rng.integers(1, 5))).astype(float) for _ in range(rng.integers(0, 5))]
-        start = np.concatenate([[0], np.cumsum([len(own) for own in lists])]).astype(np.int64)
-        expected = sorted(sum(pick) for pick in itertools.product(*lists))
-        k = int(rng.choice([1, 4, 1000]))
-        total, choice = merge(start, np.concatenate([*lists, np.zeros(0)]), k)
-        assert total.tolist() == expected[:k]
-        assert len(np.unique(choice, axis=0)) == len(choice)
-        assert [sum(own[i] for own, i in zip(lists, pick, strict=True)) for pick in choice] == total.tolist()
-
-
-def test_same_answer_twice_and_prefixes():
-    problem = gated_problem(np.random.default_rng(7), (6, 6, 6), 0.5, "ties")
-    first, second = kbest(problem, 30), kbest(problem, 30)
-    assert [s.tuples.tolist() for s in first] == [s.tuples.tolist() for s in second]
-    assert [s.cost for s in kbest(problem, 7)] == [s.cost for s in first[:7]]
-
-
-@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e150])
-def test_scale_of_costs(scale):
-    for shape in ((4, 4), (3, 3, 3)):
-        problem = gated_problem(np.random.default_rng(8), shape, 0.7, listed_singletons=0.5)
-        scaled = AssignmentProblem(problem.tuples, problem.costs * scale, problem.sizes)
-        expected = [s.cost for s in all_solutions(problem)[:20]]
-        assert [s.cost / scale for s in kbest(scaled, 20)] == pytest.approx(expected, rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_large_two_sensors():
-    """Against the method for more sensors, which shares only the final sorting with Murty's."""
-    problem = planar_random(40, seed=9)
-    lifted = AssignmentProblem(
-        np.concatenate([problem.tuples, problem.tuples[:, :1]], axis=1), problem.costs, [40, 40, 40], dummy=False
-    )
-    flat = [s.cost for s in kbest(problem, 60)]
-    assert flat == pytest.approx([s.cost for s in kbest(lifted, 60)], abs=1e-12)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(20, 20, 20), (150, 150)])
 def test_time_limit_returns_only_what_is_proved(shape):
     rng = np.random.default_rng(10)
@@ -301,33 +178,11 @@ def test_time_limit_returns_only_what_is_proved(shape):
     assert all(s.lower_bound <= s.cost for s in found)
 
 
-def test_nothing_to_choose():
-    empty = np.zeros((0, 3), dtype=int)
-    assert [s.cost for s in kbest(AssignmentProblem(empty, [], [2, 0, 1]), 5)] == [0.0]
-    assert len(kbest(AssignmentProblem(empty, [], [0, 0, 0]), 5)) == 1
-    assert len(kbest(AssignmentProblem([], [], [0, 0]), 5)) == 1
-    with pytest.raises(InfeasibleError):
-        kbest(AssignmentProblem(empty, [], [1, 1, 1], dummy=False), 5)
-    with pytest.raises(InfeasibleError):
-        kbest(AssignmentProblem([[1, 1], [2, 1]], [0, 0], [2, 2], dummy=False), 5)
-
-
 def test_bounds_allow_for_what_weights_have_lost():
     """With false alarms of 1e16 that cancel, a tuple of -0.9 weighs 0, as much as its measurements alone."""
     problem = AssignmentProblem([[1, 1, 1], [1, 0, 0], [0, 0, 1]], [-0.9, 1e16, -1e16], [1, 1, 1])
     (solution,) = kbest(problem, 1)
     assert solution.lower_bound <= -0.9
-
-
-def test_one_sensor():
-    found = kbest(AssignmentProblem([[1], [2], [2]], [3.0, -1.0, -2.0], [3]), 5)
-    assert [s.cost for s in found] == [1.0]
-
-
-def test_tuples_that_no_optimum_uses_count_too():
-    """A pair that costs more than its singletons is a worse solution, but a solution."""
-    problem = AssignmentProblem([[1, 1, 0], [1, 1, 0]], [5.0, 4.0], [1, 1, 0])
-    assert [s.cost for s in kbest(problem, 10)] == [0.0, 4.0]
 
 
 @pytest.mark.parametrize(
@@ -342,22 +197,3 @@ def test_tuples_that_no_optimum_uses_count_too():
 def test_bad_k(arguments, message):
     with pytest.raises(InvalidInputError, match=message):
         assoc.kbest(blackman_popoli(), *arguments)
-
-
-def test_bad_problem_and_time_limit():
-    with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem"):
-        kbest("costs", 3)
-    with pytest.warns(AssocWarning, match="is taken as by scipy"):
-        assert [one.cost for one in kbest([[1.0, 2.0]], 3)] == [1.0, 2.0]
-    with pytest.raises(InvalidInputError, match="time_limit: expected seconds > 0"):
-        kbest(blackman_popoli(), 3, time_limit=0)
-
-
-def test_ties_in_many_components():
-    """With ties in more than four of them nothing counted as proved, and only one solution was returned."""
-    n = 6
-    cycles = np.concatenate(
-        [[[2 * i + a, 2 * i + b, 2 * i + c] for a, b, c in itertools.product((1, 2), repeat=3)] for i in range(n)]
-    )
-    problem = AssignmentProblem(cycles, np.full(len(cycles), -1.0 / 3.0), [2 * n] * 3)
-    assert [one.cost for one in kbest(problem, 4)] == pytest.approx([-2.0 * n / 3.0] * 4)

@@ -64,18 +64,6 @@ def test_where_chains_cannot_pass_between_solutions_they_say_so():
     assert len(held) > 300 and np.mean(held) > 0.99
 
 
-def test_wide_problems_are_sampled_alike_each_time():
-    rng = np.random.default_rng(3)
-    pairs = np.stack(np.nonzero(rng.random((40, 40)) < 0.5), axis=1) + 1
-    problem = AssignmentProblem(pairs, rng.normal(-1.0, 0.1, len(pairs)), (40, 40))
-    one, other = marginals(problem), marginals(problem)
-    assert not one.exact.any() and (one.error > 0.0).all() and one.error.max() < 0.05
-    assert one.probability.tolist() == other.probability.tolist()
-    for s in range(2):
-        sums = np.bincount(one.tuples[:, s], one.probability)[1:]
-        np.testing.assert_allclose(sums, 1.0, atol=1e-9)
-
-
 def test_clusters_are_independent():
     rng = np.random.default_rng(8)
     one, two = (gated_problem(rng, (3, 3, 3), 0.5, "mixed") for _ in range(2))
