@@ -10,7 +10,6 @@
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
 # make test-newest      a part of the tests with a newer Python (3.13 or 3.12) where there is one; TESTS=tests for all
 # make test-uncompiled  a part of the tests with numba switched off
-# make test-cold        the same bytes with a cold cache of kernels, a warm one, and on 1, 2 and 4 processes
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
 # make check-dist       the same, and checks what they hold, that they work in an empty environment, and compile nothing;
 #                       of another Python: make check-dist VENV=.venv-3.12 PYTHON=python3.12
@@ -37,7 +36,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
 SPHINX = $(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
-.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick clean
+.PHONY: demo test test-all test-oldest test-newest test-uncompiled lint docs fuzz check-set rows mutants dist check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -86,9 +85,6 @@ test-newest:
 
 test-uncompiled: $(VENV)/.installed-test
 	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $(UNCOMPILED)
-
-test-cold: $(VENV)/.installed-test
-	$(PY) -m tests.reliability.cold_cache
 
 dist: $(VENV)/.installed-release
 	$(PY) -m tests.release.build dist

@@ -21,10 +21,25 @@ def _solvers() -> None:
 
 
 def _all_but_solvers() -> None:
-    from tests.reliability.answers import answers
+    from assoc.costs import build_problem
+    from assoc.ranking.kbest import kbest
+    from assoc.ranking.marginals import marginals
+    from assoc.simulation import simulate
+    from assoc.tracking import TRACKERS
+    from assoc.tracking.filter_choice import make_filter
+    from tests.oracles import small_problems
+    from tests.tracking.stepping import stepped
 
     # costs and filters first: what trackers and rankings need of the solvers is on disk by then
-    answers(["costs", "tracks", "rankings"])
+    for name in ("three-radar", "bearing-only"):
+        build_problem(simulate(name, 3, scans=2), 0)
+    scene = simulate("three-radar", 4, scans=6)
+    for kind, filter_name in (("multi-sensor", "ekf"), ("nearest-neighbour", "ukf"), ("mht", "imm")):
+        filter_ = make_filter(filter_name, scene.sensors, 20.0, 0)
+        stepped(TRACKERS[kind](scene.sensors, filter_, region=scene.region, time_limit=None), scene)
+    for problem in small_problems(3, seed=22, dummy=True):
+        kbest(problem, 3)
+        marginals(problem)
 
 
 if __name__ == "__main__":

@@ -44,9 +44,6 @@ def examples() -> dict[str, dict[str, Any]]:
         "noise": [10.0, 0.01, 0.01],
         "field_of_view": [[0, 1e5], [-3.14, 3.14], [0, 1.5]],
     }
-    two = {**radar, "noise": [10.0, 0.01], "field_of_view": radar["field_of_view"][:2]}
-    bearing = {"position": [0.0, 0.0, 0.0], "noise": [0.01]}
-    box = {"position": [0.0, 0.0, 0.0], "noise": [1.0, 1.0, 1.0], "field_of_view": [[0, 1e5]] * 3}
     pair = {"truth": trajectories(), "tracks": trajectories(), "cutoff": 10.0}
     return {
         "assoc.AssignmentProblem": {"tuples": [[1, 0], [0, 1], [1, 1]], "costs": [0.0, 0.0, -1.0], "sizes": [1, 1]},
@@ -93,16 +90,12 @@ def examples() -> dict[str, dict[str, Any]]:
         "assoc.kbest": {"problem": problem(), "k": 2, "time_limit": 5.0},
         "assoc.load": {"path": "missing.npz"},
         "assoc.marginals": {"problem": problem(), "time_limit": 5.0},
-        "assoc.scene.Scene": {"sensors": one.sensors, "times": one.times, "measurements": one.measurements},
         "assoc.scene.Truth": {
             "target_ids": one.truth.target_ids,
             "positions": one.truth.positions,
             "sources": None,
             "names": {},
         },
-        "assoc.sensors.BearingSensor": bearing,
-        "assoc.sensors.PositionSensor": box,
-        "assoc.sensors.Radar2D": two,
         "assoc.sensors.Radar3D": radar,
         "assoc.solvers.register": {"name": "greedy", "parameters": GreedyParameters, "solve": print},
         "assoc.sweeps.Study": {
@@ -121,7 +114,5 @@ def examples() -> dict[str, dict[str, Any]]:
         "assoc.metrics.ospa": {"truth": points, "estimates": points, "cutoff": 10.0, "order": 2.0},
         "assoc.metrics.identity": pair,
         "assoc.simulation.simulate": {"name": "three-radar", "seed": 1},
-        "assoc.plotting.plot_scene": {"scene": one},
-        "assoc.plotting.plot_solution": {"scene": one, "association": assoc.associate(one).scans[0], "target": None},
         "assoc.plotting.plot_tracks": {"tracks": TrackTable()},
     }

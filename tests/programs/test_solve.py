@@ -52,23 +52,14 @@ def test_table_json_and_csv_agree(run, scene_file, tmp_path):
 @pytest.mark.slow
 def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
     results = []
-    for jobs in (1, 2):
+    for jobs in (1, 2, 4):
         path = tmp_path / f"{jobs}.json"
         words = ["--solver", "aco", "--mode", "paper", "--seed", 3, "--jobs", jobs, "--json", path]
         done = run("assoc.solve", scene_file, *words)
         assert (done.returncode, done.stderr) == (0, "")
         results.append(content(path))
-    assert results[0] == results[1]
+    assert results[0] == results[1] == results[2]
     assert results[0]["seed"] == 3 and results[0]["parameters"]["mode"] == "paper"
-
-
-@pytest.mark.slow
-def test_scans_are_a_range(run, scene_file, tmp_path):
-    whole, part, one = tmp_path / "whole.json", tmp_path / "part.json", tmp_path / "one.json"
-    for path, words in ((whole, []), (part, ["--scans", "2:4"]), (one, ["--scans", "3"])):
-        assert run("assoc.solve", scene_file, "--solver", "aco", "--json", path, *words).returncode == 0
-    assert content(part)["scans"] == content(whole)["scans"][2:4]
-    assert content(one)["scans"] == content(whole)["scans"][3:4]
 
 
 def test_several_files_and_problems(run, scene_file, tmp_path):
@@ -95,14 +86,6 @@ def test_parameters_from_options_and_from_a_file(run, scene_file, tmp_path):
     assert (result["solver"], result["seed"], len(result["scans"])) == ("aco", 4, 2)
     # the command line comes before the file, the file before the defaults
     assert (chosen["ants"], chosen["alpha"], chosen["rho"], chosen["beta"]) == (9, 2.0, 0.3, 1.0)
-
-
-def test_values_in_a_file_may_be_text(tmp_path):
-    from assoc._cli.options import COMMON, read_config
-
-    (tmp_path / "c.toml").write_text('target-density = "1e-12"\nseed = 3\n[aco]\nants = 4\n')
-    values, tables = read_config(str(tmp_path / "c.toml"), COMMON.values(), ["aco"])
-    assert values == {"target_density": 1e-12, "seed": 3} and tables == {"aco": {"ants": 4}}
 
 
 @pytest.mark.parametrize(
@@ -156,23 +139,22 @@ def test_time_limit_is_for_each_scan(run, tmp_path):
     assert all(row["stopped_by"] in ("time_limit", "gap") for row in rows)
 
 
-@pytest.mark.parametrize("solver", ["milp", "aco"])
-def test_interrupt_is_clean(tmp_path, solver):
+def test_interrupt_is_clean(tmp_path):
     simulate("bearing-only", targets=70, scans=4).save(tmp_path / "s.npz")
-    endless = ["--iterations", "1000000000", "--patience", "1000000000"] if solver == "aco" else []
-    command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", solver, "--json", "o.json", *endless]
+    endless = ["--iterations", "1000000000", "--patience", "1000000000"]
+    command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", "aco", "--json", "o.json", *endless]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     wait_until_it_listens(process)
-    time.sleep(3.0)
+    time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=600)
     assert process.returncode == 130
     if err == "assoc.solve: interrupted\n":
-        # nothing was finished: MIP backends are left alone, and a compiler does not listen
+        # nothing was finished: a compiler does not listen
         assert out == "" and [entry.name for entry in tmp_path.iterdir()] == ["s.npz"]
     else:
         scans = json.loads((tmp_path / "o.json").read_text())["scans"]
-        assert solver == "aco" and f"; {len(scans)} of 4 scans are finished and written\n" in err
+        assert f"; {len(scans)} of 4 scans are finished and written\n" in err
         assert sorted(entry.name for entry in tmp_path.iterdir()) == ["o.json", "s.npz"]
 
 
@@ -200,23 +182,3 @@ def test_kbest_ranks_every_scan(run, scene_file, tmp_path):
         assert [one["rank"] for one in scan["ranked"]] == [1, 2, 3]
         assert scan["cost"] == scan["ranked"][0]["cost"] == float(rows[3 * number]["cost"])
         assert scan["ranked"][2]["tuples"] == expected[2].tuples.tolist()
-
-
-@pytest.mark.parametrize(
-    "words, message",
-    [
-        (["--kbest", "0"], "--kbest: expected a whole number >= 1, got '0'"),
-        (["--kbest", "2", "--solver", "aco"], "--kbest: has its own algorithm; leave out --solver"),
-    ],
-)
-def test_kbest_refuses(run, scene_file, words, message):
-    done = run("assoc.solve", scene_file, *words)
-    assert done.returncode == 2
-    assert message in done.stderr and len(done.stderr.splitlines()) == 1
-
-
-@pytest.mark.slow
-def test_a_terminal_says_that_kernels_are_compiled(scene_file, tmp_path):
-    cold = {"NUMBA_CACHE_DIR": str(tmp_path), "ASSOC_INTERPRET": "0"}
-    words = ["assoc.solve", scene_file, "--solver", "greedy", "--scans", "0"]
-    assert "compiling, once after installation" in shown(words, only_errors=True, variables=cold)

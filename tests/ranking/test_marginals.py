@@ -31,7 +31,7 @@ def true_of(found, problem):
     return np.array([truth[tuple(row)] for row in found.tuples.tolist()])
 
 
-@few_or_all("count", 16, 160)
+@few_or_all("count", 6, 160)
 def test_sums_are_exact_and_samples_as_far_off_as_they_say(count):
     errors, held = [], []
     for problem in enumerable(count, 61):

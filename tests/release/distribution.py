@@ -9,6 +9,7 @@ answers must come from kernels that are compiled on the spot.
 
 import argparse
 import getpass
+import json
 import pickle
 import platform
 import socket
@@ -23,7 +24,6 @@ from pathlib import Path
 from tests.release.build import Built, WrongError, build, installed, run
 from tests.release.kernels import OF_RADARS, RADARS
 from tests.release.requirements import ROOT
-from tests.reliability.cold_cache import without_times
 
 _FOLDERS = ("assoc", "docs", "experiments", "tests")
 _FILES = ("Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "README.md", "LICENSE")
@@ -164,6 +164,19 @@ _USUAL = (
 )
 _COMPILING = (*_USUAL[:1], *_USUAL[2:4])
 """What is run where kernels must be compiled."""
+
+
+def without_times(path: Path) -> str:
+    """Content of a result file without its measurements of time."""
+
+    def cleaned(value: object) -> object:
+        if isinstance(value, dict):
+            return {
+                key: cleaned(one) for key, one in value.items() if key not in ("runtime", "compile_time", "seconds")
+            }
+        return [cleaned(one) for one in value] if isinstance(value, list) else value
+
+    return json.dumps(cleaned(json.loads(path.read_text())))
 
 
 def compiled(python: Path, place: Path, programs: tuple[tuple[str, ...], ...], **more: str) -> int:

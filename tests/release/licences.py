@@ -2,7 +2,6 @@
 
     python -m tests.release.licences           compare docs/dependencies.md with what is installed
     python -m tests.release.licences --write   write the table anew
-    python -m tests.release.licences --all     print what the packages install in turn
 
 Packages word their licences in many ways, and in other words from one version to the next, so that the table
 names the family ("BSD"), which is what a user has to know.
@@ -13,7 +12,7 @@ import re
 import sys
 from importlib import metadata
 
-from tests.release.requirements import ROOT, Requirement, canonical, read
+from tests.release.requirements import ROOT, Requirement, read
 
 PAGE = ROOT / "docs" / "dependencies.md"
 MARK = "<!-- written by python -m tests.release.licences --write -->"
@@ -77,27 +76,6 @@ def direct(requirements: list[Requirement]) -> dict[str, tuple[str, list[str]]]:
     return found
 
 
-def behind(names: list[str]) -> dict[str, set[str]]:
-    """Installed packages that the named ones bring along, with the names that bring them."""
-    brought: dict[str, set[str]] = {}
-    for root in names:
-        waiting, seen = [root], {canonical(root)}
-        while waiting:
-            try:
-                needs = metadata.requires(waiting.pop()) or []
-            except metadata.PackageNotFoundError:
-                continue  # for another system or Python
-            for need in needs:
-                name = re.split(r"[^A-Za-z0-9._-]", need, maxsplit=1)[0]
-                if "extra ==" in need or canonical(name) in seen:
-                    continue
-                seen.add(canonical(name))
-                waiting.append(name)
-                brought.setdefault(canonical(name), set()).add(root)
-    own = {canonical(name) for name in names}
-    return {name: roots for name, roots in sorted(brought.items()) if name not in own and _installed(name)}
-
-
 def _installed(name: str) -> metadata.Distribution | None:
     try:
         return metadata.distribution(name)
@@ -110,15 +88,6 @@ def direct_table() -> str:
     lines = ["| package | at least | for | licence |", "|---|---|---|---|"]
     for name, (oldest, groups) in direct(read()).items():
         lines.append(f"| {name} | {oldest} | {', '.join(_PURPOSES[group] for group in groups)} | {_licence(name)} |")
-    return "\n".join(lines)
-
-
-def in_turn() -> str:
-    """What these packages install in turn (without those for tests, pages and checks)."""
-    needed = direct(read())
-    used = [name for name, (_, groups) in needed.items() if {*groups} - {"docs", "test", "lint", "release", "build"}]
-    lines = ["| package | through | licence |", "|---|---|---|"]
-    lines += [f"| {name} | {', '.join(sorted(roots))} | {_licence(name)} |" for name, roots in behind(used).items()]
     return "\n".join(lines)
 
 
@@ -156,10 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the program; exit code 1 if the page is wrong."""
     parser = argparse.ArgumentParser(description="The licences of what is required.")
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("--all", action="store_true", help="print what the packages install in turn, too")
     chosen = parser.parse_args(arguments)
-    if chosen.all:
-        print(in_turn())
     if chosen.write:
         before = PAGE.read_text().split(MARK)[0]
         PAGE.write_text(f"{before}{MARK}\n\n{direct_table()}\n")

@@ -52,8 +52,3 @@ def read() -> list[Requirement]:
                 raise ValueError(f"pyproject.toml: {entry!r}: expected name>=version")
             found.append(Requirement(match[1], match[2], group))
     return found
-
-
-def canonical(name: str) -> str:
-    """Return a package's name as indexes spell it."""
-    return re.sub(r"[-_.]+", "-", name).lower()

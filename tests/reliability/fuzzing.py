@@ -5,7 +5,7 @@
 Each case spoils a valid file at random (mutations.py) and gives it to its reader in a child process that may
 take 5 s and 1 GB more than it has. A case is a fault if the reader raises anything but an `AssocError` of one line,
 is late, runs out of memory, executes a pickle, or takes the process with it. What is read without complaint is
-used, too: a problem is solved, a scene's first scan associated. A smaller part runs as programs.
+used, too: a problem is solved, a scene's first scan associated.
 """
 
 import argparse
@@ -14,9 +14,9 @@ import os
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
+import threading
 import time
 import traceback
 import warnings
@@ -28,14 +28,11 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import AssocError, AssocWarning, InfeasibleError
-from tests.reliability.mutations import MARKER, bombs, spoil
+from tests.reliability.mutations import MARKER, spoil
 from tests.reliability.readers import ROOMS, Room
 
 SECONDS = 5
 MEMORY = 1 << 30
-
-
-# --- one case -----------------------------------------------------------------------------------------------
 
 
 class LateError(Exception):
@@ -162,60 +159,10 @@ def campaign(seed: int, numbers: range, made: dict[str, list[Path]], folder: Pat
             left = range(at + 1, left.stop)
 
 
-# --- programs -----------------------------------------------------------------------------------------------
-
-_PROGRAMS: dict[str, list[list[str]]] = {
-    "scene.npz": [["assoc.solve", "{}", "--solver", "greedy", "--scans", "0", "--json", "out.json"]],
-    "problem.npz": [["assoc.solve", "{}", "--time-limit", "2", "--csv", "out.csv"]],
-    "tracks.csv": [["assoc.simulate", "from-tracks", "{}", "-o", "out.npz"]],
-    "solve.toml": [["assoc.solve", "valid.npz", "--config", "{}"]],
-    "study": [["assoc.sweep", "--summary", "{}"]],
-}
-
-
-def run_program(seed: int, number: int, made: dict[str, list[Path]], folder: Path) -> str | None:
-    """Spoil one file and give it to its program; what went wrong, or None."""
-    rng = np.random.default_rng([seed, number, 1])
-    name = list(_PROGRAMS)[number % len(_PROGRAMS)]
-    room = next(one for one in ROOMS if one.name == name)
-    source = made[name][int(rng.integers(len(made[name])))]
-    path = folder / f"program{source.suffix}"
-    if source.is_dir():
-        _spoil_study(rng, source, path)
-    else:
-        path.write_bytes(spoil(rng, source.read_bytes(), room.kind))
-    shutil.copy(made["problem.npz"][0], folder / "valid.npz")
-    words = _PROGRAMS[name][int(rng.integers(len(_PROGRAMS[name])))]
-    command = [sys.executable, "-W", "error", "-m", *[word.format(path) for word in words]]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=60, cwd=folder, preexec_fn=_program_memory
-        )
-    except subprocess.TimeoutExpired:
-        return f"{words[0]} on {room.name}: longer than 60 s"
-    label = f"{words[0]} on {room.name} (seed {seed}, program {number})"
-    if done.returncode not in (0, 2, 3) or "Traceback" in done.stderr:
-        return f"{label}: exit code {done.returncode}, {done.stderr[-300:]!r}"
-    if done.returncode and len(done.stderr.strip().splitlines()) != 1:
-        return f"{label}: complains in several lines: {done.stderr[-300:]!r}"
-    if (folder / MARKER).exists():
-        os.rmdir(folder / MARKER)
-        return f"{label}: executes a pickle"
-    if done.returncode and any(folder.glob(".*.part")):
-        return f"{label}: leaves a half-written file"
-    return None
-
-
-def _program_memory() -> None:
-    # what numba, BLAS and their threads map is about 2 GB of address space, next to nothing of it used
-    resource.setrlimit(resource.RLIMIT_AS, (4 * MEMORY, resource.RLIM_INFINITY))
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run the program; exit code 1 if there were faults."""
     parser = argparse.ArgumentParser(description="Spoiled files for every reader and program.")
     parser.add_argument("--count", type=int, default=20_000)
-    parser.add_argument("--programs", type=int, default=200, help="cases that run as programs")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=int, default=0)
@@ -226,14 +173,6 @@ def main(arguments: list[str] | None = None) -> int:
         folder = Path(name)
         made = prepare(folder)
         tried = 0
-        for room in (ROOMS[0], ROOMS[1]):
-            for path in bombs(folder, made[room.name][0].read_bytes()):
-                tried += 1
-                fault = _bomb(room, path)
-                if fault:
-                    kinds[f"{room.name}: {path.name}: {fault}"] += 1
-        import threading
-
         lock = threading.Lock()
 
         def work(part: int) -> None:
@@ -245,13 +184,6 @@ def main(arguments: list[str] | None = None) -> int:
                 with lock:
                     tried += 1
                     _note(kinds, fault, f"seed {chosen.seed} case {number}")
-            own = folder / f"programs{part}"
-            own.mkdir()
-            for number in range(part, chosen.programs, chosen.processes):
-                fault = run_program(chosen.seed, number, made, own)
-                with lock:
-                    tried += 1
-                    _note(kinds, fault, f"seed {chosen.seed} program {number}")
 
         threads = [threading.Thread(target=work, args=(part,)) for part in range(chosen.processes)]
         for thread in threads:
@@ -271,29 +203,6 @@ def _note(kinds: Counter[str], fault: str | None, label: str) -> None:
     kinds[kind] += 1
     if kinds[kind] <= 3:
         print(f"{label}: {fault}", flush=True)
-
-
-def _bomb(room: Room, path: Path) -> str | None:
-    """Read a bomb in a process of its own, and see what memory that took."""
-    context = multiprocessing.get_context("spawn")
-    receive, send = context.Pipe(duplex=False)
-    child = context.Process(target=_read_bomb, args=(room.name, str(path), send))
-    child.start()
-    send.close()
-    try:
-        return str(receive.recv()) or None
-    except EOFError:
-        return f"the process died (exit code {child.exitcode})"
-    finally:
-        child.join()
-
-
-def _read_bomb(name: str, path: str, send: Any) -> None:
-    room = next(one for one in ROOMS if one.name == name)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    text = judge(room, Path(path))
-    taken = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
-    send.send(text or (f"takes {taken >> 20} MB" if taken > MEMORY else ""))
 
 
 if __name__ == "__main__":

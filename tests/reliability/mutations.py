@@ -6,7 +6,6 @@ import pickle
 import re
 import warnings
 import zipfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -179,32 +178,3 @@ def _saved(array: np.ndarray[Any, np.dtype[Any]]) -> bytes:
 
 
 _OF_KIND = {"npz": _npz, "text": _text, "sqlite": _sqlite}
-
-
-def bombs(folder: Path, template: bytes, size: int = 3_000_000_000) -> list[Path]:
-    """Archives made from a valid one that unpack to ``size`` bytes, or whose arrays claim terabytes."""
-    with zipfile.ZipFile(io.BytesIO(template)) as archive:
-        names = [info.filename for info in archive.infolist() if info.filename not in ("format.npy", "version.npy")]
-        members = {name: archive.read(name) for name in archive.namelist()}
-    largest = max(names, key=lambda name: len(members[name]))
-    array = np.load(io.BytesIO(members[largest]), allow_pickle=False)
-    claims = {
-        "zeros": (_header((size // array[:1].nbytes, *array.shape[1:]), array.dtype.str), size),
-        "terabytes": (_header((10**12, *array.shape[1:]), array.dtype.str), 100),
-        "nothing": (_header((10**9, *array.shape[1:]), "<U0"), 0),
-        "wide": (_header((0, 10**12), array.dtype.str), 0),
-    }
-    paths = []
-    for label, (header, content) in claims.items():
-        path = folder / f"bomb-{label}.npz"
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-            for name, value in members.items():
-                if name != largest:
-                    archive.writestr(name, value)
-            with archive.open(largest, "w", force_zip64=True) as member:
-                member.write(header)
-                block = bytes(1 << 24)
-                for _ in range(content >> 24):
-                    member.write(block)
-        paths.append(path)
-    return paths

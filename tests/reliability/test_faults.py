@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from assoc._files.npz import save_npz
-from assoc._files.output import write_atomically
 from assoc._system.processes import leave, process_map, send, start_python
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.simulation import simulate
@@ -55,19 +54,6 @@ def test_stdout_on_a_full_disk(scene_file):
             stdout=full, stderr=subprocess.PIPE, text=True, timeout=600,
         )  # fmt: skip
     assert done.returncode == 2 and told(done.stderr) == "assoc.solve: error: No space left on device\n"
-
-
-def test_a_folder_that_cannot_be_written(tmp_path):
-    folder = tmp_path / "read-only"
-    folder.mkdir()
-    folder.chmod(0o500)
-    try:
-        if os.access(folder, os.W_OK):
-            pytest.skip("this user may write everywhere")
-        with pytest.raises(InvalidInputError, match="Permission denied"):
-            write_atomically(folder / "a", lambda file: file.write(b"x"))
-    finally:
-        folder.chmod(0o700)
 
 
 def children(pid):

@@ -2,16 +2,12 @@
 
 import ast
 import json
-import os
 import re
-import time
 from pathlib import Path
 
-import numba
 import pytest
 
 import assoc
-from assoc._system.helpers import _Beside
 from assoc.simulation import simulate
 from tests.running import printed
 from tests.sizes import sample
@@ -101,41 +97,6 @@ def test_the_same_ranking_with_and_without_compiled_kernels(tmp_path):
     assert run(_RANKING, tmp_path / "cold") == run(_RANKING, None, switch="0")
 
 
-# numpy sums in another order than compiled code, and its logarithm differs in the last bit
-_DIFFERENT = {"sum", "mean", "prod", "dot", "std", "var", "norm", "inv", "cumsum"}
-_ELEMENTARY = {"exp", "log", "log1p", "expm1", "power", "hypot", "logaddexp", "sin", "cos", "tan", "arctan2"}
-
-
-def doubtful_calls(function: ast.FunctionDef) -> list[str]:
-    found = []
-    for call in ast.walk(function):
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
-            name, owner = call.func.attr, ast.unparse(call.func.value)
-            unstable = name == "argsort" and "kind='mergesort'" not in ast.unparse(call)
-            if unstable or name in _DIFFERENT or (owner == "np" and name in _ELEMENTARY):
-                found.append(f"{function.name}, line {call.lineno}: {ast.unparse(call)}")
-    return found
-
-
-@pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no priorities on this system")
-def test_the_process_beside_leaves_the_cores_to_the_program():
-    """In a session of its own it would get an equal share, whatever its nice value (sched(7), autogroups)."""
-    beside = _Beside()
-    beside.ask("assoc._system.clock", "is_over", (numba.float64,))
-    process = beside._process
-    try:
-        assert os.getsid(process.pid) == os.getsid(0)
-        # Ctrl-C is for the group of the program
-        assert os.getpgid(process.pid) != os.getpgrp()
-        last = time.monotonic() + 600
-        while os.getpriority(os.PRIO_PROCESS, process.pid) <= os.getpriority(os.PRIO_PROCESS, 0):
-            assert time.monotonic() < last
-            time.sleep(0.02)
-    finally:
-        process.stdin.close()
-        process.wait(600)
-
-
 def is_kernel(node: ast.AST, mark: str = "njit") -> bool:
     return isinstance(node, ast.FunctionDef) and any(mark in ast.unparse(one) for one in node.decorator_list)
 
@@ -144,13 +105,6 @@ def all_kernels():
     """The definitions of the package's kernels."""
     files = Path(assoc.__file__).parent.rglob("*.py")
     return [node for path in files for node in ast.walk(ast.parse(path.read_text())) if is_kernel(node)]
-
-
-@pytest.mark.slow
-def test_kernels_ask_for_nothing_that_numpy_does_otherwise():
-    kernels = all_kernels()
-    assert len(kernels) > 100
-    assert [call for kernel in kernels for call in doubtful_calls(kernel)] == []
 
 
 def test_inner_kernels_are_called_by_kernels_alone():

@@ -5,7 +5,6 @@ busy machine does no harm: `python -m tests.reliability.limits` measures what is
 """
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -16,14 +15,12 @@ from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.prepare import prepare
-from assoc.packing.run import Outcome, Run
+from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
-from assoc.solvers.greedy.fallback import prepare_fallback
-from assoc.solvers.greedy.solve import greedy_choice
 from tests.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
 from tests.reliability.limits import WAYS, lateness
@@ -84,17 +81,6 @@ def test_marginals_keep_the_limit_and_say_what_is_not_known(problem):
     assert (found.error > 0.0).any() and np.isfinite(found.probability).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("way", ["exact", "kbest"])
-def test_limit_is_kept_in_another_thread(way, problem):
-    with ThreadPoolExecutor(1) as pool:
-        WAYS[way](fresh(problem), LIMIT)
-        found, late = pool.submit(lateness, lambda: WAYS[way](fresh(problem), LIMIT), LIMIT).result()
-    assert late < ALLOWED
-    answer = found[0] if isinstance(found, list) else found
-    assert check_answer(problem, answer.tuples) == pytest.approx(answer.cost, rel=1e-12)
-
-
 @pytest.mark.parametrize("way", ["exact", "tabu", "kbest", "lagrangian"])
 def test_hardly_any_time(way):
     """Less than the first look takes: still a complete solution and a bound, without dummies too."""
@@ -105,16 +91,6 @@ def test_hardly_any_time(way):
     assert check_answer(problem, answer.tuples) == pytest.approx(answer.cost, rel=1e-12)
     assert -math.inf < answer.lower_bound <= answer.cost <= cost
     assert answer.stopped_by == "time_limit"
-
-
-@pytest.mark.slow
-def test_ranking_returns_a_good_solution_when_none_is_proved():
-    """Where the best cannot be proved in the time, what the exact solver's heuristics find, not the greedy choice."""
-    problem = axial(45, seed=3)
-    kbest(fresh(problem), 5, time_limit=0.2)
-    best = kbest(fresh(problem), 5, time_limit=6.0)[0]
-    assert check_answer(problem, best.tuples) == pytest.approx(best.cost, rel=1e-12)
-    assert best.lower_bound <= best.cost < 0.7 * assign(problem, "greedy").cost
 
 
 @pytest.mark.slow
@@ -131,19 +107,6 @@ def test_a_solver_that_gives_up_or_finds_little_is_helped_out(problem, greedy_co
     for solve in (give_up, take_nothing):
         registry.register(solve.__name__, registry.parameters("greedy"), solve)
         assert assign(fresh(problem), solve.__name__, time_limit=5.0).cost == greedy_cost
-
-
-@pytest.mark.slow
-def test_searches_end_before_what_follows_them(problem):
-    packing = prepare(problem).packing
-    run = Run(0, time_limit=100.0)
-    prepare_fallback(packing, run)
-    assert 0.0 < run.reserve <= 50.0
-    assert run.remaining() < run.time_limit - run.reserve
-    # what takes longer to prepare than the limit is leaves half of it
-    short = Run(0, time_limit=1e-6)
-    prepare_fallback(packing, short)
-    assert short.reserve == 0.5e-6 and short.should_stop() and short.stopped_by == "time_limit"
 
 
 def test_sorting_as_numpy_does():
@@ -178,17 +141,3 @@ def test_clusters_and_distinct_tuples():
         tuples, place = distinct(problem.tuples)
         assert np.array_equal(tuples, np.unique(problem.tuples, axis=0))
         assert np.array_equal(tuples[place], problem.tuples)
-
-
-@pytest.mark.slow
-def test_greedy_choice_is_made_first_on_large_problems_alone(problem):
-    run = Run(0, time_limit=5.0)
-    small = ghosts(20, 500)
-    assign(fresh(small), "exact", time_limit=5.0)
-    from assoc.solvers.greedy.fallback import prepare_fallback
-
-    prepare_fallback(prepare(small).packing, run)
-    assert run.fallback is None
-    packing = prepare(problem).packing
-    prepare_fallback(packing, run)
-    assert np.array_equal(run.fallback, greedy_choice(packing, Run(0)))

@@ -5,13 +5,11 @@ import shutil
 import subprocess
 import sys
 import textwrap
-import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import assoc
@@ -21,7 +19,7 @@ from assoc.ranking.marginals import marginals
 from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from assoc.tracking import MultiSensorTracker
-from tests.oracles import gated_problem, small_problems
+from tests.oracles import small_problems
 from tests.sizes import few_or_all
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute
@@ -54,18 +52,6 @@ def test_eight_threads_answer_like_one(rounds):
     with ThreadPoolExecutor(8) as pool:
         for _ in range(rounds):
             assert list(pool.map(answer, items)) == alone
-
-
-def test_threads_share_one_problem():
-    problem = gated_problem(np.random.default_rng(3), (8, 8, 8), 0.3)
-    alone = assign(problem, "exact")
-    ranked = [one.cost for one in kbest(problem, 5)]
-    fresh = assoc.AssignmentProblem(problem.tuples, problem.costs, problem.sizes)
-    with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(lambda _: assign(fresh, "exact"), range(16)))
-        lists = list(pool.map(lambda _: [one.cost for one in kbest(fresh, 5)], range(8)))
-    assert all(one.tuples.tolist() == alone.tuples.tolist() and one.cost == alone.cost for one in found)
-    assert all(one == ranked for one in lists)
 
 
 def test_threads_rank_track_and_weigh_alone():
@@ -144,20 +130,6 @@ def test_a_cache_cut_short_is_made_anew(tmp_path, suffix):
 
 
 @pytest.mark.slow
-def test_a_cache_on_a_full_disk(tmp_path):
-    """A kernel that cannot be kept is compiled all the same."""
-    folder = copied(tmp_path)
-    script = """
-    import resource, signal
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
-    assert double(3) == 6
-    """
-    full = first_run(folder, script)
-    assert (full.communicate(timeout=600)[1], full.returncode) == ("", 0)
-
-
-@pytest.mark.slow
 def test_an_installation_that_cannot_be_written(tmp_path):
     """Neither the package nor the home can be written: the cache is temporary, shared with workers, and goes."""
     folder, temporary = copied(tmp_path / "site"), tmp_path / "tmp"
@@ -188,26 +160,6 @@ def test_no_folder_for_temporary_files_either(tmp_path):
     home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
     one = first_run(folder, "assert not double.stats.cache_path", PYTHONDONTWRITEBYTECODE="1", **home)
     assert (one.communicate(timeout=600)[1], one.returncode) == ("", 0)
-
-
-def test_an_interrupt_can_leave_no_lock_locked():
-    """KeyboardInterrupt between a lock of `threading` and its block leaves it locked, and all would wait for ever."""
-    entered = []
-
-    def look(frame, event, _):
-        if event == "call" and frame.f_code.co_filename == threading.__file__:
-            entered.append(frame.f_code.co_name)
-
-    before = sys.getprofile()
-    sys.setprofile(look)
-    try:
-        choices = [{"ordered": ordered, "here": here} for here in (False, True) for ordered in (True, False)]
-        found = [list(process_map(abs, range(-40, 0), 2, **choice)) for choice in choices]
-    finally:
-        sys.setprofile(before)
-    assert found[0] == found[2] == list(range(40, 0, -1))
-    assert sorted(found[1]) == sorted(found[3]) == found[0][::-1]
-    assert not {"__enter__", "acquire", "release", "wait", "start", "join"} & {*entered}
 
 
 def test_this_process_works_while_others_start(tmp_path):

@@ -35,7 +35,6 @@ def work(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     simulate("three-radar", 2, scans=3).save("scene.npz")
     Path("tracks.csv").write_text("icao24,time,lat,lon,geoaltitude\na,0,1,1,9000\na,10,1.01,1,9000\na,20,1.02,1,9000\n")
-    Path("config.toml").write_text("seed = 1\n")
     Path("sweep.toml").write_text('files = "scene.npz"\nsolver = "greedy"\noutput = "study"\n')
     return tmp_path
 
@@ -45,18 +44,11 @@ def work(tmp_path, monkeypatch):
     [
         "assoc.simulate from-tracks tracks.csv -o tracks.csv",
         "assoc.simulate rotating-radar -o p.csv --truth ./p.csv",
-        "assoc.simulate rotating-radar -o p.csv --truth missing/t.csv",
-        "assoc.simulate dubins-uav -o missing/scene.npz",
         "assoc.solve scene.npz --json link.npz",
-        "assoc.solve scene.npz --config config.toml --json config.toml",
         "assoc.solve scene.npz --json o --csv o",
-        "assoc.track scene.npz -o scene.npz",
-        "assoc.track scene.npz -o o --report o",
-        "assoc.sweep scene.npz --solver greedy -o study --csv scene.npz",
         "assoc.sweep --config sweep.toml --report sweep.toml",
         "assoc.sweep scene.npz --solver greedy -o study --csv study/study.json",
         "assoc.sweep --summary study --csv study/study.sqlite",
-        "assoc.sweep --summary study --csv o --report o",
     ],
 )
 def test_nothing_that_is_read_is_overwritten(work, capsys, command):
@@ -117,14 +109,6 @@ def test_closed_streams(work):
     words = ["assoc.live", "scene.npz", "-o", "t.csv"]
     done = subprocess.run([*PYTHON, *words], stderr=subprocess.PIPE, timeout=600, preexec_fn=closed(0))
     assert done.returncode == 0 and b"0 plots in 0 steps" in done.stderr and b"Traceback" not in done.stderr
-
-
-def test_nobody_reads_the_list_of_programs():
-    reader, writer = os.pipe()
-    os.close(reader)
-    done = subprocess.run([*PYTHON, "assoc"], stdout=writer, stderr=subprocess.PIPE, timeout=600)
-    os.close(writer)
-    assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.slow

@@ -7,11 +7,10 @@ import stat
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 
-from assoc._files.output import write_atomically, write_text, written_gradually
+from assoc._files.output import write_text, written_gradually
 from assoc.errors import InvalidInputError
 from assoc.sweeps import load
 from tests.reliability.writers import outcome, writers
@@ -136,20 +135,6 @@ def test_devices_folders_and_places_that_are_none(tmp_path):
     assert (tmp_path / os.fsdecode(b"\xff\xfe")).read_text() == "\\udcff"
 
 
-def test_threads_write_with_the_mode_that_was_asked_for(tmp_path):
-    before = os.umask(0o027)
-    try:
-        made = [threading.Thread(target=write_text, args=(tmp_path / f"{i}", "x")) for i in range(30)]
-        for one in made:
-            one.start()
-        for one in made:
-            one.join()
-        assert {stat.S_IMODE((tmp_path / f"{i}").stat().st_mode) for i in range(30)} == {0o640}
-        assert os.umask(0o027) == 0o027
-    finally:
-        os.umask(before)
-
-
 PARTS = """
 import resource
 from assoc._files.output import written_gradually
@@ -238,12 +223,3 @@ def test_a_study_goes_on_when_the_disk_has_room_again(disk):
     study.run(disk.parent / "expected")
     one, other = (load(folder).drop(columns="time") for folder in (disk / "s", disk.parent / "expected"))
     assert one.equals(other)
-
-
-def test_a_writer_that_fails_otherwise(tmp_path):
-    def fail(file):
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        write_atomically(tmp_path / "out", fail)
-    assert list(Path(tmp_path).iterdir()) == []
