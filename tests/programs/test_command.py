@@ -4,27 +4,19 @@ import importlib
 import io
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 import assoc
 from assoc import simulate, solve, sweep, track
-from assoc._cli.track.options import make_tracker, read_options, track_parser
 from assoc._cli.values import cores, processes
 from assoc.errors import MissingExtraError
-from assoc.recordings import write_plots
-from assoc.simulation import simulate as simulate_scene
-from assoc.simulation import simulate_recording
-from assoc.solvers import registry
 from tests.sizes import sample
 
 OWN = """
@@ -87,16 +79,6 @@ def test_subcommands_are_the_programs(run_program, here):
     assert run_program("assoc", "--nothing").returncode == 2
 
 
-def test_the_command_shows_itself_in_usage(here, monkeypatch, capsys):
-    from assoc.__main__ import main
-
-    monkeypatch.setattr(sys, "argv", ["/usr/bin/assoc", "solve", "--help"])
-    with pytest.raises(SystemExit):
-        solve.main(["--help"])
-    assert capsys.readouterr().out.startswith("usage: assoc solve FILE.npz")
-    assert main(["nonsense"]) == 2
-
-
 @pytest.mark.slow
 @sample("option", ["--json", "--csv"], every=2)
 def test_data_alone_go_to_stdout(run_program, here, option):
@@ -112,15 +94,6 @@ def test_data_alone_go_to_stdout(run_program, here, option):
     done = run_program("assoc.solve", "s.npz", "--json", "-", "--csv", "-")
     assert done.returncode == 2 and done.stdout == "" and "given twice" in done.stderr
     assert not (here / "-").exists()
-
-
-@pytest.mark.slow
-def test_tracks_scenes_and_plots_go_to_stdout(run_program, here):
-    done = run_program("assoc.track", "s.npz", "-o", "-")
-    assert done.returncode == 0 and pd.read_csv(io.StringIO(done.stdout)).track_id.nunique() == 3
-    assert "3 confirmed tracks" in done.stderr
-    done = run_program("assoc", "simulate", "-q", "rotating-radar", "--duration", "60", "-o", "-")
-    assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("time,")
 
 
 def test_quiet_and_verbose(here, capsys):
@@ -206,18 +179,6 @@ def test_jobs_all(here, capsys):
     assert "--jobs: expected a whole number >= 1 or 'all', got 'some'" in capsys.readouterr().err
 
 
-def test_a_table_is_told_where_it_can_go(here, capsys):
-    (here / "flights.csv").write_text("time,icao24,lat,lon,altitude\n0,abc,47,8,1000\n")
-    write_plots("plots.csv", simulate_recording("rotating-radar", 0, duration=30.0).recording)
-    for file in ("flights.csv", "plots.csv"):
-        assert solve.main([file]) == 2
-        err = capsys.readouterr().err
-        assert f"{file}: is a table" in err and "assoc track" in err and "assoc simulate from-tracks" in err
-    assert sweep.main(["flights.csv", "-o", "x"]) == 2 and "is a table" in capsys.readouterr().err
-    (here / "damaged.npz").write_bytes(b"PK\x03\x04,,,,")
-    assert solve.main(["damaged.npz"]) == 2 and "is a table" not in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_solvers_of_the_users_own(run_program, here):
     words = ["s.npz", "--import", "mine", "--solver", "first", "--tries", "7", "--csv", "-"]
@@ -245,23 +206,6 @@ def test_modules_that_cannot_be_imported(here, capsys, text, message):
     refused(capsys, solve.main, ["s.npz", "--import", text], message)
 
 
-@pytest.mark.slow
-def test_own_solvers_of_a_function(scene_file, here):
-    from assoc.solvers import Outcome, Parameters
-
-    @dataclass(frozen=True)
-    class Local(Parameters):
-        pass
-
-    registry.register("local", Local, lambda packing, parameters, run: Outcome([], 0))
-    scene = assoc.Scene.load(scene_file)
-    one, two = (assoc.associate(scene, "local", jobs=jobs).to_frame() for jobs in (1, 2))
-    assert one.equals(two)
-    registry.register("floats", Local, lambda packing, parameters, run: Outcome([0.5], 0))
-    with pytest.raises(assoc.InvalidInputError, match="whole numbers, got an array of shape"):
-        assoc.associate(assoc.Scene.load(scene_file), "floats")
-
-
 COMPLETED = [
     (["so"], ["solve"]),
     (["solve", "--solver", "a"], ["aco"]),
@@ -284,66 +228,3 @@ def test_bash_completes(run_program, tmp_path):
         ask = f"COMP_WORDS=({line}); COMP_CWORD={len(words)}; _shtab_assoc; printf '%s\\n' \"${{COMPREPLY[@]}}\""
         done = subprocess.run([bash, "-c", script + ask], capture_output=True, text=True, cwd=tmp_path)
         assert (done.stdout.split(), done.stderr) == (expected, ""), words
-
-
-@pytest.mark.slow
-def test_fish_completes(run_program, tmp_path):
-    fish = shutil.which("fish") or pytest.skip("fish is not installed")
-    script = run_program("assoc", "completion", "fish").stdout
-    for words, expected in COMPLETED:
-        ask = f"complete -C 'assoc {' '.join(words)}'"
-        done = subprocess.run([fish, "-N", "-c", script + ask], capture_output=True, text=True, cwd=tmp_path)
-        found = [line.split("\t")[0] for line in done.stdout.splitlines()]
-        assert found == expected and done.stderr == "", (words, found)
-
-
-@pytest.mark.slow
-def test_other_shells(run_program, tmp_path):
-    done = run_program("assoc", "completion", "zsh")
-    assert done.returncode == 0 and "_shtab_assoc" in done.stdout
-    if zsh := shutil.which("zsh"):
-        (tmp_path / "s").write_text(done.stdout)
-        assert subprocess.run([zsh, "-n", str(tmp_path / "s")]).returncode == 0
-    done = run_program("assoc", "completion", "tcsh")
-    assert done.returncode == 2 and "expected one of bash, zsh, fish, got 'tcsh'" in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("program", "words", "said"),
-    [
-        (track, ["none.csv", "-o", "no/x.csv", "--cutoff", "3"], "none.csv: no such file"),
-        (solve, ["none.npz", "--json", "no/x.json"], "none.npz: no such file"),
-        (solve, ["junk.csv"], "junk.csv: is a table, .* 'assoc track'"),
-        (sweep, ["s.npz", "--solver", "aco", "--alpha", "2", "-o", "x"], "write --grid alpha=2"),
-        (sweep, ["s.npz", "--solver", "aco", "--rho=0.1", "-o", "x"], "write --grid rho=V1,V2"),
-        (track, ["fine.csv", "-o", "x.csv"], "--range-noise: the plots do not come in steps.*30 to 150 m"),
-        (track, ["rad.csv", "-o", "x.csv"], "--rotation: no rotation time from 2 to 30 s fits the plots"),
-        (track, ["few.csv", "-o", "x.csv"], r"--rotation: the rotation time .*: give it \(4 to 12 seconds are usual\)"),
-    ],
-)  # fmt: skip
-def test_errors_in_the_words_of_the_program(here, program, words, said, capsys):
-    (here / "junk.csv").write_text("a,b\n1,2\n")
-    rng = np.random.default_rng(1)
-    rows = [f"{t * 4 + b / 90},{r},{b}" for t in range(30) for r, b in rng.uniform([1, 0], [90, 360], (3, 2)).tolist()]
-    rows.sort(key=lambda row: float(row.partition(",")[0]))
-    (here / "fine.csv").write_text("\n".join(["time,range,bearing", *rows]))
-    (here / "rad.csv").write_text("\n".join(["time,range,bearing", *(f"{k},{k % 7},{k * k % 9}" for k in range(99))]))
-    (here / "few.csv").write_text("\n".join(["time,range,bearing", *rows[:3]]))
-    try:
-        code = program.main(words)
-    except SystemExit as ended:
-        code = ended.code
-    err = capsys.readouterr().err
-    assert code == 2 and re.search(said, err) and err.count("\n") == 1, err
-
-
-@pytest.mark.parametrize(
-    ("called", "name", "rule"),
-    [("jpda", "JointProb", None), ("TOMHT", "TrackOriented", None), ("gnn", "NearestNeighbour", "assignment")],
-)
-def test_other_names_of_trackers(called, name, rule):
-    given, settings = read_options(["s.npz", "-o", "x.csv", "--tracker", called], track_parser())
-    given["filter"] = "ekf"
-    scene = simulate_scene("three-radar", scans=1)
-    made = make_tracker(given["tracker"], scene.sensors, given, settings, scene.region)
-    assert given["rule"] == rule and type(made).__name__.startswith(name)

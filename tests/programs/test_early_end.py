@@ -10,7 +10,6 @@ import time
 
 import pytest
 
-from assoc.packing.run import Run
 from assoc.simulation import simulate
 from tests.running import process
 from tests.sizes import sample
@@ -132,16 +131,6 @@ def test_tracks_that_are_finished_are_written(work):
     assert (work / "t.csv").read_text().startswith("track_id") and (work / "t.html").exists()
 
 
-def test_long_searches_tell_where_they_are():
-    """A search whose best solution stays the same has news after half a second."""
-    run = Run(0)
-    assert run.is_silent()
-    run.record(1, -1.0, -2.0)
-    assert not run.is_silent()
-    run.trace[-1] = run.trace[-1]._replace(seconds=-10.0)
-    assert run.is_silent()
-
-
 ASKED = """
 import assoc
 from assoc._system.interrupts import ask_to_end
@@ -159,16 +148,3 @@ def test_a_search_ends_when_it_is_asked_to():
     """In a process of its own: what is asked for is not taken back."""
     done = process("-c", ASKED)
     assert done.returncode == 0, done.stderr
-
-
-def test_parts_of_scenes():
-    scene = simulate("three-radar", 2, scans=5)
-    part = scene.part(1, 3)
-    assert part.num_scans == 2 and part.times.tolist() == scene.times[1:3].tolist()
-    for k in (0, 1):
-        assert part.scan(k).true_tuples().tolist() == scene.scan(k + 1).true_tuples().tolist()
-    from assoc import InvalidInputError
-
-    for start, stop in [(0, 6), (2, 2), (-1, 2), ("0", 1), (0, None)]:
-        with pytest.raises(InvalidInputError, match="part: expected whole numbers"):
-            scene.part(start, stop)

@@ -2,13 +2,11 @@
 
 import io
 import json
-import os
 import re
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 
 import numpy as np
@@ -21,11 +19,6 @@ from assoc._cli.track.plot_lines import LONGEST, IdentityError, Lines, parse_lin
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
-from assoc.tracking import MultiSensorTracker
-from assoc.tracking.file import described
-from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
-from tests.listening import wait_until_it_listens
-from tests.tracking.crossing import crossing, radar
 
 
 @pytest.fixture(scope="module")
@@ -85,26 +78,6 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     assert out.read_text() == done.stdout
 
 
-def test_the_default_filter_suits_the_turns(tmp_path, capsys):
-    """As for_scene does with scans of a turn; the scene's own pace where no turns are given."""
-    scene = simulate("rotating-radars", 5, aircraft=1, duration=12.0, interval=4.0)
-    scene.save(tmp_path / "radars.npz")
-
-    def used(name, *more):
-        """The filter that the saved state says."""
-        state = tmp_path / f"{name}.npz"
-        outputs = ["-o", str(tmp_path / f"{name}.csv"), "--state", str(state)]
-        assert live.main([str(tmp_path / "radars.npz"), "--replay", "0", *outputs, *more]) == 0
-        with np.load(state) as saved:
-            return json.loads(str(saved["settings"]))["filter"]
-
-    expected = described(MultiSensorTracker.for_scene(scene).filter)
-    assert used("turns", "--turns", "4,5,5.5") == used("pace") == expected
-    assert " steps; a step takes " in capsys.readouterr().err
-    assert used("slow", "--turns", "9,10,12", "-q") == described(two_speeds(manoeuvre_noise(9.0)))
-    assert capsys.readouterr().err == ""
-
-
 @pytest.mark.slow
 def test_datagrams_on_loopback_until_a_signal(scene_file):
     scene = Scene.load(scene_file)
@@ -127,30 +100,6 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
     assert rest == "" or rest.endswith("\n")
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux what it dropped")
-@pytest.mark.parametrize("slow", ["system", "tracker"])
-def test_datagrams_that_are_lost_are_counted(slow):
-    """Where nobody takes them out of the socket, and where nobody takes them from who does."""
-    begin = threading.Event()
-
-    class Late(Lines):
-        def _receive(self, *given):
-            return begin.wait(60) and super()._receive(*given)
-
-    lines = (Late if slow == "system" else Lines)(0, waiting=20_000)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        for _ in range(5000):
-            out.sendto(b"1,2.5,1000,0.5,0.1\n", ("127.0.0.1", lines.port))
-        begin.set()
-        time.sleep(0.5)
-        taken = iter(lines)
-        got = [next(taken)]
-        time.sleep(0.5)
-        out.sendto(b"2,2.5,1000,0.5,0.1\nend", ("127.0.0.1", lines.port))
-        got += taken
-    assert len(got) + lines.lost == 5001 and lines.lost > 1000 and len(got) > 20
-
-
 def test_long_lines_are_cut_while_they_are_read():
     """A line of any length takes no more memory than the longest that there may be, and what follows it is read."""
     read = []
@@ -165,47 +114,6 @@ def test_long_lines_are_cut_while_they_are_read():
     lines._take_lines(Stream(b"a\n" + b"b" * 10**6 + b"\n" + b"c" * LONGEST + b"\nd"))
     assert [len(one) for one in lines._waiting.queue] == [2, LONGEST + 1, LONGEST + 1, 1]
     assert set(read) == {LONGEST + 1}
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs signals of POSIX")
-def test_a_signal_twice_ends_with_its_own_code(scene_file):
-    """At any moment, also while kernels are compiled or loaded."""
-    for wait in (0.5, 0.9, 1.3, 2.5):
-        command = words(scene_file, "--udp", 0)
-        # a signal may strike while Python reads a module: its file is open then
-        command[3:3] = ["-W", "ignore::ResourceWarning"]
-        program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        wait_until_it_listens(program)
-        time.sleep(wait)
-        for _ in range(2):
-            program.send_signal(signal.SIGTERM)
-            time.sleep(0.05)
-        told = program.communicate(timeout=600)[1]
-        assert program.returncode == 143 and b"Traceback" not in told and b"terminated" in told, (wait, told)
-
-
-@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs signals of POSIX")
-def test_an_interrupt_inside_exec_leaves_the_code():
-    code = (
-        "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])\n"
-        "from assoc._cli.program import Interruption, run_program\n"
-        "found = Interruption('x'); found.code, found.word = 143, 'terminated'\n"
-        "raise SystemExit(run_program(lambda: exec('raise KeyboardInterrupt'), 'x', found))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
-    assert (done.returncode, done.stderr) == (143, "x: terminated\n")
-
-
-def test_verbose_and_an_output_that_is_full(scene_file, tmp_path, capsys):
-    words = [str(scene_file), "--replay", "0"]
-    assert live.main([*words, "-v", "-o", str(tmp_path / "t.csv")]) == 0
-    assert "life_cycle LifeCycle(" in capsys.readouterr().err
-    if not os.path.exists("/dev/full"):
-        pytest.skip("needs a device that is full")
-    assert live.main([*words, "-o", "/dev/full"]) == 2
-    error = capsys.readouterr().err
-    assert error == "assoc.live: error: /dev/full: cannot be written (No space left on device)\n"
 
 
 def test_bad_options(scene_file, tmp_path, capsys):
@@ -231,17 +139,6 @@ def test_bad_options(scene_file, tmp_path, capsys):
         said = capsys.readouterr().err
         assert code == 2 and line in said and len(said.strip().splitlines()) == 1, said
     assert not any(tmp_path.glob("x.*"))
-
-
-def test_the_old_spelling_says_the_new_one(scene_file, tmp_path, capsys):
-    out = [tmp_path / "old.csv", tmp_path / "new.csv"]
-    assert track.main([str(scene_file), "--live", "--replay", "0", "-q", "-o", str(out[0])]) == 0
-    words = f"{scene_file} --replay 0 -q -o {out[0]}"
-    assert capsys.readouterr().err == (
-        f"assoc.track: warning: --live is a program of its own now: python -m assoc.live {words}\n"
-    )
-    assert live.main([str(scene_file), "--replay", "0", "-q", "-o", str(out[1])]) == 0
-    assert capsys.readouterr().err == "" and out[0].read_bytes() == out[1].read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -288,48 +185,6 @@ def test_lines_with_identities(scene_file):
             parse_line(json.dumps(plain | more), scene)
 
 
-def test_lines_with_own_positions(scene_file, monkeypatch, capsys):
-    scene = Scene.load(scene_file)
-    full = ("radar 1", 2.5, [10.0, -20.0, 3.0], 0.5)
-    assert parse_line("platform,radar 1,2.5,10,-20,3,0.5", scene) == full
-    assert parse_line("platform, radar 1, 2.5, 10, -20, 3", scene) == (*full[:3], None)
-    line = {"platform": "radar 1", "time": 2.5, "position": [10, -20, 3], "heading": 0.5}
-    assert parse_line(json.dumps(line), scene) == full
-    for bad in ("platform,1,2.5,10,-20", "platform,1,2.5,10,-20,3,0.5,9", "platform,1,2.5,x,1,2", '{"platform": 1}',
-                json.dumps(line | {"position": [1, 2]}), json.dumps(line | {"heading": "north"})):  # fmt: skip
-        with pytest.raises(InvalidInputError, match="line left out|expected") as caught:
-            parse_line(bad, scene)
-        assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"platform,radar 1,2.5,10,-20,3,0.5\n")))
-    assert live.main([str(scene_file)]) == 0
-    told = capsys.readouterr().err
-    assert "own position for 'radar 1' left out: the sensor is on no platform" in told
-
-
-def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
-    recording = crossing(2, begin=1.0)
-    place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
-    place.save(tmp_path / "radar.npz")
-    columns = recording.times, recording.ranges, recording.azimuths, recording.identities
-    rows = zip(*(one.tolist() for one in columns), strict=True)
-    lines = "\n".join(["sensor,time,range,azimuth,mode3", *(f"1,{t!r},{r!r},{a!r},{code}" for t, r, a, code in rows)])
-    told, tracks = {}, {}
-    for how in (None, "score-only", "ignore", "use"):
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines.encode())))
-        out = tmp_path / f"{how}.csv"
-        more = [] if how is None else ["--identity", how]
-        given = [str(tmp_path / "radar.npz"), "--interval", "4", "--tracker", "nearest-neighbour"]
-        assert live.main([*given, "-o", str(out), *more]) == 0
-        told[how], tracks[how] = capsys.readouterr().err.strip().splitlines()[-1], out.read_text()
-    for how in (None, "score-only"):
-        assert told[how].endswith("; 0 of 2 tracks with an identity kept one")
-    assert "identity" not in told["ignore"]
-    assert told["use"].endswith("; 2 of 2 tracks with an identity kept one (identities were used to make them)")
-    assert tracks[None] == tracks["score-only"] == tracks["ignore"] != tracks["use"]
-    assert live.main([*given, "--replay", "0", "--identity", "use", "-o", str(out)]) == 2
-    assert "--identity: is only for plots, not for the measurements of a scene" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_a_killed_run_goes_on(scene_file, tmp_path):
     """SIGKILL; the source repeats its last seconds, and the tracks are those of a run that was never killed."""
@@ -369,33 +224,3 @@ def test_a_killed_run_goes_on(scene_file, tmp_path):
         early.sort_values(["time", "track_id"]).reset_index(drop=True),
     )
     assert len(found) == len(expected)
-
-
-def test_no_output_is_overwritten(scene_file, tmp_path, capsys):
-    tracks, state = tmp_path / "tracks.csv", tmp_path / "live.npz"
-    words = [str(scene_file), "--turns", "4,5,5.5", "--replay", "0", "-q", "-o", str(tracks)]
-    tracks.write_text("precious\n")
-    assert live.main(words) == live.main([*words, "--state", str(state)]) == 2
-    assert f"{tracks}: is there already; expected a new name, or --state" in capsys.readouterr().err
-    tracks.unlink()
-    assert live.main([*words, "--state", str(state)]) == 0
-    before = tracks.read_text()
-    assert before.count("\n") > 20 and Scene.load(scene_file) and state.exists()
-    # all plots are known, or too old
-    tracks.write_text("precious\n")
-    assert live.main([*words, "--state", str(state)]) == 2
-    assert "holds other columns" in capsys.readouterr().err and tracks.read_text() == "precious\n"
-    for bad in ("--state", str(tmp_path / "no" / "live.npz")), ("--state", "live.csv"):
-        tracks.unlink(missing_ok=True)
-        assert live.main([*words, *bad]) == 2
-    (tmp_path / "junk.npz").write_bytes(b"junk")
-    assert live.main([*words, "--state", str(tmp_path / "junk.npz")]) == 2
-    assert "junk.npz: is not a readable npz file" in capsys.readouterr().err
-
-
-def test_a_plot_whose_identity_is_none_is_used(scene_file, monkeypatch, capsys):
-    lines = b"1,0.5,50000,0.6,0.05,9999\n1,0.7,50000,0.6,0.05,,zz\n1,0.8,50000,0.6\n"
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines)))
-    assert live.main([str(scene_file)]) == 0
-    told = capsys.readouterr().err
-    assert "2 plots in " in told and "2 identities not understood" in told and told.count("identity left out") == 1

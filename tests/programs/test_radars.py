@@ -8,13 +8,12 @@ import pandas as pd
 import pytest
 
 from assoc import inspect, live, register, track
-from assoc._cli.track.plot_lines import parse_line
 from assoc._cli.track.radars_file import read_radars, write_biases
 from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
-from assoc.recordings import Recording, radar_of, read_plots
-from assoc.recordings.on_earth import Bias, placed
-from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
+from assoc.recordings import Recording, read_plots
+from assoc.recordings.on_earth import Bias
+from assoc.scene.geodesy import earth_centered
 from tests.sizes import sample
 
 pytest.importorskip("pyarrow")
@@ -99,52 +98,6 @@ def test_two_radars_to_a_map(tmp_path, heights, capsys):
     capsys.readouterr()
 
 
-@pytest.mark.slow
-def test_a_reference_trajectory_from_radar_files(tmp_path, capsys):
-    """One command: biases and gains taken off, tracks smoothed, accuracies, in both formats."""
-    asterix = pytest.importorskip("assoc.integrations.asterix")
-    pytest.importorskip("asterix")
-    file, out, sent = described(tmp_path), tmp_path / "reference.csv", tmp_path / "reference.ast"
-    north = pd.read_csv(tmp_path / "north.csv")
-    north["rho_m"], north["theta"] = 1.002 * north["rho_m"] + 250.0, (north["theta"] + 0.3) % 360
-    north.to_csv(tmp_path / "north.csv", index=False)
-    words = [file, "-o", str(out), "--asterix", str(sent), "--smooth"]
-    assert track.main([*words, "--registration", "online"]) == 2
-    assert "--registration: online needs scans of one instant; take first" in capsys.readouterr().err
-    errors = {}
-    for more in ((), ("--registration", "first")):
-        assert track.main([*words, *more]) == 0
-        found = pd.read_csv(out, dtype={"target": str})
-        own = found[(found.target == f"{CODES[0]:04o}") & (found.time > 1626098400 + 30)]
-        lat, lon, _ = place_of(0, own.time.to_numpy() - 1626098400)
-        error = np.stack([np.cos(np.radians(own.latitude)) * (own.longitude - lon), own.latitude - lat]) * 111_250
-        errors[more] = np.sqrt((error**2).sum(axis=0).mean())
-    said = capsys.readouterr().out
-    assert re.search(r"north +gain +\S+ +\S+ +m/km", said) and "no height" not in said
-    assert errors["--registration", "first"] < 0.5 * errors[()]
-    sent = asterix.read_tracks(sent)
-    assert len(sent) == len(found) and {"sigma_x", "sigma_y", "latitude", "barometric", "mode3_oct"} <= {*sent}
-
-
-def test_azimuths_in_the_frame_of_another_place():
-    """A radar's vertical is another one than the frame's: of high aircraft that turns azimuths, too."""
-    rng, origin = np.random.default_rng(3), (np.radians(47.5), np.radians(8.0), 450.0)
-    where = rng.uniform([45.5, 7.0, 1e3], [47.0, 11.0, 12e3], (50, 3)).T
-    ranges, bearings = seen_from("south", where)
-    place = tuple(np.radians(PLACES["south"][:2])) + PLACES["south"][2:]
-    altitudes = np.where(np.arange(50) < 40, where[2], np.nan)
-    plots = Recording(np.arange(50.0), ranges, np.pi / 2 - bearings, altitudes=altitudes)
-    told, radar = placed(plots, radar_of(plots, range_noise=40.0, azimuth_noise=1e-3), place, origin, 30.0)
-    exact = radar.measure(east_north_up(*np.radians(where[:2]), where[2], origin))
-    off = np.abs(np.angle(np.exp(1j * (told.azimuths - exact[:, 1]))))
-    # without an altitude one is assumed
-    assert off[:40].max() < 1e-6 and 1e-5 < off[40:].max() < 2.5e-3
-    # nearer than that altitude, or than its own with noise, a plot keeps its direction
-    near = Recording([0.0, 1.0, 2.0], [3e3, 3e3, 50e3], np.full(3, 0.7), altitudes=[np.nan, 3700.0, 9e3])
-    told, _ = placed(near, radar_of(near, range_noise=40.0, azimuth_noise=1e-3), place, origin)
-    assert np.abs(told.azimuths - 0.7).max() < 0.15
-
-
 def test_asterix_beside_tables(tmp_path, capsys):
     """Its times are of the day, its codes and addresses are kept, and tracks are named by addresses."""
     asterix = pytest.importorskip("assoc.integrations.asterix")
@@ -222,59 +175,6 @@ def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
         assert status in ("confirmed", "coasting") and consistent and 0.1 < nis < 2 and min(hits) >= 8
     assert live.main([file, "--turns", "4,5", "--replay", "0"]) == 2
     assert "--turns: " in capsys.readouterr().err
-
-
-def test_no_track_starts_in_closed_areas(tmp_path, capsys):
-    """Corners are degrees; two of the three aircraft start in a box and in a triangle."""
-    file, out = described(tmp_path), tmp_path / "tracks.csv"
-    text = (tmp_path / "radars.toml").read_text()
-    # where they are in the first minutes: 46.6 8.1, 46.8 8.35, 47.0 8.6
-    areas = "[[46.5, 8.0], [46.9, 8.2]], [[46.9, 8.5], [47.4, 8.5], [47.2, 8.9], [46.9, 8.9]]"
-    (tmp_path / "radars.toml").write_text(f"closed = [{areas}]\n{text}")
-    assert track.main([file, "-o", str(out), "-q"]) == 0
-    found = pd.read_csv(out, dtype={"target": str})
-    assert {*found.target[found.time < 1626098400 + 60]} == {"2000"}
-    assert live.main([file, "--replay", "0", "-q", "-o", str(tmp_path / "live.csv")]) == 0
-    early = pd.read_csv(tmp_path / "live.csv")
-    early = early[(early.time < 1626098400 + 60) & (early.event == "update")]
-    assert len(early) and early.latitude.between(46.6, 46.9).all() and early.longitude.between(8.3, 8.5).all()
-    capsys.readouterr()
-    for wrong, line in (
-        ("7", "closed: expected a list of areas, got 7"),
-        ("[[[46.5, 8.0]]]", "closed: area 1: expected 2 corners of a box"),
-        ("[[[46.5, 8.0], [146.5, 8.2]]]", "closed: area 1: expected a latitude within +-90"),
-        ("[[[46.5, 8.0], [46.5, 8.2]]]", "closed: area 1: the corners enclose nothing"),
-        ('[[[46.5, "a"], [46.5, 8.2]]]', "closed: area 1: expected 2 corners of a box"),
-    ):
-        (tmp_path / "radars.toml").write_text(f"closed = {wrong}\n{text}")
-        assert track.main([file, "-o", str(out)]) == 2
-        said = capsys.readouterr().err
-        assert line in said and len(said.splitlines()) == 1, said
-
-
-def test_heights_of_lines_are_altitudes(tmp_path):
-    file = described(tmp_path)
-    (tmp_path / "radars.toml").write_text('name = "Zurich"\n' + (tmp_path / "radars.toml").read_text())
-    scene = read_radars(file).scene
-    assert scene.name == "Zurich"
-    assert [sensor.name for sensor in scene.sensors[:2]] == ["north, no height", "north"]
-    slant, bearing = seen_from("north", place_of(0, np.array(0.0)))
-    azimuth = np.pi / 2 - bearing
-    csv, json = f"north,5,{slant},{azimuth},10000,4521,", '{"sensor": "north", "time": 5, "range": %f, "azimuth": %f%s}'
-    for line in (csv, json % (slant, azimuth, ', "height": 10000')):
-        plot = parse_line(line, scene)
-        lat, lon, height = geodetic(position_of(plot.values, scene.sensors[1]), scene.origin)[0]
-        assert (np.degrees(lat), np.degrees(lon), height) == pytest.approx((46.6, 8.1, 10_000.0), abs=1e-2)
-    for line in (f"north,5,{slant},{azimuth}", f"north,5,{slant},{azimuth},,4521,3c6444", json % (slant, azimuth, "")):
-        plot = parse_line(line, scene)
-        assert (plot.sensor, len(plot.values)) == ("north, no height", 2)
-
-
-def position_of(values, radar):
-    """Where slant range, azimuth and height lead to."""
-    slant, azimuth, height = values
-    ground = np.sqrt(slant**2 - (height - radar.position[2]) ** 2)
-    return [[*(radar.position[:2] + ground * np.array([np.cos(azimuth), np.sin(azimuth)])), height]]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """`python -m assoc.track` as a program."""
 
-import json
 import os
 import re
 from dataclasses import replace
@@ -11,13 +10,8 @@ import pytest
 
 from assoc import track
 from assoc._cli.track import options as track_options
-from assoc.errors import InvalidInputError
-from assoc.recordings import Recording, read_plots, write_plots
-from assoc.recordings.flights.reports import read_flight_reports
-from assoc.scene import Scene, Truth
-from assoc.sensors import Radar2D
-from assoc.simulation import simulate
-from assoc.simulation.observation import observe
+from assoc.recordings import Recording, write_plots
+from assoc.scene import Scene
 from assoc.tracking import TRACKERS, MultiSensorTracker
 from assoc.tracking.filter_choice import FILTERS, make_filter
 
@@ -55,20 +49,6 @@ def test_what_comes_by_a_pipe_is_read_once(tmp_path):
         assert os.read(end, 100) == b"time,range,bearing\n"
     finally:
         os.close(end)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-@pytest.mark.parametrize("name", ["plots.csv", "link.csv", "plots.parquet"])
-def test_a_pipe_that_nobody_may_write_to_is_no_file(name, tmp_path):
-    pipe = tmp_path / name
-    if name == "link.csv":
-        os.mkfifo(tmp_path / "pipe")
-        pipe.symlink_to("pipe")
-    else:
-        os.mkfifo(pipe)
-    for read in (read_plots, lambda path: read_flight_reports(str(path), {})):
-        with pytest.raises(InvalidInputError, match=f"{name}: is a named pipe, expected a file"):
-            read(pipe)
 
 
 def test_a_scene_as_a_program(run, scene_file, tmp_path):
@@ -119,23 +99,6 @@ def test_every_tracker(name, scene_file, tmp_path, capsys):
     assert set(track_options.TRACKERS) == set(TRACKERS) and set(track_options.FILTERS) == set(FILTERS)
 
 
-def test_the_rule_of_nearest_neighbours_asks_the_solver(scene_file, tmp_path, capsys):
-    words = [str(scene_file), "--tracker", "nearest-neighbour", "-o", str(tmp_path / "tracks.csv")]
-    assert track.main([*words, "--rule", "assignment", "--solver", "tabu"]) == 0
-    assert "nearest-neighbour, tabu: " in capsys.readouterr().out
-    assert track.main([*words, "--rule", "best"]) == 2
-    assert "--rule: unknown name 'best'; known: greedy, assignment" in capsys.readouterr().err
-
-
-def test_smoothed_tracks(scene_file, tmp_path):
-    assert track.main([str(scene_file), "--tracker", "mht", "--smooth", "-o", str(tmp_path / "tracks.csv")]) == 0
-    table = pd.read_csv(tmp_path / "tracks.csv")
-    assert table.track_id.nunique() == 3
-    # from the first detection on, and later detections have their say
-    assert (table.groupby("track_id").time.min() < table.time.max() / 2).all()
-    assert table.confirmed.all()
-
-
 def test_what_a_scene_does_not_allow_is_refused_before_it_is_tracked(scene_file, tmp_path, capsys):
     scene = Scene.load(scene_file)
     replace(scene, truth=None).save(tmp_path / "blind.npz")
@@ -175,43 +138,6 @@ def test_no_track_starts_in_areas_that_the_user_draws(scene_file, tmp_path, caps
         assert line in said and len(said.splitlines()) == 1
 
 
-def test_what_is_declared_is_checked(scene_file, tmp_path, capsys):
-    words = [str(scene_file), "-o", str(tmp_path / "tracks.csv"), "--check"]
-    assert track.main(words) == 0
-    assert "noise/declared" in capsys.readouterr().out
-    assert track.main([*words, "--no-adapt"]) == 2
-    assert "--check: nothing is estimated with --no-adapt" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", list(TRACKERS))
-def test_scans_of_one_time(name, tmp_path, capsys):
-    """Two radars that report one after the other at one time are legal; targets and tracks then count once."""
-    whole = simulate("three-radar", 2, scans=6)
-    truth = whole.truth
-    nothing = [z[:0] for z in whole.measurements[0]]
-    first = [(scan[0], nothing[1], nothing[2]) for scan in whole.measurements]
-    second = [(nothing[0], scan[1], scan[2]) for scan in whole.measurements]
-    scene = Scene(
-        whole.sensors,
-        np.repeat(whole.times, 2),
-        [scan for pair in zip(first, second, strict=True) for scan in pair],
-        whole.region,
-        # names: each track is also told whom it followed
-        Truth(
-            [ids for ids in truth.target_ids for _ in range(2)],
-            [places for places in truth.positions for _ in range(2)],
-            names={0: "a"},
-        ),
-    )
-    scene.save(tmp_path / "twice.npz")
-    out = tmp_path / "tracks.csv"
-    assert track.main([str(tmp_path / "twice.npz"), "--tracker", name, "-o", str(out), "--all"]) == 0
-    captured = capsys.readouterr()
-    assert "root mean square GOSPA" in captured.out and "12 scans" in captured.out and not captured.err
-    table = pd.read_csv(out)
-    assert {*table.time} <= {*whole.times} and table.groupby(["time", "track_id"]).size().max() == 2
-
-
 @pytest.mark.parametrize("name", ["kalman", "ukf", "modified-ekf", "enkf", "imm", "fuzzy", "ekf"])
 def test_every_filter(name, scene_file, tmp_path, capsys):
     code = track.main([str(scene_file), "--filter", name, "-o", str(tmp_path / "tracks.csv")])
@@ -243,33 +169,22 @@ def test_plots_from_csv(window, name, tmp_path, capsys):
 
 BAD = {
     "no file": (["absent.npz"], "absent.npz: no such file"),
-    "no csv": (["absent.csv"], "absent.csv"),
     "tracker": (["SCENE", "--tracker", "mth"], "--tracker: unknown name 'mth'; known: multi-sensor"),
-    "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: imm-cv"),
-    "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: is only for plots, not for scenes"),
     "identity unused": (["PLOTS", "--code-shared", "0.1"], "--code-shared: is only for --identity use"),
-    "code probability": (["PLOTS", "--identity", "use", "--code-garbled", "1"], "code_garbled: expected a number"),
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
-    "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
     "noise": (["SCENE", "--process-noise", "-1"], "--process-noise: expected a number >= 0"),
-    "targets": (["SCENE", "--targets", "boat"], "--targets: unknown name 'boat'; known: airliner, fighter, ship"),
     "targets of plots": (
         ["PLOTS", "--range-noise", "9", "--bearing-noise", "1", "--targets", "auto"],
         "auto needs a scene",
     ),
-    "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "--range-noise: the plots do not come in steps"),
-    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, irregular, none"),
     "rotation without turns": (
         ["PLOTS", "--window", "none", "--rotation", "9"],
         "--rotation: is only for --window ctw",
     ),
-    "cutoff for plots": (["PLOTS", "--cutoff", "9"], "--cutoff: is only for scenes, not for plots"),
-    "m without m-of-n": (["SCENE", "--m", "2"], "--m: is only for --confirmation m-of-n"),
     "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
-    "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }
 
 
@@ -304,23 +219,6 @@ def test_help_is_quick_and_lists_trackers(run):
     assert done.returncode == 0
     for name in TRACKERS:
         assert name in done.stdout
-
-
-def test_gospa_in_one_convention_and_its_cutoff(scene_file, tmp_path, capsys):
-    """The squares of the parts add up to the square of the whole, and the cutoff is the one that is asked for."""
-    found = {}
-    for cutoff in (None, "60"):
-        words = [str(scene_file), "-o", str(tmp_path / "t.csv"), *([] if cutoff is None else ["--cutoff", cutoff])]
-        assert track.main(words) == 0
-        line = next(one for one in capsys.readouterr().out.splitlines() if "GOSPA" in one)
-        assert f"(cutoff {cutoff or 1000} m)" in line
-        pattern = r"GOSPA (N) m \(localisation (N), missed (N), false (N)\)".replace("N", r"[\d.e+]+")
-        whole, *parts = map(float, re.search(pattern, line).groups())
-        assert whole**2 == pytest.approx(sum(part**2 for part in parts), rel=2e-3) and max(parts) <= whole
-        found[cutoff] = parts
-    assert found["60"][1] > found[None][1]  # errors of more than 60 m are targets missed
-    assert track.main([str(scene_file), "-o", str(tmp_path / "t.csv"), "--cutoff", "-1"]) == 2
-    assert "--cutoff: expected a number above 0" in capsys.readouterr().err
 
 
 def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
@@ -374,21 +272,6 @@ def test_speed_heading_and_altitude(tmp_path, capsys):
     assert last.altitude == pytest.approx(9144)
 
 
-def test_irregular_windows_and_what_rates_need(tmp_path, capsys):
-    plots(tmp_path / "plots.csv")
-    words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE, "--window"]
-    counts = {}
-    for window in ("ctw", "irregular", "none"):
-        assert track.main([*words, window]) == 0
-        counts[window] = int(re.search(r"rows, (\d+) scans", capsys.readouterr().out)[1])
-    assert counts["ctw"] < counts["irregular"] < counts["none"]
-    unknown = read_without_identities(tmp_path)
-    assert track.main([unknown, "-o", str(tmp_path / "t.csv"), "--rates", str(tmp_path / "x.csv"), *NOISE]) == 2
-    assert "no plot has an identity" in capsys.readouterr().err and not (tmp_path / "t.csv").exists()
-    assert track.main([unknown, "-o", str(tmp_path / "t.csv"), "--rotation", "10", *NOISE]) == 0
-    assert "CT" not in capsys.readouterr().out
-
-
 def test_identities_judge_or_are_used_or_are_left_out(tmp_path, capsys):
     plots(tmp_path / "plots.csv")
     printed, tables = {}, {}
@@ -413,54 +296,3 @@ def test_identities_judge_or_are_used_or_are_left_out(tmp_path, capsys):
         "--rates: is only for --identity use or score-only, not for ignore" in capsys.readouterr().err
         and not (tmp_path / "t.csv").exists()
     )
-
-
-def read_without_identities(folder):
-    frame = pd.read_csv(folder / "plots.csv")
-    path = folder / "unknown.csv"
-    known = [name for name in frame.columns if name.startswith(("mode3", "aircraft"))]
-    frame.drop(columns=known).to_csv(path, index=False)
-    return str(path)
-
-
-def test_tracks_that_do_not_agree_with_their_measurements_are_listed(tmp_path, capsys):
-    """Radars that err thrice as much as they say."""
-    scene = simulate("three-radar", 1, scans=25)
-    noisy = [replace(one, noise=3.0 * one.noise) for one in scene.sensors]
-    truth = scene.truth
-    seen = observe(noisy, scene.times, truth.target_ids, truth.positions, np.random.default_rng(0), region=scene.region)
-    replace(seen, sensors=scene.sensors).save(tmp_path / "scene.npz")
-    report, out = tmp_path / "r.html", tmp_path / "tracks.csv"
-    assert track.main([str(tmp_path / "scene.npz"), "-o", str(out), "--report", str(report), "--no-adapt"]) == 0
-    listed = re.search(r"do not agree with their measurements .*: (.*)", capsys.readouterr().out)
-    assert listed
-    table = pd.read_csv(out)
-    worst = {int(one) for one in re.findall(r"(\d+) \(", listed[1])}
-    assert worst <= set(table["track_id"][~table["consistent"]])
-    assert "hits by sensor" in report.read_text()
-
-
-def test_priors_of_what_is_tracked(scene_file, tmp_path, capsys):
-    assert track.main([str(scene_file), "--targets", "auto", "-o", str(tmp_path / "tracks.csv")]) == 0
-    assert pd.read_csv(tmp_path / "tracks.csv").track_id.nunique() == 3
-
-
-def test_tracks_without_measured_heights_are_compared_horizontally(tmp_path, capsys):
-    """Three radars without elevations, on the same targets: the program tracks in three dimensions, and says so."""
-    scene = simulate("three-radar", 1, scans=25)
-    flat = [
-        Radar2D(position=one.position, noise=one.noise[:2], field_of_view=one.field_of_view[:2])
-        for one in scene.sensors
-    ]
-    truth = scene.truth
-    seen = observe(flat, scene.times, truth.target_ids, truth.positions, np.random.default_rng(0), region=scene.region)
-    seen.save(tmp_path / "scene.npz")
-    report, out = tmp_path / "r.html", tmp_path / "tracks.csv"
-    assert track.main([str(tmp_path / "scene.npz"), "-o", str(out), "--report", str(report)]) == 0
-    printed = capsys.readouterr().out
-    assert "heights are not measured: z comes from slant ranges" in printed
-    gospa = float(re.search(r"1000 m, horizontally\): root mean square GOSPA ([\d.]+)", printed)[1])
-    values = np.array(json.loads(re.search(r'"name":"GOSPA".*?"y":(\[.*?\])', report.read_text())[1]))
-    assert gospa == pytest.approx(np.sqrt((values**2).mean()), rel=1e-3)
-    assert gospa < 700.0
-    assert (pd.read_csv(out)["sigma_z"] > 0.0).all()
