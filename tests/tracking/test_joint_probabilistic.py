@@ -9,7 +9,7 @@ import pytest
 from assoc import InvalidInputError, filters
 from assoc.filters import Gaussian
 from assoc.filters.merging import merged
-from assoc.tracking import Initiation, JointProbabilisticTracker
+from assoc.tracking import JointProbabilisticTracker
 from tests.tracking import plain
 
 SCORE = 1.5
@@ -165,47 +165,6 @@ def test_measurements_of_own_times_are_compared_at_these(seed):
         # parts with a share below 1e-5 are dropped
         np.testing.assert_allclose(tracks[t + 1].mean, middle, rtol=1e-4, atol=1e-3)
         assert tracks[t + 1].score == pytest.approx(math.log(exists / (1 - exists)) + SCORE - before[t], abs=1e-5)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_sensors_are_taken_in_in_the_order_of_their_times(seed):
-    """One track and a plot or two of each sensor, the last sensor's first: all ways by which they may be its own."""
-    rng = np.random.default_rng(seed)
-    sensors = [plain.sensor(0.8), plain.sensor(0.6, sigma=5.0)]
-    mean, cov = np.array([500.0, 500, 250, 20, -10, 5]), np.diag([60.0] * 3 + [20.0] * 3)
-    motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
-    tracker = JointProbabilisticTracker(
-        sensors, filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12,
-        initiation=Initiation(birth_rate=1e-9),
-    )  # fmt: skip
-    tracker.begin(0.0, Gaussian(mean[None], cov[None]), score=SCORE)
-    before = survived(SCORE, 2.0)
-    p = 1 / (1 + math.exp(-before))
-    times = [np.array([1.6, 1.7]), np.array([0.4, 0.7])]
-    # near enough to be doubted; as good as no new targets, which would contend for the second sensor's plots
-    z = [mean[:3] + t[:, None] * mean[3:] + rng.normal(0, 10, (2, 3)) for t in times]
-    tracker.step(2.0, z, times)
-    ways = []
-    for a, b in itertools.product(range(3), repeat=2):
-        weight, x, C, now = 1.0, mean, cov, 0.0
-        for s, number in ((1, b), (0, a)):
-            P, density = sensors[s].detection_probability, sensors[s].false_alarm_rate / sensors[s].volume
-            if number:
-                when = times[s][number - 1]
-                x, C, log = plain.correct(*plain.predict(x, C, when - now), z[s][number - 1], sensors[s].covariance)
-                weight, now = weight * P * math.exp(log) / density, when
-            else:
-                weight *= 1 - P
-        ways.append((weight, *plain.predict(x, C, 2.0 - now)))
-    total = sum(w for w, _, _ in ways)
-    odds = p * total / (1 - p)
-    track = next(one for one in tracker.tracks if one.track_id == 1)
-    middle = sum(w * x for w, x, _ in ways) / total
-    spread = sum(w * (C + np.outer(x - middle, x - middle)) for w, x, C in ways) / total
-    assert track.existence == pytest.approx(odds / (1 + odds), rel=1e-6)
-    assert track.score == pytest.approx(SCORE + math.log(odds) - before, abs=1e-4)
-    np.testing.assert_allclose(track.mean, middle, rtol=1e-4, atol=1e-3)
-    np.testing.assert_allclose(track.covariance, spread, rtol=1e-2, atol=1e-2)
 
 
 def test_models_are_merged_each_by_itself():

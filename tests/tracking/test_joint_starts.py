@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from assoc import AssocWarning, build_problem
+from assoc import AssocWarning
 from assoc.filters import Gaussian
-from assoc.scene import Scan, Scene
+from assoc.scene import Scene
 from assoc.sensors import BearingSensor
 from assoc.simulation import simulate
 from assoc.simulation.observation import observe
@@ -55,26 +55,6 @@ def test_three_bearings_start_all_tracks_and_ghosts_die(name):
     assert TARGETS in found[:10]
     assert found[-1] == TARGETS
     assert not any(false[20:])
-
-
-def test_crossings_are_the_tuples_of_what_is_free():
-    one = scene(7)
-    scan = one.scan(3)
-    whole = build_problem(one, scan)
-    several = np.count_nonzero(whole.tuples, axis=1) > 1
-    free = [np.ones(len(z), dtype=np.bool_) for z in scan.measurements]
-    crossings = TRACKERS["mht"].for_scene(one).settings.births.crossings
-    found = crossings(scan, free)
-    assert sorted(map(tuple, found.rows)) == sorted(map(tuple, whole.tuples[several]))
-    free[0][0] = False
-    left = crossings(scan, free)
-    without = several & (whole.tuples[:, 0] != 1)
-    assert sorted(map(tuple, left.rows)) == sorted(map(tuple, whole.tuples[without]))
-    costs = dict(zip(map(tuple, whole.tuples), whole.costs, strict=True))
-    np.testing.assert_allclose(left.costs, [costs[tuple(row)] for row in left.rows], rtol=1e-9)
-    nothing = [np.zeros(len(z), dtype=np.bool_) for z in scan.measurements]
-    assert crossings(scan, nothing) is None
-    assert crossings(Scan(0, 0.0, tuple(z[:0] for z in scan.measurements)), [z[:0] for z in nothing]) is None
 
 
 @pytest.mark.parametrize("name", TRACKERS)

@@ -8,7 +8,6 @@ from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LatePlots
-from assoc.tracking.filter_choice import FILTERS, make_filter
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
 from tests.tracking.stepping import stepped
@@ -78,53 +77,6 @@ def test_without_late_measurements_nothing_changes(scene, kind):
     np.testing.assert_array_equal(mine, theirs)
     final += wrapped.flush()
     assert [one.scan for one in final] == list(range(10))
-
-
-# `kalman` needs linear sensors; the other two have states that cannot be merged
-@sample(
-    "kind,filter",
-    [
-        (kind, filter)
-        for filter in FILTERS
-        for kind in sorted(TRACKERS)
-        if filter != "kalman" and (kind != "joint-probabilistic" or filter not in ("enkf", "fuzzy"))
-    ],
-    every=5,
-)
-def test_plots_stamped_at_their_scan_are_those_in_order(scene, kind, filter):
-    """A third of the plots come a scan late, stamped with the very time of their scan."""
-    rng, S = np.random.default_rng(1), len(scene.sensors)
-    filters_of_both = [make_filter(filter, scene.sensors, 8.0, 0, 2.0, scene.region) for _ in range(2)]
-    late, plain = (TRACKERS[kind](scene.sensors, one, region=scene.region, adapt=True) for one in filters_of_both)
-    late, wait = LatePlots(late), [(np.zeros((0, 3)), np.zeros(0))] * S
-    for k in range(10):
-        scan = scene.scan(k)
-        given = []
-        for s, z in enumerate(scan.measurements):
-            behind = rng.random(len(z)) < (0.0 if k == 9 else 0.3)
-            stamps = np.full(len(z), scan.time)
-            given.append(tuple(map(np.concatenate, zip(wait[s], (z[~behind], stamps[~behind]), strict=True))))
-            wait[s] = z[behind], stamps[behind]
-        plain.step(scan.time, scan.measurements, [np.full(len(z), scan.time) for z in scan.measurements], scan.sectors)
-        late.step(scan.time, *map(list, zip(*given, strict=True)), scan.sectors)
-    assert late.late > 5 and not late.refused
-    expected, found = (sorted(track.mean.tolist() for track in one.tracks) for one in (plain, late))
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-6)
-
-
-def test_two_steps_of_one_instant_are_both_on_time():
-    """Sensors that report by themselves at the same time: neither is late."""
-    sensor = PositionSensor(
-        position=(0, 0, 0), noise=(20.0,) * 2, detection_probability=0.9, false_alarm_rate=1.0,
-        field_of_view=((-3e3, 3e3),) * 2,
-    )  # fmt: skip
-    late, none = LatePlots(TRACKERS["multi-sensor"]([sensor] * 2)), np.zeros((0, 2))
-    for k in range(4):
-        for s in range(2):
-            z, turns = [none, none], np.zeros((2, 2))
-            z[s], turns[s] = np.array([[10.0 * k, 5.0 * s]]), (-np.pi, np.pi)
-            late.step(float(k), z, [np.full(len(one), float(k)) for one in z], turns)
-    assert late.late == 0 and len(late.tracks) == 1
 
 
 def test_what_is_too_old_is_refused_and_counted(scene):
@@ -204,16 +156,6 @@ def test_what_is_final_is_told_once(scene, kind):
     assert step.late == 1
     final += [*step.final, *late.flush()]
     assert [one.scan for one in final] == list(range(10))
-
-
-def test_tracks_of_the_past_keep_their_ids_when_names_are_forgotten(scene):
-    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), many=0)
-    known = []
-    for k in range(6):
-        stepped(late, scene, k, k + 1, times=True)
-        known.append([track.track_id for track in late.tracks])
-        assert [[track.track_id for track in late.past_tracks(j)] for j in range(k + 1)] == known
-    assert not set(known[0]) <= set(known[-1])
 
 
 def dense_scans(rng):

@@ -1,7 +1,6 @@
 """Plots one by one: the tracks of a scene, and what comes of clocks that jump, silence, repetition, strangers."""
 
 import math
-import re
 from collections import Counter
 from dataclasses import replace
 
@@ -10,13 +9,11 @@ import pytest
 
 from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
-from assoc.metrics import tracks_of_one_identity
 from assoc.recordings import Window
 from assoc.scene import Scene
-from assoc.sensors import Platform, PositionSensor, Radar3D
+from assoc.sensors import Platform, Radar3D
 from assoc.simulation import observe, simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
-from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.offline.plots import track_plots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
@@ -142,30 +139,6 @@ def test_the_silence_of_a_radar_is_no_miss(scene):
     ]
 
 
-def test_without_turns_a_sensor_looks_when_it_speaks():
-    still = simulate("crowd", 2, targets=5, scans=8, width=20_000.0)
-    tracker, told = live(still, turns=None)
-    pictures = fed(tracker, replayed(still, 0.0))
-    assert len(pictures[-1].tracks) == 5 and not told
-
-
-def test_reports_miss_nothing_where_the_sectors_say_so():
-    seen = radar(crossing(0))
-    ais = PositionSensor(position=np.zeros(3), noise=[10.0, 10.0], field_of_view=[[-2e4, 2e4]] * 2,
-                         detection_probability=0.9, false_alarm_rate=0.1, name="AIS")  # fmt: skip
-    for sectors, best in ((None, False), ([[(-math.pi, math.pi), (0.0, 0.0)]], True)):
-        scene = Scene([seen, ais], [0.0], [[[], []]], region=[[-2e4, 2e4], [-2e4, 2e4], [0, 1]], sectors=sectors)
-        tracker, _ = live(scene, turns=None)
-        pictures = []
-        for k in range(40):
-            # the radar sees one target every four seconds, the reports are of another
-            if k % 4 == 0:
-                pictures += tracker.take("1", k, [6e3, 0.3 + 1e-4 * k])
-            pictures += tracker.take("AIS", k + 0.5, [-6e3, 1e3 + k])
-        tracks = [track for track in pictures[-1].tracks if track.position[0] > 0.0]
-        assert any(track.reported for track in tracks) == best, tracks
-
-
 def test_what_is_refused(scene):
     for options, words in [
         ({"turns": [4.0]}, "turns: expected one for each of 3 sensors"),
@@ -176,16 +149,6 @@ def test_what_is_refused(scene):
     ]:
         with pytest.raises(InvalidInputError, match=words):
             live(scene, **options)
-
-
-def test_times_that_are_no_seconds_are_left_out(scene):
-    """Of microseconds since 1970 a tenth is less than a number can tell."""
-    tracker, told = live(scene, interval=0.1)
-    plot = next(replayed(scene, 0.0))
-    for time in (1.7e15, 1.7e15 + 1.0, -math.inf):
-        assert tracker.take("1", time, plot.values) == []
-    assert tracker.counts["unusable"] == 3 and "its time is 1.7e+15, expected seconds" in told[0]
-    assert tracker.finish() == []
 
 
 def partition(tracks):
@@ -235,85 +198,6 @@ def test_identities_give_the_tracks_of_the_recording(name):
         assert ("were used" in live.summary()) == (how == "use")
         found[how] = partition(taken)
     assert found["use"] != found["ignore"] and set(found["use"][20:]) == {1, 2}
-
-
-def test_identities_that_are_none_are_told():
-    recording = crossing(0)
-    place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
-    told = []
-    live = LiveTracker(place, lambda: TRACKERS["mht"]([radar(recording)]), tell=told.append)
-    for pair in ((-2, 0), (0, 2 * 10**9), (0.5, 0), (1,), "use", None):
-        live.take("1", 0.0, recording.measurements[0], pair)
-    assert live.counts["unusable"] == 6 and len(told) == 1 and "identities" in told[0]
-    live.take("1", 0.0, recording.measurements[0])
-    live.finish()
-    assert "identity" not in live.summary()
-
-
-def test_kept_identities_are_those_of_the_metric():
-    rng = np.random.default_rng(5)
-    for column in (0, 1):
-        n = 400
-        tracks, sure = rng.integers(0, 12, n), rng.random(n) < 0.7
-        codes = np.where(rng.random(n) < 0.6, 1 + tracks, rng.integers(0, 9, n))
-        expected = tracks_of_one_identity(np.where(codes > 0, codes, -1), np.where(tracks > 0, tracks, -1), sure)
-        told = np.zeros((n, 2), dtype=np.int64)
-        told[:, column] = codes
-        judge = KeptIdentities()
-
-        def feed(judge=judge, given=(tracks, sure, told)):
-            for k in range(0, len(given[0]), 7):
-                of, known, codes = (one[k : k + 7] for one in given)
-                judge.take(of, known, np.full(len(of), float(k)), codes)
-                assert k < 200 or judge.counts()[1] > 5
-
-        feed()
-        assert 0 < expected[0] < expected[1] and judge.counts() == expected
-        # what is judged is counted once, and forgotten
-        judge.settle({1, 2}, 1e9)
-        assert judge.counts() == expected
-        judge.settle(set(), 1e9)
-        feed()
-        assert judge.counts() == (2 * expected[0], 2 * expected[1])
-
-
-@pytest.mark.parametrize("time", [5_000.0, -5_000.0])
-def test_a_plot_that_is_repeated_does_not_agree_with_itself(scene, time):
-    tracker, told = live(scene)
-    plots = list(replayed(scene, 0.0))
-    for plot in plots[:20]:
-        tracker.take(*plot)
-    for _ in range(30):
-        assert tracker.take(*plots[0]._replace(time=time)) == []
-    assert tracker.counts["repeated"] == 29 and not any("tracks begin anew" in line for line in told)
-
-
-def test_a_plot_without_values_is_left_out(scene):
-    tracker, told = live(scene)
-    assert tracker.take("1", 1.0, []) == []
-    assert tracker.counts["unusable"] == 1 and told[0].endswith(
-        "left out: measurements of sensor 0 must have 3 values; further ones are only counted"
-    )
-
-
-def test_what_is_heard_of_each_sensor(scene):
-    tracker, _ = live(scene)
-    plots = [*replayed(scene, 0.0)]
-    first = next(plot for plot in plots if plot.sensor == "1")
-    tracker.take("1", first.time, first.values[:1])
-    tracker.take(*first[:3])
-    tracker.take(*first[:3])
-    one, two, _ = tracker.heard
-    assert one == (scene.sensors[0].name, first.time, 1, 2, False, (0,))
-    assert two == (scene.sensors[1].name, -math.inf, 0, 0, False, (1,))
-    tracker.take("2", first.time, first.values)
-    for plot in plots:
-        if plot.sensor != "2":
-            tracker.take(*plot)
-    for plot in plots:
-        if plot.sensor == "1":
-            tracker.take("1", plot.time + 35.0, plot.values)
-    assert [one.silent for one in tracker.heard] == [False, True, True]
 
 
 def pictured(pictures):
@@ -448,46 +332,3 @@ def test_own_positions_of_a_ship(tmp_path):
         late.finish()
         silent = ["ship has had no own position since 3 s: it goes on as then"] if until > 0 else []
         assert told == silent and late.counts["steps failed"] == 0
-
-
-def test_own_positions_that_cannot_be_are_left_out():
-    _, scene, ship = at_sea()
-    for bad, line in (
-        ((10.0, [9e3, 0, 0], 0.5), "jumps, with"),
-        ((10.0, [0.0, 0, 0], 45.0), "45: degrees"),
-        ((10.0, [0.0, 0, 0], None), "has no heading"),
-        ((4.0, [0.0, 0, 0], 0.5), "is not newer than that of 9 s"),
-        ((10.0, [0.0, math.nan, 0], 0.5), "position"),
-        ((math.inf, [0.0, 0, 0], 0.5), "expected seconds"),
-    ):
-        tracker, told = live(scene, turns=None)
-        for row in own_positions(ship, 9.0):
-            tracker.take_own_position("ship", *row)
-        tracker.take_own_position("ship", *bad)
-        (path,) = tracker.state.own_positions.paths.values()
-        assert len(told) == 1 and line in told[0] and path.poses[-1].time == 9.0
-        assert tracker.counts["own positions"] == 1
-    # what the next position confirms was none; and a clock that goes back starts anew
-    tracker.take_own_position("ship", 10.0, [9e3, 0, 0], 0.5)
-    tracker.take_own_position("ship", 11.0, [9e3, 10, 0], 0.5)
-    (path,) = tracker.state.own_positions.paths.values()
-    assert [pose.time for pose in path.poses] == [10.0, 11.0]
-    tracker.take_own_position("ship", -100.0, [0.0, 0, 0], 0.5)
-    assert [pose.time for pose in tracker.state.own_positions.paths[0].poses] == [-100.0]
-    tracker, told = live(replace(scene, sensors=[replace(scene.sensors[0], platform=None)]), turns=None)
-    tracker.take_own_position("ship", 1.0, [0.0, 0, 0], 0.5)
-    tracker.take_own_position("boat", 1.0, [0.0, 0, 0], 0.5)
-    assert told == ["own position for 'ship' left out: the sensor is on no platform; further ones are only counted"]
-
-
-@pytest.mark.parametrize(
-    ("axis", "factor", "said"), [(0, 1e-3, "kilometres|another unit"), (1, 57.3, "degrees"), (0, 1.0, None)]
-)
-def test_units_that_are_hardly_meant_are_told_once(scene, axis, factor, said):
-    tracker, told = live(scene)
-    for plot in [*replayed(scene, 0.0)][:200]:
-        values = np.array(plot.values)
-        values[axis] *= factor
-        tracker.take(plot.sensor, plot.time, values)
-    doubts = [line for line in told if line.startswith("warning: ")]
-    assert len(doubts) == (len(scene.sensors) if said else 0) and all(re.search(said, line) for line in doubts), doubts

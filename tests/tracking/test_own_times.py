@@ -7,10 +7,8 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
-from assoc.sensors import BearingSensor, Radar3D
 from assoc.simulation import simulate
-from assoc.tracking import TRACKERS, Initiation, LifeCycle, track_scene
-from experiments.trackers.judging import OracleTracker
+from assoc.tracking import TRACKERS, Initiation, LifeCycle
 from tests.sizes import sample
 from tests.tracking import plain
 
@@ -102,17 +100,6 @@ def test_a_miss_is_charged_once_a_look(kind):
     assert tracker.tracks[0].score == pytest.approx(before.score + math.log(0.2 * 0.1), abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_scans_in_which_nobody_looked_do_not_count(kind):
-    cycle = LifeCycle(confirmation="m-of-n", m=2, n=2, deletion="count", deletion_count=2)
-    tracker = make(kind, SENSORS[:1], life_cycle=cycle)
-    tracker.step(0.0, [at(0.0)[None]], sectors=[[0.0, 2 * math.pi]])
-    for k in range(1, 6):
-        tracker.step(float(k), [np.zeros((0, 3))], sectors=[[0.0, 0.0]])
-    tracker.step(6.0, [at(6.0)[None]], sectors=[[0.0, 2 * math.pi]])
-    assert [track.confirmed for track in tracker.tracks if track.hits == 2] == [True]
-
-
 @sample("kind", KINDS, every=6)
 def test_the_patience_counts_looks_not_scans(kind):
     """Ten scans for a turn: a track lives on though it is seen in one of them only."""
@@ -130,55 +117,6 @@ def test_the_patience_counts_looks_not_scans(kind):
     for k in range(200, 320):
         tracker.step(float(k), [np.zeros((0, 3))], sectors=[[2 * math.pi * k / 10, 2 * math.pi * (k + 1) / 10]])
     assert not tracker.tracks
-
-
-def test_scores_are_the_logarithms_of_the_predictive_densities():
-    rng = np.random.default_rng(4)
-    tracker = make("nearest-neighbour")
-    tracker.step(0.0, [at(0.0)[None], np.zeros((0, 3)), np.zeros((0, 3))])
-    (before,) = tracker.tracks
-    mean, cov = before.mean, before.covariance
-    times, expected = np.array([0.9, 0.2, 0.6]), before.score
-    z = [rng.normal(at(t), s.noise)[None] for t, s in zip(times, SENSORS, strict=True)]
-    tracker.step(1.0, z, [np.array([t]) for t in times])
-    now = 0.0
-    for s in np.argsort(times):
-        mean, cov, density = plain.correct(*plain.predict(mean, cov, times[s] - now), z[s][0], SENSORS[s].covariance)
-        now = times[s]
-        one = SENSORS[s]
-        expected += density + math.log(one.detection_probability * one.volume / one.false_alarm_rate)
-    assert tracker.tracks[0].score == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_bearing_before_the_radar_that_begins_the_track_is_used():
-    radar = Radar3D(position=[0, 0, 0], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], [-math.pi, math.pi], [0, 1.5]])
-    bearing = BearingSensor(position=[0, 0, 0], noise=[1e-4])
-    place = np.array([[20_000.0, 20_000.0, 5_000.0]])
-    tracker = TRACKERS["multi-sensor"]([bearing, radar])
-    truth = bearing.measure(place), radar.measure(place) + [0.0, 1e-3, 0.0]
-    step = tracker.step(2.0, list(truth), [np.array([1.0]), np.array([1.5])])
-    assert step.assigned[0].tolist() == step.assigned[1].tolist() == [1]
-    # across the line of sight: the radar's place p at 1.5 s, and the bearing's half a second before, by p - v / 2
-    ground = math.hypot(*place[0, :2])
-    rows = np.array([[1.0, 0.0], [1.0, -0.5], [0.0, 1.0]]) / np.array([[1e-3 * ground], [1e-4 * ground], [300.0]])
-    p, v = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0]), rcond=None)[0]
-    (track,) = tracker.tracks
-    across = (track.position - place[0]) @ [-1, 1, 0] / math.sqrt(2)
-    assert across == pytest.approx(p + v / 2, rel=0.02)
-    assert len(tracker.tracks) == 1 and track.time == 2.0
-
-
-@pytest.mark.slow
-def test_all_trackers_follow_rotating_radars_like_the_oracle():
-    scene = simulate("rotating-radars", 0, aircraft=6, duration=40.0, interval=4.0)
-    oracle = OracleTracker(scene)
-    expected, _ = track_scene(oracle, scene)
-    for kind in KINDS:
-        found, _ = track_scene(TRACKERS[kind].for_scene(scene), scene)
-        places = [table.arrays()[2][table.arrays()[0] == 40.0] for table in (expected, found)]
-        assert len(places[1]) == 6, kind
-        nearest = np.linalg.norm(places[0][:, None] - places[1][None], axis=2).min(axis=1)
-        assert nearest.max() < 60.0, kind
 
 
 def test_what_is_refused():

@@ -1,6 +1,5 @@
 """Quality of tracks: NIS and NEES against their mean, hits by sensor, alarms."""
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +8,8 @@ import pytest
 from assoc import filters
 from assoc.filters import Gaussian
 from assoc.simulation.observation import observe
-from assoc.tracking import TRACKERS, Track, TrackTable, track_scene
+from assoc.tracking import TRACKERS, track_scene
 from assoc.tracking.quality import Qualities
-from assoc.tracking.records.track import TrackColumns
 from tests.tracking import plain
 
 
@@ -73,37 +71,3 @@ def test_nis_is_that_of_the_prediction_also_at_times_of_its_own():
     expected = off @ np.linalg.solve(spread[:3, :3] + sensor.covariance, off) / 3
     assert qualities.of_track(1).nis == pytest.approx(expected)
     assert qualities.of_track(1).hits.tolist() == [1]
-
-
-def test_tracks_as_columns_have_the_status_of_tracks():
-    rng, count = np.random.default_rng(3), 500
-    tracks = [
-        Track(
-            number, 1.0, np.zeros(2), np.eye(2), np.zeros(3), np.zeros(3), bool(rng.random() < 0.7), 0.0,
-            int(rng.integers(0, 9)), 0.0, 0.0, float(rng.random()), int(rng.integers(0, 4)),
-            float(rng.choice([0.0, 5.0])),
-        )
-        for number in range(count)
-    ]  # fmt: skip
-    columns = TrackColumns.of(tracks)
-    assert columns.status.tolist() == [track.status for track in tracks]
-    assert {*columns.status.tolist()} == {"tentative", "confirmed", "coasting", "lost"}
-    assert columns.reported.tolist() == [track.reported for track in tracks]
-
-
-def test_a_track_is_named_by_the_code_that_it_had_most():
-    rng, table, counted = np.random.default_rng(4), TrackTable(), {}
-    for _ in range(50):
-        ids, codes = rng.integers(-1, 4, 30), rng.integers(0, 4, 30)
-        table.count_identities(ids, np.stack([codes, np.zeros(30, np.int64)], axis=1))
-        for number, code in zip(ids.tolist(), codes.tolist(), strict=True):
-            if number > 0 and code:
-                counted.setdefault(number, Counter())[code] += 1
-    table.name_by_identities()
-    expected = {number: ("", f"{one.most_common(1)[0][0]:04o}") for number, one in counted.items()}
-    assert table.identities == expected
-    # of equals the first
-    table = TrackTable()
-    table.count_identities(np.array([1, 1, 1, 1]), np.array([[7, 0], [3, 0], [3, 0], [7, 0]]))
-    table.name_by_identities()
-    assert table.identities == {1: ("", "0007")}

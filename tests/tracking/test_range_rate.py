@@ -1,7 +1,6 @@
 """Range rates: smaller errors of the velocity in all trackers, and crossing targets that keep their tracks."""
 
 import numpy as np
-import pytest
 
 from assoc import simulation
 from assoc.sensors import Radar3D
@@ -50,26 +49,3 @@ def crossing(doppler, seed):
     places, speeds = [start + t * velocity for t in times], [velocity] * len(times)
     rng = np.random.default_rng(seed)
     return observe([radar], times, [np.arange(2)] * len(times), places, rng, velocities=speeds)
-
-
-def kept(doppler, seed, name):
-    """How many measurements of targets went to a track that had the other target's measurements before."""
-    scene = crossing(doppler, seed)
-    tracker, owner, wrong, total = TRACKERS[name].for_scene(scene), {}, 0, 0
-    for k in range(scene.num_scans):
-        scan = scene.scan(k)
-        step = tracker.step(scan.time, scan.measurements)
-        for decided in step.final:
-            source = scene.scan(decided.scan).sources[0]
-            for track, target in zip(decided.assigned[0].tolist(), source.tolist(), strict=True):
-                if track and target >= 0:
-                    total += 1
-                    wrong += owner.setdefault(track, target) != target
-    return wrong / max(total, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["nearest-neighbour", "mht", "multi-sensor"])
-def test_crossing_targets_keep_their_tracks(name):
-    plain, doppler = (np.mean([kept(on, seed, name) for seed in range(6)]) for on in (False, True))
-    assert doppler < 0.03 and doppler <= plain

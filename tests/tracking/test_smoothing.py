@@ -1,19 +1,15 @@
 """Smoothed tracks against one large linear system, and against the truth."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from assoc import InvalidInputError, filters, simulation
-from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
-from assoc.recordings import clustering_time_window, radar_of
+from assoc import filters
 from assoc.scene import Scene
-from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoothed, track_scene
+from assoc.tracking import Decision, MultiSensorTracker, smoothed
 from assoc.tracking.offline.ended_smoothing import EndedSmoothing
-from assoc.tracking.offline.plots import track_plots
 from tests.tracking import plain
 
 
@@ -65,36 +61,6 @@ def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements(own_times
     assert frame["last_detection"].tolist() == [0.0, 1.0, 1.0, 3.0, 5.0]
 
 
-def test_smoothing_brings_tracks_nearer_to_the_truth():
-    scene = simulation.simulate("three-radar", 4, scans=25)
-    tracker = TrackOrientedMHT.for_scene(scene)
-    table, decisions = track_scene(tracker, scene)
-    truth = Trajectories.from_scene(scene)
-
-    def off(one):
-        return mean_gospa(gospa_over_time(truth, Trajectories(*one.arrays()), 500.0)[1])["localisation"]
-
-    later = smoothed(tracker, scene, decisions)
-    assert off(later) < 0.85 * off(table) and not later.targets
-    # where the truth has names, smoothed tracks say whom they followed, as others do
-    names = {int(i): f"target {i}" for i in np.unique(np.concatenate(scene.truth.target_ids))}
-    told = smoothed(tracker, replace(scene, truth=replace(scene.truth, names=names)), decisions)
-    assert told.targets and {*told.targets.values()} <= {*names.values()}
-    assert "target" in told.to_frame().columns
-
-
-def test_decisions_of_other_scans_are_refused():
-    """One sensor that sees its one target always: the measurements of any scans would make a track."""
-    places = [np.array([[300.0 + 20.0 * k, 400.0, 200.0]]) for k in range(12)]
-    scene = Scene(
-        sensors=[plain.sensor()], times=np.arange(12.0), measurements=[[z] for z in places], region=plain.REGION
-    )
-    tracker = MultiSensorTracker.for_scene(scene)
-    _, decisions = track_scene(tracker, scene, scans=range(6, 12))
-    with pytest.raises(InvalidInputError, match="decisions: that of scan 0 is of another scan"):
-        smoothed(tracker, scene, decisions)
-
-
 def test_ended_tracks_wait_for_late_decisions():
     """Two targets, one after the other; decisions come three windows late, and it is asked after each window."""
     times, path = np.arange(12.0), [np.array([[300.0 + 20.0 * k, 400.0, 200.0]]) for k in range(12)]
@@ -112,26 +78,3 @@ def test_ended_tracks_wait_for_late_decisions():
     assert [len(frame) for frame in found] == [0] * 8 + [6, 0, 0, 6]
     whole = smoothed(tracker, scene, decisions, altitudes={}).to_frame()
     assert pd.concat(found, ignore_index=True).equals(whole)
-
-
-def test_plots_with_times_of_their_own_are_smoothed():
-    """Of two aircraft with heights: a row for each plot, at its time, and nearer to the truth."""
-    simulated = simulation.simulate_recording("rotating-radar", 1, traffic="crossing", duration=300.0)
-    recording, filter = (
-        simulated.recording,
-        filters.ExtendedKalmanFilter(filters.ConstantVelocity(5.0, 2, "continuous")),
-    )
-    windows = clustering_time_window(recording, 9.5)
-
-    def tracks(smooth):
-        tracker = TrackOrientedMHT([radar_of(recording)], filter)
-        return track_plots(tracker, recording, windows, smooth=smooth).table.to_frame()
-
-    def bends(frame):
-        one = frame[frame.track_id == frame.track_id.mode()[0]]
-        return np.abs((np.diff(one.heading) + 180.0) % 360.0 - 180.0).mean()
-
-    table, later = tracks(False), tracks(True)
-    assert len(set(later.time) & set(recording.times)) > 0.8 * len(later)
-    assert (later.groupby("track_id").time.diff().dropna() >= 0).all()
-    assert bends(later) < 0.5 * bends(table)

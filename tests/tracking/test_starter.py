@@ -1,19 +1,11 @@
 """Trackers that decide each scan at once, of bearings alone: a starter that keeps hypotheses begins their tracks."""
 
 import numpy as np
-import pytest
 
 from assoc import simulation
-from assoc._files.npz import save_npz
-from assoc.errors import InvalidInputError
 from assoc.filters import Gaussian
-from assoc.scene import Scan
-from assoc.tracking import TRACKERS, LatePlots
-from assoc.tracking.file import FORMAT, VERSION, file_arrays
-from assoc.tracking.progress import Progress, Work
+from assoc.tracking import TRACKERS
 from assoc.tracking.records.ghosts import Unseen
-from assoc.tracking.records.track import Step
-from assoc.tracking.stages.starter import partners
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
@@ -63,38 +55,6 @@ def test_ids_and_decisions_go_on_when_tracks_are_taken_over(name):
     assert all(track.hits >= 8 for track in tracker.tracks if track.confirmed)
 
 
-def test_a_starter_of_another_time_is_refused(tmp_path):
-    scene, path = bearings(1002, 2), tmp_path / "state.npz"
-    one, two = (TRACKERS["static"].for_scene(scene) for _ in range(2))
-    stepped(one, scene)
-    arrays = file_arrays(one.settings, one.state)
-    save_npz(path, FORMAT, VERSION, arrays | {"nursery.time": arrays["nursery.time"] - 1.0})
-    with pytest.raises(InvalidInputError, match="nursery.time"):
-        two.restore(path)
-    assert two.time is None
-
-
-def test_late_bearings_are_put_in_their_place():
-    """A sensor's bearings of one scan come late: the tracks keep their ids."""
-    scene = bearings(1001, 9)
-    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), horizon=40.0)
-    nothing = [np.zeros((0, 1))] * 2
-    for k in range(9):
-        scan = scene.scan(k)
-        if k != 5:
-            late.step(scan.time, scan.measurements)
-            continue
-        before = {track.track_id for track in late.tracks if track.reported}
-        late.step(scan.time, [*scan.measurements[:2], np.zeros((0, 1))])
-        late.step(scan.time + 1.0, [np.zeros((0, 1))] * 3, None, np.zeros((3, 2)))
-        stamps = np.full(len(scan.measurements[2]), scan.time + 0.5)
-        step = late.step(
-            scan.time + 2.0, [*nothing, scan.measurements[2]], [np.zeros(0)] * 2 + [stamps], np.zeros((3, 2))
-        )
-        assert step.late == len(stamps) and set(step.assigned[2][step.confirmed[2]].tolist()) <= before
-    assert {track.track_id for track in late.tracks if track.reported} == before and len(before) == 3
-
-
 def test_ghosts_are_what_a_sensor_does_not_see():
     """Counted anew by hand: rows of misses of three sensors with P_D 0.9, 0.9 and 0.5."""
     miss = np.log([0.1, 0.1, 0.5])
@@ -142,25 +102,3 @@ def test_a_ghost_that_a_sensor_never_sees_ends(name):
     # four looks of the sensor that does not see it: 0.05 ** 4 is below 1e-4; in the last the bearings are free again
     assert fed[:3] == [[True, False, True]] * 3 and not np.any(fed[3:]) and ended == [1]
     assert found(tracker, targets) == (2, 0)
-
-
-def test_partners_of_a_ghost_are_those_that_swapped():
-    """Track 67 has a bearing of either target, 58 the other one of the first; 47 has its own three."""
-    scene = bearings(0, 2)
-    targets = np.array([[40e3, 70e3, 5e3], [60e3, 50e3, 5e3], [25e3, 30e3, 5e3]])
-    tracker = TRACKERS["nearest-neighbour"].for_scene(scene)
-    scan = Scan(0, 0.0, tuple(sensor.measure(targets) for sensor in scene.sensors))
-    progress = Progress(tracker.settings, tracker.state, scan, Work(tracker.settings, tracker.state))
-    ids = (np.array([58, 67, 47]), np.array([67, 58, 47]), np.array([0, 58, 47]))
-    step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
-    assert partners(progress, step, np.array([67])).tolist() == [58, 67]
-    # where nothing is swapped there is no partner
-    ids = (np.array([0, 58, 47]), np.array([67, 58, 47]), np.array([67, 58, 47]))
-    step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
-    assert partners(progress, step, np.array([67])).tolist() == []
-
-
-def test_sensors_that_start_tracks_have_no_starter():
-    scene = simulation.simulate("three-radar", 0, scans=2)
-    assert not any(TRACKERS[name].for_scene(scene).settings.starter for name in STARTING)
-    assert all(TRACKERS[name].for_scene(bearings(0, 2)).settings.starter for name in STARTING)

@@ -88,14 +88,6 @@ def test_a_tracker_saved_in_the_middle_of_a_scene_goes_on(kind, name, options, c
     assert content(plain) == content(other)
 
 
-def test_numbers_of_numpys_are_the_same_settings(tmp_path):
-    one = scene("three-radar")
-    options = {"depth": 3, "max_branches": 20, "branch_drop": 6.0, "gate_probability": 0.99, "max_tuples": 1000}
-    TRACKERS["mht"].for_scene(one, **options).save(tmp_path / "state.npz")
-    numpys = {name: np.array(value)[()] for name, value in options.items()}
-    TRACKERS["mht"].for_scene(one, **numpys).restore(tmp_path / "state.npz")
-
-
 def test_a_file_of_version_1_is_refused(tmp_path):
     tracker, path = TRACKERS["mht"].for_scene(scene("three-radar")), tmp_path / "state.npz"
     np.savez(path, format=np.array(FORMAT), version=np.array(1), settings=np.array("{}"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assoc import InvalidInputError, Scene, simulation
+from assoc import Scene, simulation
 from assoc._cli.track import options
 from assoc.filters import FreeFlight
 from assoc.sensors import Radar2D, Radar3D
@@ -59,13 +59,6 @@ def test_priors_of_a_kind():
     given = MultiSensorTracker.for_scene(scene, targets="ship", initiation=Initiation(speed=9.0)).settings
     assert np.max(given.initiation.speed) == 9.0 and described(given.filter) == described(ship.filter)
     assert tuple(TARGETS) == options.TARGETS
-
-
-def test_unknown_kinds():
-    with pytest.raises(InvalidInputError, match="targets: unknown name 'boat'; known: airliner"):
-        MultiSensorTracker.for_scene(harbour(scans=2), targets="boat")
-    with pytest.raises(InvalidInputError, match="auto needs a scene"):
-        target_kind("auto", None, NearestNeighbourTracker.for_scene)
 
 
 def arcs(speed, up, height, scans=40):

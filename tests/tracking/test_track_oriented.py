@@ -3,13 +3,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from assoc import InvalidInputError
 from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.tracking import LifeCycle, TrackOrientedMHT
 from tests.tracking import plain
 
-ALL = 1 - 1e-12
 SEEDS = (0, 4, 5)
 
 
@@ -54,42 +52,6 @@ def test_late_decisions_are_those_of_enumeration(seed, solver):
         for label in set(final[k].assigned[0].tolist()) - {0}:
             parts.add((k, *np.flatnonzero(final[k].assigned[0] == label) + 1))
     assert parts == {(k, t[1][k]) for t in tracks for k in (1, 2) if t[1][k]}
-
-
-def test_each_plot_may_have_its_own_time():
-    rng = np.random.default_rng(3)
-    own, R = tracker(depth=1), plain.sensor().covariance
-    place, velocity = np.array([[200.0, 300, 100], [700.0, 600, 300]]), np.array([[20.0, 5, 0], [-15.0, 10, 0]])
-    wanted, last = [None, None], [0.0, 0.0]
-    for k in range(12):
-        stamps = 5.0 * k + np.sort(rng.uniform(0, 4, 2))
-        z = place + stamps[:, None] * velocity + rng.normal(0, 10, (2, 3))
-        step = own.step(5.0 * k + 4.5, [z], [stamps])
-        for i in range(2):
-            if k == 0:
-                wanted[i] = plain.start(z[i], R)
-            else:
-                wanted[i] = plain.correct(*plain.predict(*wanted[i], stamps[i] - last[i]), z[i], R)[:2]
-            last[i] = stamps[i]
-    assert step.assigned[0].tolist() == [1, 2] and step.confirmed[0].all()
-    for track, state, when in zip(own.tracks, wanted, last, strict=True):
-        mean, covariance = plain.predict(*state, own.time - when)
-        np.testing.assert_allclose(track.mean, mean, rtol=1e-7, atol=1e-7)
-        np.testing.assert_allclose(track.covariance, covariance, rtol=1e-7, atol=1e-7)
-        assert track.last_detection == pytest.approx(when)
-
-
-def test_times_outside_the_scan_are_refused():
-    own = tracker()
-    own.step(10.0, [np.zeros((0, 3))])
-    with pytest.raises(InvalidInputError, match="times of sensor 0 must lie from"):
-        own.step(20.0, [np.array([[1.0, 2, 3]])], [np.array([9.0])])
-
-
-@pytest.mark.parametrize("wrong", [{"depth": 0}, {"max_branches": 1.5}, {"branch_drop": -1.0}, {"gate_probability": 1}])
-def test_settings_out_of_range(wrong):
-    with pytest.raises(InvalidInputError, match=next(iter(wrong))):
-        tracker(**wrong)
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError, filters, simulation
-from assoc.sensors import PositionSensor, Radar2D
+from assoc.sensors import PositionSensor
 from assoc.tracking import (
     TRACKERS,
     LifeCycle,
@@ -16,9 +16,6 @@ from assoc.tracking import (
     TrackOrientedMHT,
 )
 from assoc.tracking.file import file_arrays
-from assoc.tracking.filter_choice import two_speeds
-from assoc.tracking.records.life_cycle import count_bits
-from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
@@ -28,13 +25,6 @@ KINDS = list(TRACKERS.values())
 @cache
 def scene(scans=8, seed=1):
     return simulation.simulate("three-radar", seed, scans=scans)
-
-
-def same(one, other):
-    assert [t.track_id for t in one.tracks] == [t.track_id for t in other.tracks]
-    for a, b in zip(one.tracks, other.tracks, strict=True):
-        assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
-        assert (a.score, a.confirmed, a.hits, a.started) == (b.score, b.confirmed, b.hits, b.started)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -96,17 +86,6 @@ def test_the_order_of_the_sensors_matters_little(kind):
     sigma = np.sqrt(max(t.covariance[:3, :3].trace() for t in found))
     for other in positions[1:]:
         np.testing.assert_allclose(positions[0], other, atol=0.1 * sigma)
-
-
-def test_a_target_is_no_formula_in_a_spreadsheet(tmp_path):
-    table = TrackTable()
-    tracker = MultiSensorTracker.for_scene(scene())
-    stepped(tracker, scene())
-    table.add(tracker.tracks[:1])
-    table.targets = {tracker.tracks[0].track_id: "=1+1"}
-    table.to_csv(tmp_path / "tracks.csv")
-    assert (tmp_path / "tracks.csv").read_text().splitlines()[1].endswith(",'=1+1")
-    assert table.to_frame()["target"].tolist() == ["=1+1"]
 
 
 @sample("kind", KINDS, every=3)
@@ -214,92 +193,54 @@ def test_planar_states():
         np.testing.assert_allclose(track.velocity, [100, 0, 0], atol=2)
 
 
+NONE = np.zeros((0, 3))
+
+
 @pytest.mark.parametrize(
-    "sensor",
+    ("time", "measurements", "message"),
     [
-        PositionSensor(position=np.zeros(3), noise=[8.0, 8.0], field_of_view=[[-1e3, 1e3], [-1e3, 1e3]]),
-        Radar2D(position=np.zeros(3), noise=[5.0, 0.01], field_of_view=[[0.0, 1e3], [-np.pi, np.pi]]),
+        (4.0, [NONE] * 3, "time must not run backwards: got 4 s after 5 s"),
+        ("1", [NONE] * 3, "time must be a finite number"),
+        (np.nan, [NONE] * 3, "time must be a finite number"),
+        (6.0, [NONE] * 2, "measurements of 2 sensors, expected 3"),
+        (6.0, [NONE, np.zeros((2, 2)), NONE], r"measurements of sensor 1 must have shape \(2, 3\)"),
+        (6.0, [np.full((1, 3), np.nan), NONE, NONE], "measurements of sensor 0 must be finite"),
     ],
-    ids=lambda sensor: sensor.kind,
 )
-@pytest.mark.parametrize("kind", KINDS)
-def test_one_sensor_starts_tracks_in_a_low_region(kind, sensor):
-    """The unmeasured height makes births no more likely than joining a track of one scan."""
-    times = 1.7 * np.arange(10)
-    boat = np.stack([200 + 3 * times, 100 - 2 * times, 0 * times], axis=1)
-    tracker = kind([sensor], two_speeds(5.0, 2), region=[[-1e3, 1e3], [-1e3, 1e3], [-0.5, 0.5]])
-    for time, place in zip(times, boat, strict=True):
-        tracker.step(time, [sensor.measure(place[None])])
-    assert [track.confirmed for track in tracker.tracks] == [True]
+def test_bad_steps_are_refused_and_change_nothing(time, measurements, message):
+    tracker = MultiSensorTracker.for_scene(scene())
+    tracker.step(5.0, [NONE] * 3)
+    with pytest.raises(InvalidInputError, match=message):
+        tracker.step(time, measurements)
+    assert tracker.num_steps == 1
 
 
-class TestBadInput:
-    @pytest.fixture
-    def tracker(self):
-        return MultiSensorTracker.for_scene(scene())
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: MultiSensorTracker.for_scene(scene(), solver="acoo"), "unknown name 'acoo'; did you mean aco"),
+        (lambda: MultiSensorTracker.for_scene(scene(), "ekf"), "filter must be a filter"),
+        (
+            lambda: MultiSensorTracker.for_scene(scene(), life_cycle={"m": 3}),
+            "life_cycle must be a LifeCycle, got dict",
+        ),
+        (lambda: MultiSensorTracker.for_scene(scene(), time_limit=-1.0), "time_limit: expected seconds > 0, got -1.0"),
+        (lambda: MultiSensorTracker.for_scene(scene(), max_tuples=1e6), "max_tuples must be a whole number above 0"),
+        (lambda: LifeCycle(confirmation="x"), "confirmation must be 'score' or 'm-of-n'"),
+        (lambda: LifeCycle(m=5, n=4), "m <= n"),
+        (lambda: LifeCycle(deletion_time=-1.0), "deletion_time must be a number above 0"),
+    ],
+)
+def test_bad_settings_are_refused_at_once(make, message):
+    with pytest.raises(InvalidInputError, match=message):
+        make()
 
-    def test_time_backwards(self, tracker):
-        tracker.step(5.0, [np.zeros((0, 3))] * 3)
-        with pytest.raises(InvalidInputError, match="time must not run backwards: got 4 s after 5 s"):
-            tracker.step(4.0, [np.zeros((0, 3))] * 3)
 
-    @pytest.mark.parametrize("time", [np.nan, "1", None, True])
-    def test_time_is_no_number(self, tracker, time):
-        with pytest.raises(InvalidInputError, match="time must be a finite number"):
-            tracker.step(time, [np.zeros((0, 3))] * 3)
-
-    def test_number_of_sensors(self, tracker):
-        with pytest.raises(InvalidInputError, match="measurements of 2 sensors, expected 3"):
-            tracker.step(0.0, [np.zeros((0, 3))] * 2)
-
-    def test_shape_and_nan(self, tracker):
-        with pytest.raises(InvalidInputError, match=r"measurements of sensor 1 must have shape \(2, 3\)"):
-            tracker.step(0.0, [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros((0, 3))])
-        with pytest.raises(InvalidInputError, match="measurements of sensor 0 must be finite"):
-            tracker.step(0.0, [np.full((1, 3), np.nan), np.zeros((0, 3)), np.zeros((0, 3))])
-        assert tracker.num_steps == 0
-
-    def test_unknown_solver_and_filter(self):
-        with pytest.raises(InvalidInputError, match="unknown name 'acoo'; did you mean aco"):
-            MultiSensorTracker.for_scene(scene(), solver="acoo")
-        with pytest.raises(InvalidInputError, match="filter must be a filter"):
-            MultiSensorTracker.for_scene(scene(), "ekf")
-
-    @pytest.mark.parametrize(
-        ("wrong", "message"),
-        [
-            ({"life_cycle": {"m": 3}}, "life_cycle must be a LifeCycle, got dict"),
-            ({"initiation": 0.1}, "initiation must be an Initiation, got float"),
-            ({"time_limit": -1.0}, "time_limit: expected seconds > 0, got -1.0"),
-            ({"max_tuples": 0}, "max_tuples must be a whole number above 0, got 0"),
-            ({"max_tuples": 1e6}, "max_tuples must be a whole number above 0, got 1000000.0"),
-        ],
-    )
-    def test_settings_that_are_none(self, wrong, message):
-        """They are refused at once, not in a later scan."""
-        with pytest.raises(InvalidInputError, match=message):
-            MultiSensorTracker.for_scene(scene(), **wrong)
-
-    def test_saved_by_another(self, tracker, tmp_path):
-        tracker.save(tmp_path / "state.npz")
-        other = MultiSensorTracker.for_scene(scene(), gate_probability=0.99)
-        with pytest.raises(InvalidInputError, match=r"other settings: gate_probability was '0\.999', is '0\.99'"):
-            other.restore(tmp_path / "state.npz")
-
-    @pytest.mark.parametrize(
-        ("wrong", "message"),
-        [
-            ({"confirmation": "x"}, "confirmation must be 'score' or 'm-of-n'"),
-            ({"deletion": "x"}, "deletion must be"),
-            ({"m": 5, "n": 4}, "m <= n"),
-            ({"false_probability": 0.0}, "false_probability must be a number above 0"),
-            ({"deletion_time": -1.0}, "deletion_time must be a number above 0"),
-            ({"m": 1.5}, "m must be a whole number"),
-        ],
-    )
-    def test_life_cycle(self, wrong, message):
-        with pytest.raises(InvalidInputError, match=message):
-            LifeCycle(**wrong)
+def test_a_state_saved_under_other_settings_is_refused(tmp_path):
+    MultiSensorTracker.for_scene(scene()).save(tmp_path / "state.npz")
+    other = MultiSensorTracker.for_scene(scene(), gate_probability=0.99)
+    with pytest.raises(InvalidInputError, match=r"other settings: gate_probability was '0\.999', is '0\.99'"):
+        other.restore(tmp_path / "state.npz")
 
 
 def test_m_of_n_and_deletion_by_count():
@@ -318,18 +259,3 @@ def test_m_of_n_and_deletion_by_count():
         assert story[3:9] == [True] * 6
         assert not any(story[:3])
         assert story[9] is None
-
-
-def test_count_bits():
-    values = np.array([0, 1, 5, 2**61 + 3], dtype=np.int64).astype(np.uint64)
-    assert count_bits(values).tolist() == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize("name", sorted(TRACKERS))
-def test_columns_of_tracks_are_copies(name):
-    tracker = TRACKERS[name].for_scene(scene())
-    stepped(tracker, scene())
-    before, columns = str(tracker.tracks), tracker.track_columns()
-    for values in columns:
-        values[...] = 0
-    assert str(tracker.tracks) == before

@@ -14,7 +14,6 @@ from assoc.costs.tracks.unresolved import (
     resolutions,
     unresolved_probability,
 )  # fmt: skip
-from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.filters.base import Expected
 from assoc.sensors import PositionSensor
@@ -178,17 +177,3 @@ def test_only_pairs_that_were_seen_apart_are_two():
     for k in range(12, 20):
         tracker.step(float(k), [at + rng.normal(0.0, 10.0, (2, 2))])
     assert tracker.state.unresolved.apart.tolist() == [SURE]
-
-
-def test_damaged_pairs_are_refused(tmp_path):
-    scene, _ = flight()
-    tracker = MultiSensorTracker.for_scene(scene)
-    for k in range(40):
-        tracker.step(scene.times[k], scene.measurements[k])
-    tracker.save(tmp_path / "tracker.npz")
-    arrays = dict(np.load(tmp_path / "tracker.npz"))
-    assert len(arrays["unresolved.ids"])
-    for name, wrong in (("ids", -arrays["unresolved.ids"]), ("evidence", arrays["unresolved.evidence"][:, 1:])):
-        np.savez(tmp_path / "wrong.npz", **{**arrays, f"unresolved.{name}": wrong})
-        with pytest.raises(InvalidInputError, match=f"unresolved.{name}"):
-            MultiSensorTracker.for_scene(scene).restore(tmp_path / "wrong.npz")

@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc.costs.views import BANDS, Views, bands_of, log_missed, reach, share_in_view
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian
-from assoc.filters.imm import Mixture
-from assoc.filters.state import gaussian
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-from assoc.tracking import TRACKERS, LifeCycle
+from assoc.costs.views import share_in_view
+from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
+from assoc.sensors import Radar3D
+from assoc.tracking import TRACKERS
 from tests.sizes import sample
 
 REGION = np.array([[-30e3, 30e3], [-30e3, 30e3], [0.0, 10e3]])
@@ -70,48 +68,6 @@ def test_shares_are_those_of_samples(sector):
     assert np.ptp(shares) > 0.3 or sector == (3.0, 4.0)
 
 
-class Own(Radar3D):
-    """A user's class, without a compiled model."""
-
-
-def test_views_of_all_sensors_at_once_are_those_of_each():
-    rng, circle = np.random.default_rng(1), [[1e3, 9e3], [2.8, 4.0]]
-    narrow = [[2e3, 10e3], [-0.5, 0.2], [0.05, 0.6]]
-    values = {"position": np.zeros(3), "detection_probability": 0.9}
-    sensors = [
-        radar(0.0, 10e3, field_of_view=narrow),
-        Own(noise=[50.0, 1e-3, 1e-3], field_of_view=narrow, **values),
-        radar(0.0, 12e3),
-        Radar2D(noise=[50.0, 1e-3], field_of_view=circle, **values),
-        Radar3D(noise=[50.0, 1e-3, 1e-3, 5.0], field_of_view=[*narrow, [-300.0, 300.0]], **values),
-        PositionSensor(noise=[9.0] * 3, field_of_view=[[0.0, 5e3], [-1e3, 1e3], [0.0, 3e3]], **values),
-        BearingSensor(noise=[1e-3], field_of_view=[[3.0, 4.0]], **values),
-    ]
-    means = np.zeros((300, 2, 6))
-    means[:, :, 1::2] = rng.uniform([-11e3, -3e3, 1e3], [11e3, 3e3, 4e3], (300, 1, 3)) + rng.normal(0, 50, (300, 2, 3))
-    root = rng.normal(0.0, 200.0, (300, 2, 6, 6))
-    covariances = root @ root.transpose(0, 1, 3, 2)
-    mixture = Mixture(means, covariances, rng.dirichlet([1.0, 1.0], 300))
-    for states in (mixture, gaussian(means[:, 0].copy(), covariances[:, 0].copy()), mixture[:0]):
-        views, by_range = Views(sensors, (1, 3, 5)), rng.uniform(0.3, 1.0, (len(sensors), BANDS))
-        uneven = Views(sensors, (1, 3, 5), by_range)
-        where, spread = states.mean[:, [1, 3, 5]], states.covariance[:, [1, 3, 5]][:, :, [1, 3, 5]]
-        found, seen = views.shares(states), views.at_means(states) > 0.0
-        for s, sensor in enumerate(sensors):
-            np.testing.assert_allclose(found[:, s], share_in_view(sensor, where, spread), rtol=1e-9, atol=1e-12)
-            np.testing.assert_array_equal(views.shares(states, slice(s, s + 1))[:, 0], found[:, s])
-            relative = by_range[s, bands_of(sensor, where)] if reach(sensor) else 1.0
-            np.testing.assert_allclose(uneven.shares(states)[:, s], found[:, s] * relative, rtol=1e-9, atol=1e-12)
-            np.testing.assert_allclose(uneven.at_means(states)[:, s], seen[:, s] * relative, rtol=1e-9)
-            part = sensor.position_part
-            np.testing.assert_array_equal(seen[:, s], part.in_view(part.measure(where)))
-
-
-def test_a_miss_counts_by_the_share_in_view():
-    share = np.array([0.0, 0.5, 1.0])
-    np.testing.assert_allclose(log_missed(math.log(0.1), share), [0.0, math.log(0.55), math.log(0.1)])
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sensor_that_does_not_look_changes_nothing(kind):
     """Switched off, or one that reports on its own and is silent: a sector without width."""
@@ -141,16 +97,6 @@ def test_sensors_that_cannot_see_a_target_do_not_matter(kind, timed):
     assert len(found) == 1
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_at_the_edge_of_a_view_a_miss_is_half_a_miss(kind):
-    sensor = radar(0.0, 10e3, P=0.9)
-    tracker = make(kind, [sensor], life_cycle=LifeCycle(lifetime=1e9))
-    where = np.array([10e3 * math.cos(0.3), 0.0, 10e3 * math.sin(0.3)])
-    tracker.begin(0.0, Gaussian(np.append(where, np.zeros(3))[None], np.diag([50.0] * 3 + [1e-3] * 3)[None] ** 2))
-    tracker.step(0.0, [np.zeros((0, 3))])
-    assert tracker.tracks[0].score == pytest.approx(20.0 + math.log(0.55), abs=1e-3)
-
-
 @sample("kind", KINDS, every=3)
 def test_a_track_crosses_a_gap_between_views_under_its_id(kind):
     """Two radars that reach 12 km, 8 km of nothing between them; 40 s out of view."""
@@ -164,18 +110,6 @@ def test_a_track_crosses_a_gap_between_views_under_its_id(kind):
     for k in range(30, 45):
         tracker.step(4.0 * k, [np.zeros((0, 3))] * 2)
     assert not [track for track in tracker.tracks if track.confirmed]
-
-
-@sample("kind", KINDS, every=3)
-def test_a_track_that_leaves_views_and_region_ends(kind):
-    sensor = radar(reach=40e3)
-    tracker = make(kind, [sensor])
-    # downwards, through the ground
-    falling = Gaussian(np.array([[0.0, 0.0, 1e3, 0.0, 100.0, -600.0]]), np.diag([50.0] * 3 + [5.0] * 3)[None] ** 2)
-    tracker.begin(0.0, falling)
-    for k in range(1, 15):
-        tracker.step(4.0 * k, [np.zeros((0, 3))])
-    assert not tracker.tracks
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -197,19 +131,6 @@ def test_a_lost_track_is_taken_up_again_under_its_id(kind):
     assert set() in seen[10:20]
     assert len(other[39]) == 1 and other[39] != seen[39]
     assert any(seen[39] <= set(ids.tolist()) for ids in step.assigned)
-
-
-@sample("kind", KINDS, every=2)
-def test_a_target_that_moves_as_no_filter_expects_keeps_its_id(kind):
-    """As a recording with a gap does: 2 km to the side from one scan to the next."""
-    sensors, seen = [radar(-20e3, P=0.9), radar(20e3, P=0.9)], []
-    tracker = make(kind, sensors)
-    before = flight(sensors, 7, 12, (-14e3, 0.0, 5e3))
-    after = flight(sensors, 8, 24, (-14e3, 2e3, 5e3))
-    for time, z in [*before, *list(after)[12:]]:
-        tracker.step(time, z)
-        seen.append({track.track_id for track in tracker.tracks if track.reported})
-    assert seen[11] == seen[23] and len(seen[11]) == 1
 
 
 @sample("kind", KINDS, every=3)

@@ -9,8 +9,6 @@ import pytest
 from assoc import simulation
 from assoc.errors import LimitExceededError
 from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
-from assoc.tracking.filter_choice import two_speeds
-from assoc.tracking.progress import solver_options
 
 
 @pytest.fixture
@@ -37,28 +35,6 @@ def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
     assert rows(TRACKERS[name].for_scene(crowd), crowd) == quick
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"time_limit": 7.0}, {"time_limit": 7.0}),
-        ({"solver_parameters": {"nodes": 3}}, {"time_limit": None, "nodes": 3, "patience": 0, "gap": 1e-3}),
-        ({"solver": "greedy"}, {"time_limit": None}),
-    ],
-)
-def test_a_clock_that_is_asked_for_counts(scene, options, expected):
-    assert solver_options(MultiSensorTracker.for_scene(scene, **options).settings, 100) == expected
-
-
-def test_the_work_is_less_for_large_problems(scene):
-    settings = MultiSensorTracker.for_scene(scene).settings
-    # the starter of tracks asks the solver, too
-    for one in (settings, settings.starter):
-        found = [solver_options(one, count) for count in (0, 10, 10_000, 10_000_000)]
-        assert [each.pop("nodes") for each in found] == [500_000, 50_000, 50, 10]
-        assert [solver_options(one, count, 0.05)["nodes"] for count in (0, 10_000, 10_000_000)] == [25_000, 2, 1]
-        assert all(each == {"time_limit": None, "patience": 0, "gap": 1e-3} for each in found)
-
-
 @pytest.mark.parametrize("seed", (200, 201))
 def test_the_default_holds_a_target_through_five_g(seed):
     """The second target of the three-radar scene turns at 12 s and at 23 s."""
@@ -67,22 +43,6 @@ def test_the_default_holds_a_target_through_five_g(seed):
     frame = table.to_frame()
     assert frame.track_id.nunique() == 3
     assert (frame.groupby("track_id").size() >= 34).all()
-
-
-def test_two_speeds_believes_in_manoeuvres_when_there_is_one():
-    from assoc.filters import Gaussian
-    from assoc.sensors import PositionSensor
-
-    filter_ = two_speeds()
-    sensor = PositionSensor(position=np.zeros(3), noise=np.full(3, 30.0), field_of_view=[[-1e5, 1e5]] * 3)
-    state = filter_.start(Gaussian(np.array([[0.0, 0, 0, 300, 0, 0]]), np.diag([900.0] * 3 + [100.0] * 3)))
-    weights = []
-    for k in range(1, 31):
-        turn = max(k - 15, 0)
-        place = np.array([[300.0 * k, 25.0 * turn**2, 0.0]])
-        state = filter_.update(filter_.predict(state, 1.0), place, sensor).state
-        weights.append(state.weights[0, 1])
-    assert weights[14] < 0.1 and min(weights[17:]) > 0.6
 
 
 @pytest.mark.parametrize("own_times", [False, True])
