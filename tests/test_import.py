@@ -36,20 +36,6 @@ def test_public_names_resolve():
         assoc.solve_everything  # noqa: B018
 
 
-def test_package_does_not_import_the_program():
-    code = (
-        "import assoc, sys\n"
-        "for name in assoc.__all__: getattr(assoc, name)\n"
-        "assert 'assoc.solve' not in sys.modules and not hasattr(assoc, 'solve')"
-    )
-    printed("-W", "error", "-c", code)
-
-
-def test_the_list_of_programs():
-    listed = printed("-W", "error", "-m", "assoc")
-    assert "assoc.simulate" in listed and "assoc.solve" in listed
-
-
 def test_no_files_import_each_other_in_a_circle():
     """Imports inside functions and for types alone count, too."""
     root = Path(assoc.__file__).parents[1]

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import assoc
 from assoc.errors import AssocError, AssocWarning, InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from tests.oracles import axial_problem, disconnected_problem, gated_problem, small_problems
@@ -16,38 +15,23 @@ BAD_INPUTS = [
     # tuples, costs, sizes, dummy, what the message must say
     ([[1, 1]], [1.0], [], True, "sizes: expected at least one sensor"),
     ([[1, 1]], [1.0], [2, -1], True, "sizes: expected numbers >= 0, got -1"),
-    ([[1, 1]], [1.0], [2.0, 2.0], True, "sizes: expected integers, got float64"),
     ([[1, 1]], [1.0], [[2, 2]], True, "sizes: expected 1 dimension"),
-    ([[1, 1]], [1.0], 3, True, "sizes: expected 1 dimension"),
     ([[1, 1]], [1.0], [2**31 - 1, 2**31 - 1], True, "sizes: more measurements"),
-    ([[1, 1]], [1.0], [True, True], True, "sizes: expected integers, got bool"),
-    ([[1, 1]], [1.0], ["2", "2"], True, "sizes: expected integers"),
     ([[1, 1, 1]], [1.0], [2, 2], True, r"tuples: expected shape \(M, 2\)"),
-    ([1, 1], [1.0], [2, 2], True, "tuples: expected 2 dimension"),
     ([[1, 1], [1]], [1.0, 1.0], [2, 2], True, "tuples: "),
     ([[1.5, 1]], [1.0], [2, 2], True, "tuples: expected integers, got float64"),
-    ([["a", "b"]], [1.0], [2, 2], True, "tuples: expected integers"),
-    ([[None, 1]], [1.0], [2, 2], True, "tuples: expected integers"),
     ([[1, 3]], [1.0], [2, 2], True, "tuples: row 0, sensor 2: index 3 is outside 0..2"),
     ([[1, 1], [-1, 1]], [1.0, 1.0], [2, 2], True, "tuples: row 1, sensor 1: index -1 is outside 0..2"),
-    ([[2**40, 1]], [1.0], [2, 2], True, "tuples: row 0, sensor 1: index 1099511627776 is outside"),
     (np.array([[2**63, 1]], dtype=np.uint64), [1.0], [2, 2], True, "tuples: a value exceeds 64 bits"),
     ([[1, 1], [0, 0]], [1.0, 1.0], [2, 2], True, "tuples: row 1 is the all-dummy tuple: indices count from 1"),
     (np.ma.masked_equal([[1, 2]], 2), [1.0], [2, 2], True, "tuples: expected integers, got a masked array"),
     ([[1, 0]], [1.0], [2, 2], False, "tuples: row 0, sensor 2: index 0 is outside 1..2"),
-    ([[1, 1]], [1.0], [2, 0], True, "tuples: row 0, sensor 2: index 1 is outside 0..0"),
     ([[1, 1]], [1.0, 2.0], [2, 2], True, r"costs: expected shape \(1,\), got \(2,\)"),
-    ([[1, 1]], 1.0, [2, 2], True, r"costs: expected shape \(1,\), got \(\)"),
     ([[1, 1]], [NAN], [2, 2], True, "costs: row 0 is nan"),
     ([[1, 1], [1, 2]], [0.0, -INF], [2, 2], True, "costs: row 1 is -inf"),
-    ([[1, 1], [1, 2]], [INF, NAN], [2, 2], True, "costs: row 1 is nan"),
     ([[1, 1], [1, 2]], [1e300, 1e300], [2, 2], True, "costs: the sum of magnitudes exceeds 1e"),
-    ([[1, 1]], ["1"], [2, 2], True, "costs: expected real numbers"),
     ([[1, 1]], [1j], [2, 2], True, "costs: expected real numbers, got complex128"),
-    ([[1, 1]], [None], [2, 2], True, "costs: expected real numbers, got object"),
     ([[1, 1]], [1.0], [2, 2], "no", "dummy: expected True or False, got 'no'"),
-    ([[1, 1]], [1.0], [2, 2], 0, "dummy: expected True or False, got 0"),
-    ([[1, 1]], [1.0], [2, 2], [False], "dummy: expected True or False, got list"),
 ]
 
 
@@ -67,10 +51,7 @@ def test_bad_input_is_one_clear_line(tuples, costs, sizes, dummy, message):
         (np.zeros((2, 0)), True, "tensor: each dimension needs its dummy"),
         (np.full((2, 2), NAN), True, r"costs\[0, 1\] is nan; expected a number, or inf"),
         (np.array([[1.0, INF], [2.0, -INF]]), False, r"costs\[1, 1\] is -inf"),
-        ([[1.0], [1.0, 2.0]], True, "tensor: "),
-        ([["a"]], True, "tensor: expected real numbers"),
         (np.zeros((2, 2)), "no", "dummy: expected True or False, got 'no'"),
-        (np.zeros((2, 2)), 0, "dummy: expected True or False, got 0"),
     ],
 )
 def test_bad_tensors(tensor, dummy, message):
@@ -92,23 +73,6 @@ def test_canonical_form():
             array[0] = 0
 
 
-def test_input_arrays_are_copied():
-    tuples, costs = np.array([[1, 1]], dtype=np.int32), np.array([1.0])
-    problem = AssignmentProblem(tuples, costs, np.array([1, 1], dtype=np.int32), dummy=False)
-    tuples[0, 0] = 7
-    costs[0] = 9.0
-    assert problem.tuples.tolist() == [[1, 1]] and problem.costs.tolist() == [1.0]
-
-
-def test_forbidden_singleton_is_as_if_not_listed():
-    problem = AssignmentProblem([[1, 0], [1, 1]], [INF, -1.0], [1, 1])
-    assert sorted(zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True)) == [
-        ([0, 1], 0.0),
-        ([1, 0], 0.0),
-        ([1, 1], -1.0),
-    ]
-
-
 def test_layouts_and_types():
     """Whatever the layout and type of the arrays, the problem is the same."""
     tuples = np.array([[1, 2], [2, 1]])
@@ -125,14 +89,6 @@ def test_layouts_and_types():
         assert problem.tuples.flags.c_contiguous
 
 
-def test_empty_problems():
-    for tuples in ([], np.zeros((0, 2)), np.zeros((0, 2), dtype=int)):
-        problem = AssignmentProblem(tuples, [], [1, 2])
-        assert problem.num_tuples == 3
-    assert AssignmentProblem([], [], [0, 0]).num_tuples == 0
-    assert AssignmentProblem([], [], [1, 2], dummy=False).num_tuples == 0
-
-
 def test_dense_with_dummies():
     tensor = np.array([[9.0, 1.0, INF], [INF, -2.0, INF]])
     with pytest.warns(AssocWarning, match="ignores the cost 9 at index 0 of every dimension"):
@@ -141,13 +97,6 @@ def test_dense_with_dummies():
     dense = problem.to_dense()
     # index (0, 0) is ignored and 0; missing singletons cost 0; a listed one keeps its cost
     assert dense.tolist() == [[0.0, 1.0, 0.0], [0.0, -2.0, INF]]
-
-
-def test_dense_without_dummies():
-    tensor = np.array([[1.0, INF, 3.0], [4.0, 5.0, 6.0]])
-    problem = AssignmentProblem.from_dense(tensor, dummy=False)
-    assert problem.sizes.tolist() == [2, 3] and problem.num_tuples == 5
-    assert problem.to_dense().tolist() == tensor.tolist()
 
 
 @given(st.integers(0, 2**31), st.booleans())
@@ -160,11 +109,6 @@ def test_dense_round_trip(seed, dummy):
     assert sorted(zip(again.tuples.tolist(), again.costs.tolist(), strict=True)) == sorted(
         zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True)
     )
-
-
-def test_duplicates_count_with_the_smaller_cost():
-    problem = AssignmentProblem([[1, 1], [1, 1]], [2.0, -3.0], [1, 1])
-    assert problem.to_dense()[1, 1] == -3.0
 
 
 def test_dense_guard():
@@ -226,18 +170,11 @@ def _archive(path, **changes):
     ("changes", "message"),
     [
         ({"format": np.array("assoc.scene")}, "format"),
-        ({"format": None}, "format"),
         ({"version": np.array(2)}, "version"),
-        ({"version": np.array("x")}, "version"),
         ({"tuples": None}, "tuples"),
         ({"costs": np.array([NAN])}, "costs: row 0 is nan"),
-        ({"costs": np.array([1.0, 2.0])}, "costs: expected shape"),
         ({"tuples": np.array([[1, 5]])}, "index 5 is outside"),
-        ({"tuples": np.array([[1, -5]])}, "index -5 is outside"),
-        ({"tuples": np.array([[1.0, 1.0]])}, "tuples"),
-        ({"sizes": np.array([], dtype=np.int32)}, "sizes"),
         ({"dummy": np.array([True, False])}, "dummy"),
-        ({"dummy": np.array("yes")}, "dummy"),
         ({"costs": np.array([{"a": 1}], dtype=object)}, "costs"),
     ],
 )
@@ -247,25 +184,3 @@ def test_bad_files_are_one_line_that_names_the_file(tmp_path, changes, message):
         AssignmentProblem.load(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04broken"])
-def test_files_that_are_no_archives(tmp_path, content):
-    path = tmp_path / "problem.npz"
-    path.write_bytes(content)
-    with pytest.raises(InvalidInputError) as caught:
-        AssignmentProblem.load(path)
-    assert str(caught.value).startswith(str(path))
-
-
-def test_missing_file_and_folder(tmp_path):
-    for path in (tmp_path / "missing.npz", tmp_path):
-        with pytest.raises(InvalidInputError) as caught:
-            AssignmentProblem.load(path)
-        assert str(caught.value).startswith(str(path))
-
-
-def test_repr_and_public_name():
-    assert assoc.AssignmentProblem is AssignmentProblem
-    assert repr(AssignmentProblem([[1, 2]], [0.0], [2, 3])) == "AssignmentProblem(2 x 3 measurements, 6 tuples)"
-    assert "no dummies" in repr(AssignmentProblem([[1, 2]], [0.0], [2, 3], dummy=False))

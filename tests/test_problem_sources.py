@@ -50,19 +50,11 @@ def test_a_table_is_its_tuples():
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1]})), "frame: has no column 'cost', only a"),
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"cost": [1.0]})), "expected a column for each sensor"),
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1.5], "cost": [1.0]})), "column 'a': expected whole"),
-        (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": ["x"], "cost": [1.0]})), "column 'a': expected whole"),
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1], "cost": ["x"]})), "column 'cost'"),
-        (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [np.inf], "cost": [1.0]})), "'a': expected whole"),
-        (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1e300], "cost": [1.0]})), "'a': expected whole"),
         (
             lambda: AssignmentProblem.from_frame(pd.DataFrame([[1, 1, -1.0]], columns=["a", "a", "cost"])),
             "frame: expected columns of different names, got 'a' twice",
         ),
-        (
-            lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": pd.to_timedelta([1], "ns"), "cost": [1.0]})),
-            "column 'a': expected whole",
-        ),
-        (lambda: AssignmentProblem.from_frame([1, 2]), "frame: expected a pandas DataFrame, got list"),
         (
             lambda: AssignmentProblem.from_sparse(
                 SimpleNamespace(coords=[[1.5], [1.0]], data=np.array([1.0]), shape=(2, 2))

@@ -1,7 +1,5 @@
 """What a Solution says about itself, and what the front door refuses."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
@@ -46,26 +44,11 @@ def test_status_follows_from_the_gap(cost, bound, status):
     assert found.gap == cost - bound
 
 
-def test_targets_are_tuples_of_two_or_more():
-    assert solution(0.0, 0.0).num_targets == 1
-    assert solution(0.0, 0.0, ()).num_targets == 0
-
-
 def test_frame():
     frame = solution(0.0, 0.0).to_frame()
     assert list(frame.columns) == ["sensor_1", "sensor_2", "sensor_3", "measurements"]
     assert frame.to_numpy().tolist() == [[1, 1, 0, 2], [0, 0, 1, 1]]
     assert len(solution(0.0, 0.0, ()).to_frame()) == 0
-
-
-def test_solutions_are_frozen():
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        solution(0.0, 0.0).cost = 1.0
-
-
-def test_repr_says_what_matters():
-    text = repr(solution(5.0, 4.0))
-    assert "greedy" in text and "cost 5" in text and "lower bound 4" in text and "feasible" in text
 
 
 def test_what_assign_returns():
@@ -83,17 +66,9 @@ def test_what_assign_returns():
     ("arguments", "message"),
     [
         ({"solver": "exakt"}, "solver: unknown name 'exakt'; did you mean exact"),
-        ({"solver": "nothing like it"}, "solver: unknown name .* known: greedy"),
-        ({"solver": 3}, "solver: unknown name 3"),
         ({"seed": -1}, "seed: expected a whole number >= 0, or None for a random one, got -1"),
-        ({"seed": 1.5}, "seed: expected"),
-        ({"seed": "one"}, "seed: expected"),
-        ({"seed": True}, "seed: expected"),
         ({"time_limit": 0}, "time_limit: expected seconds > 0"),
-        ({"time_limit": -1.0}, "time_limit: expected"),
         ({"time_limit": float("nan")}, "time_limit: expected"),
-        ({"time_limit": "1"}, "time_limit: expected"),
-        ({"time_limit": True}, "time_limit: expected"),
         ({"nodez": 3}, "nodez: no parameter of solver 'exact'; did you mean nodes"),
         ({"nodes": -3}, "nodes: expected"),
         ({"solver": "greedy", "ants": 3}, "ants: no parameter of solver 'greedy'; it takes none"),

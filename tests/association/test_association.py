@@ -1,13 +1,10 @@
 """Associations of scenes: targets, labels, fused positions, correct tuples, one seed one answer."""
 
-import json
-
-import cloudpickle
 import numpy as np
 import pytest
 
 import assoc
-from assoc.association import Association, associate
+from assoc.association import associate
 from assoc.association.plan import Plan
 from assoc.association.table import to_csv
 from assoc.costs import positions_and_covariances
@@ -58,43 +55,11 @@ def test_by_hand(by_hand, solver):
     np.testing.assert_allclose(scan.covariances[1], np.eye(3) / 1.5, atol=1e-9)
 
 
-def test_correct_means_exactly_the_measurements_of_a_target(by_hand):
-    # the third sensor missed target 9 in truth; what it was given to is a false alarm nearby
-    sources = [[np.array([9, 4]), np.array([4, -1]), np.array([4, -1, 9])]]
-    truth = Truth(by_hand.truth.target_ids, by_hand.truth.positions, sources)
-    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, truth)
-    totals = associate(scene, "milp").totals()
-    assert (totals["correct_tuples"], totals["true_tuples"], totals["share_correct"]) == (1, 2, 0.5)
-
-
-def test_true_tuples(by_hand):
-    assert by_hand.scan(0).true_tuples().tolist() == [[2, 1, 1], [1, 0, 2]]
-    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION)
-    assert scene.scan(0).true_tuples() is None
-    totals = associate(scene, "greedy").totals()
-    assert totals["true_tuples"] is None and totals["share_correct"] is None
-    # one sensor with two measurements of target 4: it has no tuple
-    twice = Truth([np.array([4])], [np.zeros((1, 3))], [[np.array([4, 4]), np.array([4, -1]), np.full(3, -1)]])
-    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, twice)
-    assert scene.scan(0).true_tuples().tolist() == []
-
-
 def test_a_single_measurement_is_a_target_only_at_negative_cost():
     problem = assoc.AssignmentProblem([[1, 0], [0, 1]], [-1.0, 0.5], [1, 1])
     scan = Plan((problem,), "greedy")((0, 0))
     assert scan.targets.tolist() == [[1, 0]]
     assert scan.false_alarms == 1 and scan.positions is None and scan.time is None
-
-
-def test_empty_scans_and_a_single_sensor():
-    nothing = np.zeros((0, 3))
-    scene = Scene([sensor(1.0)] * 2, [0.0, 1.0], [[nothing, nothing], [nothing, np.ones((1, 3))]], REGION)
-    result = associate(scene, "greedy")
-    assert [scan.false_alarms for scan in result.scans] == [0, 1]
-    assert result.totals()["gap"] == 0.0
-    assert len(result.to_frame()) == 0
-    alone = Scene([sensor(1.0)], [0.0], [[np.ones((3, 3))]], REGION)
-    assert associate(alone, "greedy").totals()["false_alarms"] == 3
 
 
 def test_the_seed_of_a_scan_does_not_depend_on_what_was_solved_before():
@@ -128,65 +93,6 @@ def test_processes_do_not_change_the_answer():
         assert a.scan == b.scan and np.array_equal(a.solution.tuples, b.solution.tuples)
         assert a.solution.cost == b.solution.cost and a.solution.lower_bound == b.solution.lower_bound
         assert np.array_equal(a.positions, b.positions)
-
-
-def test_processes_are_sent_the_scans_that_they_solve(monkeypatch):
-    scene = simulate("three-radar", scans=40)
-    sent = []
-
-    def spread(task, items, **rest):
-        sent.extend([task, *items])
-        return map(task, items)
-
-    monkeypatch.setattr("assoc.association.plan.parallel_map", spread)
-    for gating in ({}, {"target_density": "auto"}):
-        plan = Plan((scene,), "greedy", gating=gating)
-        sent.clear()
-        found = [list(plan.run(plan.items(), jobs)) for jobs in (1, 2)]
-        assert all(a.solution.cost == b.solution.cost for a, b in zip(*found, strict=True))
-        whole, bare = (len(cloudpickle.dumps(sent[at])) for at in (0, 41))
-        # a prior found from all scans needs them
-        assert (bare > 0.9 * whole) if gating else (bare < 0.2 * whole)
-
-
-@pytest.mark.slow
-def test_errors_in_processes_come_through():
-    scene = simulate("three-radar", scans=4)
-    with pytest.raises(assoc.LimitExceededError, match="tuples"):
-        associate(scene, "greedy", jobs=2, gating={"max_tuples": 1})
-
-
-def test_frame_summary_and_json(by_hand, tmp_path):
-    result = associate(by_hand, "greedy", seed=3)
-    frame = result.to_frame()
-    assert list(frame.columns[:6]) == ["scan", "time", "target", "sensor_1", "sensor_2", "sensor_3"]
-    assert list(frame.columns[6:]) == ["x", "y", "z", "sigma_x", "sigma_y", "sigma_z"]
-    assert frame[["sensor_1", "sensor_2", "sensor_3"]].to_numpy().tolist() == [[1, 0, 2], [2, 1, 1]]
-    assert frame["sigma_x"].to_numpy() == pytest.approx([1.25**-0.5, 1.5**-0.5])
-    assert "2 targets, 2 false alarms" in result.summary() and "2 of 2 true tuples" in result.summary()
-    path = tmp_path / "result.json"
-    result.to_json(path)
-    content = json.loads(path.read_text())
-    keys = ["format", "version", "solver", "parameters", "seed", "scans", "totals"]
-    assert list(content) == keys
-    assert (content["format"], content["version"], content["seed"]) == ("assoc.result", 1, 3)
-    (scan,) = content["scans"]
-    assert list(scan) == (
-        ["scan", "time", "sizes", "cost", "lower_bound", "gap", "status", "tuples", "targets", "runtime"]
-        + ["compile_time"]
-    )
-    assert sorted(map(tuple, scan["tuples"])) == [(0, 0, 3), (0, 2, 0), (1, 0, 2), (2, 1, 1)]
-    assert [target["tuple"] for target in scan["targets"]] == [[1, 0, 2], [2, 1, 1]]
-    np.testing.assert_array_equal(scan["targets"][0]["position"], result.scans[0].positions[0])
-    assert np.shape(scan["targets"][0]["covariance"]) == (3, 3)
-    assert content["totals"]["cost"] == scan["cost"]
-
-
-def test_json_has_no_infinities(tmp_path):
-    result = Association((), "greedy", {"limit": float("inf"), "names": ("a", 1), "n": np.int64(3)})
-    result.to_json(tmp_path / "r.json")
-    content = json.loads((tmp_path / "r.json").read_text())
-    assert content["parameters"] == {"limit": None, "names": ["a", 1], "n": 3}
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import html
 import re
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +10,7 @@ import pytest
 import assoc
 from assoc.association.plan import Plan
 from assoc.plotting.report import write_association_report
-from assoc.plotting.report.figures import evenly, within_budget
 from assoc.scene import Scene
-from assoc.scene.geodesy import geodetic
 from assoc.sensors import Radar3D
 from assoc.simulation import simulate
 from tests.plotting.pages import EVIL, figures_of, parsed, step_of, text_of
@@ -75,20 +72,6 @@ def test_the_figure_of_each_scan_is_that_of_the_association(page, scene, associa
         assert (max(x) - min(x)) / 2 == pytest.approx(2.4477e-3 * np.sqrt(one.covariances[0, 0, 0]), rel=0.05, abs=1e-3)
 
 
-def test_convergence_ends_at_cost_and_bound(page, association):
-    figure = figures_of(page)["convergence-0"]
-    for k, one in enumerate(association.scans):
-        assert step_of(figure, k, "cost of the best known")["y"][-1] == pytest.approx(one.solution.cost, abs=1e-5)
-        assert step_of(figure, k, "lower bound")["y"][-1] == pytest.approx(one.solution.lower_bound, abs=1e-5)
-
-
-def test_command_parameters_and_versions_are_said(page):
-    text = text_of(page)
-    command = "python -m assoc.solve s.npz --report out.html"
-    for word in (command, "three-radar", assoc.__version__, np.__version__, "seed"):
-        assert word in text
-
-
 def test_text_from_files_is_only_text(tmp_path):
     sensors = [
         Radar3D(position=(0, 0, 0), noise=(10, 1e-3, 1e-3), field_of_view=[[0, 1e4], [-3, 3], [0, 1]], name=EVIL),
@@ -132,22 +115,6 @@ def _of_problem(problem):
     return plan.gather(plan.run(plan.items()))
 
 
-def test_ranked_associations_say_how_far_the_second_is(tmp_path, scene):
-    plan = Plan((scene,), "exact", kbest=3)
-    ranked = plan.gather(plan.run(plan.items()[:2]))
-    path = tmp_path / "out.html"
-    write_association_report(path, ranked, scene)
-    text = text_of(path)
-    for one in ranked.scans:
-        assert f"{one.ranked[1].solution.cost - one.ranked[0].solution.cost:.4f}" in text
-
-
-def test_steps_beyond_the_budget_are_thinned_evenly():
-    steps = [str(i) * 98 for i in range(10)]
-    assert within_budget(steps, 450) == steps[::3]
-    assert within_budget(steps, 10_000) == steps and len(evenly(5_000)) <= 300
-
-
 def test_the_chance_that_a_tuple_is_drawn_is_the_ants_own(tmp_path):
     scene = simulate("bearing-only", 0, targets=12, scans=2)
     parameters = {"mode": "mmas", "iterations": 20, "refinement": "none"}
@@ -174,15 +141,6 @@ def test_a_hundred_scans_stay_below_nine_megabytes(tmp_path):
     assert path.stat().st_size < 9_000_000
 
 
-def test_nothing_is_left_where_it_cannot_be_written(tmp_path, scene, association):
-    with pytest.raises(assoc.InvalidInputError, match="does not exist"):
-        write_association_report(tmp_path / "none" / "out.html", association, scene)
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(assoc.InvalidInputError, match="is a folder"):
-        write_association_report(tmp_path / "folder", association, scene)
-    assert [one.name for one in tmp_path.iterdir()] == ["folder"]
-
-
 def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association, monkeypatch):
     monkeypatch.setitem(sys.modules, "plotly", None)
     with pytest.raises(ImportError, match=r"python -m pip install 'assoc\[report\]'"):
@@ -192,40 +150,3 @@ def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association,
     assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
     assert "pip install 'assoc[report]'" in done.stderr
     assert not (tmp_path / "out.html").exists() and not (tmp_path / "out.csv").exists()
-
-
-@pytest.mark.slow
-def test_the_program_writes_it(tmp_path, scene):
-    scene.save(tmp_path / "scene.npz")
-    words = ["scene.npz", "--solver", "greedy", "--scans", "2:5", "--report", "out.html"]
-    done = here("assoc.solve", *words, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    steps = figures_of(tmp_path / "out.html")["scene-0"]["layout"]["sliders"][0]["steps"]
-    assert [step["label"].partition(",")[0] for step in steps] == ["scan 2", "scan 3", "scan 4"]
-    assert "python -m assoc.solve " + " ".join(words) in text_of(tmp_path / "out.html")
-
-
-def test_compiling_is_told_apart_from_solving(scene, association, tmp_path):
-    first, *others = association.scans
-    scans = (replace(first, compile_time=12.5), *(replace(one, compile_time=0.0) for one in others))
-    for name, content in (("cold.html", scans), ("warm.html", scans[1:])):
-        write_association_report(tmp_path / name, replace(association, scans=content), scene)
-    assert "12.5 s" in parsed(tmp_path / "cold.html").text
-    assert "Compiling" not in parsed(tmp_path / "warm.html").text
-
-
-def test_scenes_on_the_earth_show_coordinates(tmp_path, scene, association):
-    write_association_report(tmp_path / "a.html", association, replace(scene, origin=(0.82, 0.15, 400.0)))
-    hovers = step_of(figures_of(tmp_path / "a.html")["scene-0"], 0, "targets found")["hovertext"]
-    degrees = np.degrees(geodetic(association.scans[0].positions, (0.82, 0.15, 400.0))[:, :2])
-    for text, (lat, lon) in zip(hovers, degrees, strict=True):
-        assert f"{lat:.5f}\u00b0, {lon:.5f}\u00b0" in text
-
-
-def test_measurements_with_times_of_their_own_have_no_residuals(tmp_path):
-    """The target was elsewhere when they were made: what is between them and its position is no error."""
-    radars = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
-    write_association_report(tmp_path / "p.html", assoc.associate(radars), radars, ["s.npz"] * radars.num_scans)
-    figure = figures_of(tmp_path / "p.html")["scene-0"]
-    texts = [text for k in range(radars.num_scans) for text in step_of(figure, k, "targets found")["hovertext"]]
-    assert texts and not any("\u03c3" in text for text in texts)

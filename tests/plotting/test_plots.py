@@ -1,7 +1,6 @@
 """What the figures show, read back from the axes and compared with the arrays it should be."""
 
 import re
-import sys
 
 import matplotlib as mpl
 import numpy as np
@@ -11,13 +10,11 @@ from scipy import stats
 
 import assoc
 from assoc import plotting
-from assoc.plotting.ellipses import ellipses, position_covariances
-from assoc.plotting.heat_map import cells
+from assoc.plotting.ellipses import ellipses
 from assoc.plotting.measured import distances_to_border, positions_of
 from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
-from assoc.solvers import pheromone
 
 mpl.use("agg")
 
@@ -60,13 +57,6 @@ def sensors():
     ]
 
 
-def test_a_place_measures_like_its_measurement():
-    where = np.random.default_rng(0).uniform([-5e3, -5e3, 100], [5e3, 5e3, 4e3], (50, 3))
-    for sensor in sensors():
-        ground = np.hypot(*(where[:, :2] - sensor.position[:2]).T)
-        assert positions_of(sensor, sensor.measure(where), where[:, 2], ground) == pytest.approx(where)
-
-
 def test_rays_end_on_the_border():
     region = np.array([[-1e3, 2e3], [-500.0, 700.0], [0.0, 10.0]])
     sensor = BearingSensor(position=(100, -50, 0), noise=1e-3)
@@ -88,15 +78,6 @@ def test_ellipses_hold_their_share():
         assert square == pytest.approx(stats.chi2(2).ppf(0.9))
 
 
-def test_covariances_of_places_are_those_of_the_jacobian():
-    where = np.array([[3e3, 1e3, 500.0], [-2e3, 4e3, 900.0]])
-    for sensor in (one for one in sensors() if one.dim == 3):
-        inverse = np.linalg.inv(sensor.jacobian(where))
-        expected = (inverse @ sensor.covariance @ np.swapaxes(inverse, 1, 2))[:, :2, :2]
-        found = position_covariances(sensor, sensor.measure(where), where[:, 2])
-        assert found == pytest.approx(expected, rel=1e-3, abs=1e-3)
-
-
 def test_scene(scene, ax):
     assert plotting.plot_scene(scene, ax=ax) is ax
     assert_units(ax)
@@ -109,18 +90,6 @@ def test_scene(scene, ax):
     # where all three targets and radars are is in view
     low, high = np.array(ax.get_xlim()), np.array(ax.get_ylim())
     assert (low[0] < truth[:, 0][~np.isnan(truth[:, 0])]).all() and high[1] > 56.7
-
-
-def test_gates_are_drawn_for_every_kind_of_sensor(ax):
-    scene = simulate("bearing-only", 0, targets=4, scans=1)
-    plotting.plot_scene(scene, 0, gates=True, ax=ax)
-    assert_units(ax)
-    assert sum(one.get_linestyle() == "--" for one in ax.lines) == 2 * len(scene.sensors)
-    radars = simulate("three-radar", 1, scans=1)
-    other = plotting.plot_scene(radars, 0, gates=True, ax=new_figure().subplots())
-    dashed = [one for one in other.lines if one.get_linestyle() == "--"]
-    corners = sum(np.isnan(one.get_xdata()).sum() for one in dashed)
-    assert corners == radars.scan(0).sizes.sum()
 
 
 def test_solution(scene, association, ax):
@@ -147,94 +116,12 @@ def test_solution(scene, association, ax):
             draw()
 
 
-def test_costs(scene, association, ax):
-    problem, solution = assoc.build_problem(scene, 1), association.scans[1].solution
-    plotting.plot_costs(problem, solution, ax=ax)
-    assert_units(ax)
-    every, chosen = line(ax, "candidate tuples"), line(ax, "chosen")
-    assert every[:, 1] == pytest.approx(problem.costs) and chosen[:, 1].sum() == pytest.approx(solution.cost)
-    assert (np.round(every[:, 0]) == np.count_nonzero(problem.tuples, axis=1)).all()
-    with pytest.raises(assoc.InvalidInputError, match="not one of this problem"):
-        plotting.plot_costs(problem, association.scans[2].solution, ax=ax)
-
-
 def test_gates_fill_evenly_where_the_model_is_right():
     scene = simulate("three-radar", 5)
     ax = plotting.plot_gates(scene, assoc.associate(scene, "greedy"), bins=10, ax=new_figure().subplots())
     assert_units(ax)
     counts = np.array([bar.get_height() for bar in ax.patches])
     assert counts.sum() > 200 and stats.chisquare(counts).pvalue > 1e-4
-
-
-def test_convergence(ax):
-    problem = assoc.build_problem(simulate("bearing-only", 0, targets=12, scans=1), 0)
-    found = {name: assoc.assign(problem, name) for name in ("lagrangian", "greedy")}
-    plotting.plot_convergence(found, ax=ax)
-    assert_units(ax)
-    for name, solution in found.items():
-        cost, bound = line(ax, f"{name}: cost"), line(ax, f"{name}: lower bound")
-        assert cost[-1] == pytest.approx([solution.iterations, solution.cost])
-        known = bound[~np.isnan(bound[:, 1]), 1]
-        assert (np.diff(known) >= 0).all() and known[-1] <= solution.cost + 1e-9
-    assert_units(plotting.plot_convergence(found["lagrangian"], over="time", ax=new_figure().subplots()))
-    with pytest.raises(assoc.InvalidInputError, match="solutions: expected at least one, got none"):
-        plotting.plot_convergence({}, ax=ax)
-
-
-def test_pheromone_gathers_on_what_is_chosen(ax):
-    problem = assoc.build_problem(simulate("crowd", 0, targets=6, scans=1), 0)
-    history = pheromone(problem, seed=4, mode="paper", rho=0.8)
-    solution = assoc.assign(problem, "aco", seed=4, mode="paper", rho=0.8)
-    assert len(history.cycles) == solution.iterations
-    chosen = {tuple(row) for row in history.tuples[history.chosen].tolist()}
-    best = {tuple(row) for row in solution.tuples.tolist()}
-    assert chosen <= best and len(chosen) >= 6
-    # a measurement that is in no tuple with others is a false alarm before any ant walks
-    shared = problem.tuples[np.count_nonzero(problem.tuples, axis=1) > 1]
-    for row in best - chosen:
-        sensor = int(np.argmax(row))
-        assert np.count_nonzero(row) == 1 and not (shared[:, sensor] == row[sensor]).any()
-    prices = dict(zip(map(tuple, problem.tuples.tolist()), problem.costs, strict=True))
-    assert history.costs == pytest.approx([prices[tuple(row)] for row in history.tuples.tolist()])
-    last = history.pheromone[-1]
-    assert last[history.chosen].min() > last[~history.chosen].max()
-    plotting.plot_pheromone(history, nodes=len(chosen), ax=ax)
-    shown = {tuple(map(int, re.findall(r"\d+", text.get_text()))) for text in ax.get_yticklabels()}
-    assert shown == chosen
-    for of in ("visibility", "probability"):
-        other = plotting.plot_pheromone(history, of=of, nodes=len(chosen), ax=new_figure().subplots())
-        values = getattr(history.top(len(chosen)), of)
-        if of == "visibility":
-            values = values / np.nansum(history.visibility, axis=1, keepdims=True)
-        (image,) = other.images
-        assert np.asarray(image.get_array()) == pytest.approx(100.0 * values[:, ::-1].T)
-        assert {"visibility": "visibility", "probability": "drawn"}[of] in image.colorbar.ax.get_ylabel()
-    with pytest.raises(assoc.InvalidInputError, match="of: expected pheromone, visibility, probability, got 'colour'"):
-        plotting.plot_pheromone(history, of="colour", ax=ax)
-
-
-def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):
-    from assoc.sweeps import Study, grid, load
-    from assoc.sweeps.sources import StudySource
-
-    settings = grid("aco", {"mode": ["paper"], "alpha": [1, 2], "rho": [0.3, 0.6, 0.9]})
-    Study([StudySource(scene, "scene")], settings, 2).run(tmp_path / "s")
-    frame = load(tmp_path / "s")
-    plotting.plot_heat_map(frame, "iterations", ("alpha", "rho"), ax=ax)
-    texts = [text.get_text() for text in ax.texts]
-    assert len(texts) == 6
-    expected = frame.groupby(["rho", "alpha"])["iterations"].mean().to_numpy()
-    for text, mean in zip(texts, expected, strict=True):
-        middle, low, high = (float(one) for one in re.split(r"\n| \.\. ", text))
-        assert middle == pytest.approx(mean, rel=5e-3) and low <= middle <= high
-    # over a parameter that is not named all runs are averaged
-    _, _, middle, low, high = cells(frame.assign(half=frame["rho"] > 0.5), "iterations", "alpha", "half")
-    halves = frame.groupby([frame["rho"] > 0.5, "alpha"])["iterations"].mean().to_numpy().reshape(2, 2)
-    assert middle == pytest.approx(halves) and (low <= middle).all() and (middle <= high).all()
-    with pytest.raises(assoc.InvalidInputError, match="study: expected the runs of assoc.sweeps.load"):
-        plotting.plot_heat_map(frame[["alpha", "rho"]], ax=ax)
-    with pytest.raises(assoc.InvalidInputError, match="needs two that vary"):
-        plotting.plot_heat_map(frame[frame["rho"] == 0.3], ax=ax)
 
 
 def test_tracks_and_metric(scene, ax):
@@ -257,32 +144,3 @@ def test_tracks_and_metric(scene, ax):
     assert other.get_ylabel() == "GOSPA (m)" and line(other, "a")[:, 1].tolist() == [1, 2, 3]
     with pytest.raises(assoc.InvalidInputError, match="shape of times"):
         plotting.plot_metric([0, 1], [1.0], name="GOSPA", unit="m", ax=ax)
-
-
-def test_overview_composes_the_others(scene, association):
-    axes = plotting.plot_overview(scene, association, 2)
-    assert [one.get_title() for one in axes][1] == "Association of scan 2" and len(axes) == 4
-    with pytest.raises(assoc.InvalidInputError, match="no scan 77"):
-        plotting.plot_overview(scene, association, 77)
-    mpl.pyplot.close("all")
-
-
-def test_series_differ_without_colour():
-    from assoc.plotting.colours import DASHES, MARKERS, SERIES
-
-    assert len({*MARKERS}) == len({*map(str, DASHES)}) == len({*SERIES}) == 7
-
-
-def test_every_name_is_there_and_matplotlib_is_asked_for(scene, monkeypatch):
-    assert all(callable(getattr(plotting, name)) for name in plotting.__all__)
-    with pytest.raises(AttributeError, match="no attribute 'plot_nothing'"):
-        plotting.plot_nothing  # noqa: B018
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ImportError, match=r"python -m pip install 'assoc\[plot\]'"):
-        plotting.plot_scene(scene)
-
-
-def test_gates_of_measurements_with_times_of_their_own_are_refused(ax):
-    scene = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
-    with pytest.raises(assoc.InvalidInputError, match="scan 0 has measurements with times of their own"):
-        plotting.plot_gates(scene, assoc.associate(scene), ax=ax)

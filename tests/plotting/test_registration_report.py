@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from assoc.errors import InvalidInputError
-from assoc.plotting import plot_residuals
 from assoc.plotting.report import write_registration_report
 from assoc.registration import register
 from tests.plotting.pages import EVIL, figures_of, named, text_of
@@ -50,11 +48,3 @@ def test_what_cannot_be_observed_is_named(tmp_path):
     write_registration_report(tmp_path / "alone.html", register(scene_of(radars(1), 1, 2)))
     first = figures_of(tmp_path / "alone.html")["residuals-before-and-after-0"]
     assert named(first["data"], "before")["median"] == [None]
-
-
-def test_picture(found):
-    ax = plot_residuals(found, "azimuth")
-    assert ax.get_ylabel() == "residual of azimuth (deg)"
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["radar 1", "radar 2", "radar 3"]
-    with pytest.raises(InvalidInputError, match="no sensor measures 'x'"):
-        plot_residuals(found, "x")

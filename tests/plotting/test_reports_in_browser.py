@@ -117,20 +117,6 @@ def test_a_script_that_slips_through_does_not_run(browser, pages, tmp_path):
 
 
 @pytest.mark.slow
-def test_dark_pages_are_dark(browser, pages, pictures):
-    from PIL import Image
-
-    try:
-        media = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
-        show(browser, pages / "tracks.html")
-        shot = Image.open(io.BytesIO(screenshot(browser, pictures / "tracks-dark.png"))).convert("L")
-        assert np.percentile(np.asarray(shot), 90) < 60
-    finally:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["scene", "tracks", "study"])
 def test_on_paper_nothing_is_cut(browser, pictures, pages, name):
     """A4 without its margins is 703 units wide."""

@@ -8,8 +8,7 @@ from assoc.plotting.report import write_sweep_report
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid, load, summarize
 from assoc.sweeps.sources import StudySource
-from tests.plotting.pages import EVIL, figures_of, named, parsed, text_of
-from tests.running import here
+from tests.plotting.pages import EVIL, figures_of, named
 
 
 @pytest.fixture(scope="module")
@@ -51,29 +50,3 @@ def test_curves_end_at_the_mean_excess(page, folder):
         curve = named(data, f"alpha {alpha:.4g}, rho {rho:.4g}")
         assert curve["x"] == sorted(curve["x"]) and curve["y"] == sorted(curve["y"], reverse=True)
         assert curve["y"][-1] == pytest.approx(expected, abs=1e-6)
-
-
-def test_what_made_it_is_said_and_text_is_text(page):
-    text = text_of(page)
-    assert "python -m assoc.sweep x.npz --solver aco" in text and EVIL in text and "paper" in text
-    assert sum(tag == "script" for tag, _ in parsed(page).tags) == 1
-
-
-def test_studies_without_maps_and_without_runs(tmp_path):
-    settings = grid("greedy", {})
-    study = Study([StudySource(simulate("three-radar", 2, scans=2), "s")], settings, 1)
-    study.run(tmp_path / "study")
-    write_sweep_report(tmp_path / "one.html", tmp_path / "study")
-    assert {*figures_of(tmp_path / "one.html")} == {"convergence-0", "convergence-1"}
-    empty = load(tmp_path / "study").iloc[:0]
-    write_sweep_report(tmp_path / "none.html", tmp_path / "study", empty)
-    assert "no runs yet" in text_of(tmp_path / "none.html")
-
-
-@pytest.mark.slow
-def test_the_program_writes_it(folder, tmp_path):
-    done = here("assoc.sweep", "--summary", folder, "--report", "s.html", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert len(figures_of(tmp_path / "s.html")["convergence-0"]["data"]) == 6
-    done = here("assoc.sweep", "--summary", folder, "--report", tmp_path / "none" / "s.html")
-    assert (done.returncode, done.stdout) == (2, "") and "does not exist" in done.stderr

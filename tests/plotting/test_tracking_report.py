@@ -12,7 +12,6 @@ from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker, track_scene
 from tests.plotting.pages import EVIL, figures_of, parsed, step_of, text_of
-from tests.running import here
 
 
 def tracks_of(scene):
@@ -109,20 +108,6 @@ def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
     assert not (tmp_path / "bad.html").exists()
 
 
-def test_long_recordings_are_thinned_and_say_so(tmp_path):
-    count = 200_000
-    frame = pd.DataFrame({"track_id": np.arange(count) % 700, "time": np.arange(count) * 0.1})
-    frame = frame.assign(x=np.sin(frame["time"]) * 1e5, y=np.cos(frame["time"]) * 1e5)
-    write_tracking_report(tmp_path / "long.html", frame)
-    assert (tmp_path / "long.html").stat().st_size < 11_000_000
-    text = text_of(tmp_path / "long.html")
-    for said in ("every 5th of their points", "of 200,000 instants", "The first 500 of 700 rows"):
-        assert said in text
-    # the last point of a path is always there
-    paths = figures_of(tmp_path / "long.html")["tracks-over-time-0"]["data"]
-    assert round(1e-3 * frame["x"].iloc[-1], 3) in {x for one in paths for x in one["x"] or ()}
-
-
 def test_names_uncertainty_and_places_on_the_earth(tmp_path, scene):
     frame = tracks_of(scene).assign(sigma_x=20.0, sigma_y=10.0)
     names = {10: "SWR12", 11: "4521"}
@@ -138,16 +123,3 @@ def test_names_uncertainty_and_places_on_the_earth(tmp_path, scene):
     last = table[table["time"] == table["time"].max()].sort_values("track_id")
     for text, (lat, lon) in zip(shown, last[["latitude", "longitude"]].to_numpy(), strict=True):
         assert f"{lat:.5f}\u00b0, {lon:.5f}\u00b0" in text
-
-
-@pytest.mark.slow
-def test_the_program_writes_it(tmp_path):
-    simulate("three-radar", 2, scans=6).save(tmp_path / "scene.npz")
-    words = ["scene.npz", "-o", "tracks.csv", "--report", "tracks.html"]
-    done = here("assoc.track", *words, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    frame = pd.read_csv(tmp_path / "tracks.csv")
-    figures = figures_of(tmp_path / "tracks.html")
-    figure = figures["tracks-over-time-0"]
-    assert {name for k in range(6) for name in step_of(figure, k, "tracks")["text"]} == {*map(str, frame["track_id"])}
-    assert "python -m assoc.track " + " ".join(words) in text_of(tmp_path / "tracks.html")

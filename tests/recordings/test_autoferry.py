@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError
-from assoc.recordings.autoferry import merged, read_autoferry
+from assoc.recordings.autoferry import read_autoferry
 from assoc.sensors import BearingSensor
 
 
@@ -59,17 +59,6 @@ def test_frames_become_scans_of_sensors_on_the_ferry(tmp_path):
     np.testing.assert_allclose(scene.truth.positions[0], [[20.0, 110.0, 0.0], [50.0, 0.0, 0.0]])
 
 
-def test_some_sensors_with_other_parameters(tmp_path):
-    scene = read_autoferry(*write(tmp_path), sensors={"radar": {"reach": 500.0, "false_alarm_rate": 7.0}}, extent=1.0)
-    assert len(scene.sensors) == 1 and scene.sensors[0].false_alarm_rate == 7.0
-    assert [len(z) for z in scene.scan(0).measurements] == [3]
-
-
-def test_detections_near_each_other_are_one_target():
-    points = np.array([[0.0, 0.0], [50.0, 0.0], [8.0, 0.0], [16.0, 0.0]])
-    np.testing.assert_allclose(merged(points, 10.0), [[8.0, 0.0], [50.0, 0.0]])
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -86,19 +75,3 @@ def test_bad_files_name_the_frame(tmp_path, content, message):
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     with pytest.raises(InvalidInputError, match=f"scenario1_detections.json: .*{message}"):
         read_autoferry(path)
-
-
-def test_false_alarms_are_as_dense_at_another_reach(tmp_path):
-    far, near = (
-        read_autoferry(*write(tmp_path), sensors={"radar": {"reach": reach}}).sensors[0] for reach in (600.0, 300.0)
-    )
-    assert far.false_alarm_rate / far.volume == pytest.approx(near.false_alarm_rate / near.volume)
-    assert far.volume == pytest.approx(4 * near.volume)
-
-
-def test_truth_of_other_frames_and_unknown_sensors(tmp_path):
-    paths = write(tmp_path, boats=BOATS * 2)
-    with pytest.raises(InvalidInputError, match="has 2 frames, the detections 6"):
-        read_autoferry(*paths)
-    with pytest.raises(InvalidInputError, match="unknown name 'sonar'; known: lidar, radar"):
-        read_autoferry(paths[0], sensors=("sonar",))

@@ -56,15 +56,6 @@ def test_positions_have_the_time_when_they_were_received():
     np.testing.assert_array_equal(kept.time, reports.time)
 
 
-def test_what_stands_still_may_repeat_its_place():
-    reports = flight().rows(np.zeros(30, dtype=int))
-    parked = replace(reports, time=10.0 * np.arange(30))
-    kept, found = clean(parked)
-    assert not found and len(kept) == 30
-    flying = replace(parked, velocity=np.broadcast_to([200.0, 0.0, 0.0], (30, 3)))
-    assert clean(flying)[1] == {REPEATED: 29}
-
-
 def test_altitudes_are_mended_and_climbs_are_not():
     plain = joined(flight(climb=15.0), flight(2, climb=-20.0))
     heights = plain.height.copy()
@@ -86,12 +77,6 @@ def test_places_far_off_are_left_out():
     latitude[12] += 0.02
     kept, found = clean(replace(plain, latitude=latitude))
     assert found == {JUMPS: 1} and 12 * 10.0 not in kept.time and len(kept) == 29
-
-
-def test_few_reports():
-    for count in (1, 2, 3):
-        reports = flight(count=count)
-        assert len(clean(reports)[0]) == count
 
 
 def turning(times):
@@ -118,29 +103,6 @@ def test_curves_follow_turns():
     """Chords are off by up to v w dt^2 / 8 = 131 m; a cubic with velocities by (w dt)^4 r / 384 = 0.75 m."""
     assert errors(velocities=True).max() < 1.5
     assert errors(velocities=False).max() < 25.0
-
-
-def test_places_of_reports_are_kept_and_straight_flight_is_straight():
-    own = np.array([0.0, 7.0, 19.0, 30.0])
-    place = own[:, None] * np.array([100.0, -50.0, 5.0])
-    ids, found = resample(reports_at(own), place, np.array([0.0, 3.0, 7.0, 18.0, 30.0, 31.0]), 60.0)
-    np.testing.assert_allclose(np.concatenate(found), np.array([[0], [3], [7], [18], [30]]) * [100.0, -50.0, 5.0])
-    assert [len(one) for one in ids] == [1, 1, 1, 1, 1, 0]
-
-
-def test_velocities_that_cannot_be_right_are_not_used():
-    own = np.arange(0.0, 41.0, 10.0)
-    place = own[:, None] * np.array([200.0, 0.0, 0.0])
-    wrong = np.tile([-200.0, 300.0, 0.0], (5, 1))
-    _, found = resample(reports_at(own), place, np.array([5.0, 15.0]), 60.0, wrong)
-    np.testing.assert_allclose(np.concatenate(found), [[1000.0, 0, 0], [3000.0, 0, 0]], atol=1e-9)
-
-
-def test_gaps_are_kept():
-    own = np.array([0.0, 10.0, 200.0, 210.0])
-    place = own[:, None] * np.array([100.0, 0.0, 0.0])
-    ids, _ = resample(reports_at(own), place, np.array([5.0, 100.0, 205.0]), 60.0)
-    assert [len(one) for one in ids] == [1, 0, 1]
 
 
 def test_velocities_in_the_frame():

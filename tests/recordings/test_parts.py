@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from assoc.errors import InvalidInputError
-from assoc.recordings import Recording, clustering_time_window, estimate_rotation, radar_of, read_plots, reading
+from assoc.recordings import clustering_time_window, estimate_rotation, radar_of, read_plots, reading
 from assoc.recordings.recording import RECORDED
 from assoc.recordings.survey import StoredPlots, Survey
 from assoc.recordings.windows import windows_in_turn
@@ -89,11 +89,3 @@ def test_an_unusual_row_is_treated_alike_wherever_it_stands(tmp_path, line):
             found.append(str(error))
     assert found[0] == found[1]
     assert isinstance(found[0], dict) or "line 22" in found[0]
-
-
-def test_only_plots_that_are_near_in_time_judge_an_altitude():
-    levels, times = np.full(7, 100.0), np.arange(7.0)
-    levels[3] = 300.0
-    recording = [Recording(times * step, np.ones(7), np.zeros(7), np.ones(7, int)) for step in (10.0, 200.0)]
-    flags = [reading.garbled_altitudes(levels, np.ones(7), (), one.times)[3] for one in recording]
-    assert flags == [True, False]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assoc.errors import InvalidInputError
 from assoc.recordings import Recording, radar_of, scene_of_radars
 from assoc.recordings.several import parts_of_radars
 from assoc.scene.own_times import looked_at
@@ -51,19 +50,6 @@ def test_a_recording_that_ends_within_a_scan_looked_until_its_last_plot():
     np.testing.assert_allclose(scene.sectors[20, 0], [np.pi / 4, np.pi / 2], atol=1e-6)
     np.testing.assert_allclose(scene.sectors[20, 1], [-np.pi / 2, np.pi / 2], atol=1e-6)
     assert scene.sectors[21, 0, 0] == scene.sectors[21, 0, 1]
-
-
-def test_what_is_refused(recordings):
-    one, radar = recordings[0], radars(recordings)[0]
-    for arguments, options, words in [
-        (([], []), {}, "recordings: expected at least one"),
-        (([one], [radar, radar]), {}, "recordings: expected at least one"),
-        (([one], [radar]), {"rotations": [4.0, 5.0]}, "rotations: expected one for each"),
-        (([one], [radar]), {"rotations": [4.0], "interval": 5.0}, "interval: expected at most the shortest turn"),
-        (([one], [radar]), {"rotations": [4.0], "interval": 1e-9}, "makes more than"),
-    ]:
-        with pytest.raises(InvalidInputError, match=words):
-            scene_of_radars(*arguments, **options)
 
 
 def test_plots_with_and_without_heights_share_the_detections():

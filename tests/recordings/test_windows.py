@@ -1,7 +1,5 @@
 """Windows hold each aircraft once, as the antenna does; rotation times are found; other groupings are as described."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,7 +15,6 @@ from assoc.recordings import (
     irregular_groups,
     read_plots,
 )
-from assoc.recordings.rotation import _sums
 from tests.recordings.common import GROUPS_WITH_WINDOW, TABLE_2_1, circling
 
 
@@ -78,44 +75,6 @@ def test_the_rotation_is_found(turn):
     assert estimate_rotation(circling(turn=turn, turns=60)) == pytest.approx(turn, rel=1e-3)
 
 
-def test_the_rotation_of_a_single_aircraft():
-    assert estimate_rotation(circling(turns=60, aircraft=1, jitter=0.05)) == pytest.approx(9.5, rel=0.01)
-
-
-def test_no_rotation_in_noise_or_too_little():
-    rng = np.random.default_rng(1)
-    noise = Recording(np.sort(rng.uniform(0, 900, 800)), np.ones(800), rng.uniform(-3, 3, 800))
-    with pytest.raises(InvalidInputError, match="no rotation time from 2 to 30 s fits"):
-        estimate_rotation(noise)
-    with pytest.raises(InvalidInputError, match="cannot be estimated from 2 plots"):
-        clustering_time_window(Recording([0.0, 1.0], [1.0, 1.0], [0.0, 0.1]))
-    assert clustering_time_window(Recording([], [], [])) == []
-    for rotation in (0.0, -1.0, math.nan, math.inf, "9.5"):
-        with pytest.raises(InvalidInputError, match="rotation: expected seconds > 0"):
-            clustering_time_window(circling(), rotation)
-    with pytest.raises(InvalidInputError, match="by: expected"):
-        clustering_time_window(circling(), 9.5, by="bearing")
-
-
-def joined(*parts):
-    return Recording(
-        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("times", "ranges", "azimuths", "identities")),
-        sources=np.concatenate([p.sources for p in parts]),
-    )
-
-
-def test_gaps_of_hours():
-    bearings = np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60])
-    # after three hours and a bit the antenna is somewhere else
-    parts = [circling(turns=30, bearings=bearings, seed=k, start=k * 11_003.7) for k in range(3)]
-    recording = joined(*parts)
-    assert estimate_rotation(recording) == pytest.approx(9.5, rel=1e-3)
-    windows = clustering_time_window(recording)
-    holds_each_once(recording, windows)
-    assert all(w.times[-1] - w.times[0] < 2 * 9.5 for w in windows)
-    assert len(windows) <= 3 * 31
-
-
 def test_a_drifting_motor():
     # the rotation slows down by 2 %: at the end the antenna is four turns behind the first rotation time
     bearings = np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60])
@@ -151,31 +110,3 @@ def test_groupings_without_a_window(tmp_path):
     ):
         with pytest.raises(InvalidInputError, match=message):
             call()
-
-
-@pytest.mark.slow
-def test_groups_without_number_are_refused():
-    recording = circling()
-    for mean, shape in ((1e-300, 2.0), (6.2, 1e-300)):
-        with pytest.raises(InvalidInputError, match="mean, shape: .* make more than 10000000 groups"):
-            irregular_groups(recording, np.random.default_rng(0), mean, shape)
-    with pytest.raises(InvalidInputError, match="seconds: 1e-300 s is too short"):
-        fixed_groups(recording, 1e-300)
-    with pytest.raises(InvalidInputError, match="shortest: 1e-09 s makes too many"):
-        estimate_rotation(recording, 1e-9, 30.0)
-
-
-def test_rotations_of_numpy():
-    recording = circling()
-    expected = [len(one) for one in clustering_time_window(recording, 10)]
-    assert [len(one) for one in clustering_time_window(recording, np.int64(10))] == expected
-    assert [len(one) for one in clustering_time_window(recording, np.float32(10))] == expected
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 1000])
-def test_sums_over_plots_at_many_frequencies(count):
-    rng = np.random.default_rng(count)
-    times, bearings = np.sort(rng.uniform(0.0, 300.0, 50)), rng.uniform(0.0, 2 * np.pi, 50)
-    frequencies = 0.05 + 1e-3 * np.arange(count)
-    expected = np.exp(1j * (2 * np.pi * np.outer(frequencies, times) - bearings)).sum(axis=1)
-    np.testing.assert_allclose(_sums(times, bearings, frequencies), expected, atol=1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from assoc import Scene, build_problem
+from assoc import Scene
 from assoc.errors import InvalidInputError
 from assoc.recordings.several import NO_HEIGHT
 from assoc.registration import RegistrationParameters, Term, register, with_biases
@@ -16,9 +16,7 @@ from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
 from assoc.registration.observability import describe
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
-from assoc.simulation import simulate
-from assoc.simulation.observation import observe
-from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.radars import on_circle
 from assoc.simulation.turning import Path, observe_in_turns
 from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
 
@@ -39,15 +37,6 @@ def test_large_biases_are_found_within_what_it_says(found):
     assert np.abs(off[in_range]).max() < 25.0 and np.degrees(np.abs(off[np.logical_not(in_range)]).max()) < 0.03
     assert found.observed.all() and found.open == () and found.significant
     assert 0.9 < found.noise < 1.1
-
-
-def test_residuals_before_and_after(found):
-    for s, sensor in enumerate(found.sensors):
-        own = found.residuals[s]
-        assert len(own.time) == len(own.before) == len(own.after) > 100
-        # fitted residuals are smaller than the noise; those before show the bias
-        assert (own.after.std(axis=0) < np.sqrt(np.diagonal(sensor.covariance))).all()
-        assert np.abs(own.before[:, 0].mean()) > 3.0 * np.abs(own.after[:, 0].mean()) + 5.0
 
 
 @pytest.mark.slow
@@ -104,24 +93,6 @@ def _target(scene, k, row):
     return int(scene.truth.sources[k][s][row[s] - 1])
 
 
-def test_unbiased_scenes_stay_as_they_are():
-    scene = scene_of(radars(), 5)
-    result = register(scene)
-    assert not result.significant and result.correct(scene) is scene
-    assert "stay unchanged" in result.summary()
-
-
-def test_registered_scene_is_the_unbiased_one(found):
-    scene = biased_scene()
-    after, plain = found.correct(scene), scene_of(radars())
-    for z, y in zip(after.measurements[2], plain.measurements[2], strict=True):
-        np.testing.assert_allclose(z[:, 0], y[:, 0], atol=25.0)
-        np.testing.assert_allclose(z[:, 1:], y[:, 1:], atol=np.radians(0.03))
-    assert after.truth is scene.truth and after.sensors == scene.sensors
-    with pytest.raises(InvalidInputError, match="sensors"):
-        found.correct(scene_of(radars(2)))
-
-
 def test_two_radars_at_one_place():
     place = np.array([-60e3, 0.0, 0.0])
     result = register(scene_of(radars(places=[place, place]), 1, 10))
@@ -143,14 +114,6 @@ def _leads(result):
     return [first[component] for component in ("range", "bearing", "elevation")]
 
 
-def test_a_radar_alone():
-    result = register(scene_of(radars(1), 1, 5))
-    assert result.tuples == 0 and not result.observed.any() and not result.significant
-    assert (result.biases == 0).all() and "no bias is observable" in result.summary()
-    # nothing is known of the residuals
-    assert np.isnan(result.noise) and result.to_dict()["noise"] is None
-
-
 @pytest.mark.slow
 def test_clocks_only_by_their_differences():
     clocks = (0.5, -0.7, 0.2)
@@ -162,14 +125,6 @@ def test_clocks_only_by_their_differences():
     again = register(result.correct(scene), components=("range", "azimuth", "elevation", "time"))
     left = np.array([again.of(s)["time"] for s in range(3)])
     assert np.abs(left - left.mean()).max() < 0.1
-
-
-@pytest.mark.slow
-def test_clocks_with_a_reference():
-    scene = late_scene(radars(), (0.0, -0.7, 0.2), scans=20)
-    result = register(scene, components=("time",), reference=("radar 1",))
-    assert result.open == () and result.of(0) == {}
-    assert result.of(1)["time"] == pytest.approx(-0.7, abs=0.06)
 
 
 def test_places_need_a_reference():
@@ -184,45 +139,6 @@ def test_places_need_a_reference():
     free = register(scene, components=("range", "azimuth", "position"))
     named = " ".join(free.open)
     assert all(f"{axis} of radar" in named for axis in "xyz")
-
-
-def test_sensors_that_report_positions():
-    view = np.array(REGION, dtype=float)
-    sensors = [
-        PositionSensor(position=np.zeros(3), noise=np.full(3, 60.0), field_of_view=view, name=name) for name in "ab"
-    ]
-    scene = with_biases(scene_of(sensors, 4), [{}, {"x": 200.0, "y": -100.0, "z": 50.0}])
-    result = register(scene, reference=("a",))
-    np.testing.assert_allclose(result.biases, [200.0, -100.0, 50.0], atol=4.0 * 60.0 * np.sqrt(2.0 / 200))
-
-
-@pytest.mark.slow
-def test_range_and_azimuth_without_heights():
-    flat = [
-        Radar2D(
-            position=one.position, noise=np.array([50.0, 1e-3]), field_of_view=one.field_of_view[:2],
-            false_alarm_rate=2.0, name=one.name,
-        )
-        for one in radars()
-    ]  # fmt: skip
-    wrong = [{"range": 100.0, "azimuth": np.radians(0.1)}, {"azimuth": np.radians(-0.15)}, {"range": -100.0}]
-    scene = with_biases(scene_of(flat, 6, 30), wrong)
-    result = register(scene, range_spread=100.0, angle_spread=np.radians(0.15))
-    off = (result.biases - truth_of(result, wrong)).reshape(3, 2)
-    assert np.degrees(np.abs(off[:, 1]).max()) < 0.03 and np.abs(off[:, 0]).max() < 60.0
-
-
-@pytest.mark.slow
-def test_bearings_beside_radars():
-    sensors = radars(2) + [
-        BearingSensor(
-            position=[0.0, -60e3, 0.0], noise=np.array([2e-3]), false_alarm_rate=2.0,
-            field_of_view=np.array([[0.0, np.pi]]), name="bearings",
-        )
-    ]  # fmt: skip
-    wrong = [{"range": 100.0}, {"azimuth": np.radians(0.1)}, {"azimuth": np.radians(-0.3)}]
-    result = register(with_biases(scene_of(sensors, 7, 20), wrong))
-    assert np.degrees(result.of(2)["azimuth"]) == pytest.approx(-0.3, abs=0.05)
 
 
 def test_bearings_with_times_of_their_own():
@@ -243,16 +159,6 @@ def test_bearings_with_times_of_their_own():
     late = Scene(plain.sensors, plain.times, plain.measurements, REGION, measurement_times=times)
     result = register(late)
     assert result.tuples > 20 and np.isfinite(result.biases).all()
-
-
-@pytest.mark.slow
-def test_measurements_with_times_of_their_own():
-    """Antennas that turn in 4, 5 and 5.5 s: looks are moved to one time by their targets' motion."""
-    scene = with_biases(simulate("rotating-radars", 1, duration=80.0), BIASES)
-    result = register(scene)
-    off = result.biases - truth_of(result, BIASES)
-    assert (np.abs(off) < 4.5 * result.deviations).all() and result.deviations[0] < 8.0
-    assert result.noise < 1.2
 
 
 def heard_scene(seed=3, share=0.75):
@@ -287,12 +193,6 @@ def test_radars_whose_plots_have_heights_or_not():
     for s in range(6):
         parts = [np.concatenate([scan[s][:, :2] for scan in one.measurements]) for one in (corrected, clean)]
         assert np.abs(parts[0] - parts[1]).mean(axis=0) @ [1.0, 1e5] < 60.0
-
-
-def test_false_alarms_do_not_disturb():
-    scene = with_biases(scene_of(radars(false_alarms=150.0), 8), BIASES)
-    result = register(scene)
-    assert (np.abs(result.biases - truth_of(result, BIASES)) < 4.5 * result.deviations).all()
 
 
 @pytest.mark.slow
@@ -331,25 +231,6 @@ def test_bad_input():
     assert RegistrationParameters(components=["range"]).components == ("range",)
 
 
-def test_scans_with_too_many_tuples_are_passed_over():
-    scene = scene_of(radars(), 1, 4)
-    count = build_problem(scene, 0).num_tuples
-    result = register(scene, max_tuples=count // 4)
-    assert result.skipped > 0 and "passed over" in result.summary()
-
-
-def test_correction_undoes_itself():
-    scene = scene_of(radars(), 1, 2)
-    there = with_biases(scene, BIASES)
-    back = with_biases(there, [{name: -value for name, value in own.items()} for own in BIASES])
-    for z, y in zip(back.measurements[0], scene.measurements[0], strict=True):
-        np.testing.assert_allclose(z, y, atol=1e-9)
-    _, where, velocity = paths(1, 2)
-    sensor = scene.sensors[0]
-    moved = corrected_measurements(sensor, sensor.measure(where[0] - 0.5 * velocity), {"time": 0.5}, velocity)
-    np.testing.assert_allclose(moved, sensor.measure(where[0]), rtol=1e-9)
-
-
 def test_files(found, tmp_path):
     found.to_json(tmp_path / "biases.json")
     content = json.loads((tmp_path / "biases.json").read_text())
@@ -370,11 +251,6 @@ def test_files(found, tmp_path):
     assert list(frame.columns) == ["sensor", "component", "unit", "bias", "sigma", "observed"]
 
 
-def test_same_seed_same_biases():
-    scene = biased_scene(scans=6)
-    assert np.array_equal(register(scene).biases, register(scene).biases)
-
-
 def test_late_measurements_are_left_out():
     """A third of a radar's measurements come three scans late: they would take their look before the one before."""
     scene = scene_of(radars(2), 3, 6)
@@ -392,35 +268,12 @@ def test_late_measurements_are_left_out():
     assert np.isfinite(register(late).biases).all()
 
 
-def test_noise_that_is_widened_is_not_doubted():
-    """A single aircraft flies away from precise radars: warnings, which fail a test, would be of noise nobody gave."""
-    options = {"range_noise": 30.0, "angle_noise": 5e-4, "detection_probability": 0.99, "false_alarm_rate": 1e-9}
-    sensors = [radar_over(REGION, np.array([x, 0.0, 0.0]), name=f"{x}", **options) for x in (-50e3, -20e3)]
-    where = [np.array([[10e3 + 800.0 * k, 0.0, 9e3]]) for k in range(12)]
-    rng = np.random.default_rng(1)
-    scene = observe(sensors, 4.0 * np.arange(12), [np.zeros(1, dtype=np.int64)] * 12, where, rng, region=REGION)
-    assert register(scene).tuples >= 5
-
-
 def test_the_shift_of_many_sensors_together_is_named():
     """Each of 30 has a small part in it."""
     view = [[-1e5, 1e5]] * 2
     sensors = [PositionSensor(position=np.zeros(3), noise=[20.0] * 2, field_of_view=view) for _ in range(30)]
     named = describe(np.full(30, 30**-0.5), [Term(s, "x") for s in range(30)], sensors)
     assert named == "x of sensor 1 + x of sensor 2 + x of sensor 3 + x of sensor 4 ..."
-
-
-def test_biases_that_are_none_are_refused():
-    scene = scene_of(radars(2), 1, 2)
-    for biases, match in (
-        ([{}], "biases: expected one mapping for each of 2 sensors, got 1"),
-        ([{}, {"rnge": 100.0}], "biases of sensor 1: .* range, azimuth, elevation, gain, got 'rnge': 100.0"),
-        ([{"time": 1.0}, {}], "biases of sensor 0"),
-        ([{"range": "100"}, {}], "biases of sensor 0"),
-        ([{}, None], "biases"),
-    ):
-        with pytest.raises(InvalidInputError, match=match):
-            with_biases(scene, biases)
 
 
 def test_heading_and_position_of_platforms():

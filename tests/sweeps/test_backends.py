@@ -53,15 +53,6 @@ def test_batches_take_about_their_time_and_leave_nothing_out(study):
     assert found == runs
 
 
-def test_the_job_is_small_and_shared_once(study):
-    import pickle
-
-    from assoc.sweeps.worker import Batch
-
-    batch = Batch(study.settings, [(0, 0, 0, scan) for scan in range(5)])
-    assert len(pickle.dumps(batch)) < 3000
-
-
 @pytest.mark.slow
 def test_an_interrupted_study_goes_on_in_processes_and_is_the_same(slow, expected, tmp_path):
     class EnoughError(Exception):
@@ -136,19 +127,6 @@ def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
     assert [worker.poll() for worker in workers] == [-signal.SIGKILL] * 2
     # complete, without doubles, and the same
     assert counts.new == slow.size == len(load(tmp_path / "s")) and same(tmp_path / "s", expected)
-
-
-@pytest.mark.slow
-def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, start_worker):
-    def lose(counts):
-        if counts.new >= 20 and not lost:
-            lost.append(scheduler.process.kill())
-
-    start_worker()
-    lost = []
-    with pytest.raises(InvalidInputError, match="same command goes on"):
-        slow.run(tmp_path / "s", scheduler=scheduler, progress=lose, **SMALL)
-    assert len(load(tmp_path / "s")) >= 20
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://", "127.0.0.1:9"])

@@ -5,7 +5,6 @@ import os
 import shutil
 import sqlite3
 import time
-import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.old_form import import_study
-from assoc.sweeps.sources import StudySource, named_sources
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import COLUMNS, DATABASE, PARAMETERS, Store
 from tests.sizes import few_or_all
 
@@ -57,14 +56,6 @@ def test_a_row_is_a_run_that_assign_gives_again(study, whole, scene):
     for scan, row in best.iterrows():
         one = expected.scans[scan]
         assert row["true_tuples"] == one.true_tuples and row["correct_tuples"] == one.correct_tuples
-
-
-def test_traces_end_at_the_cost_of_their_run(whole):
-    frame, traces = load(whole), load_traces(whole)
-    last = traces.groupby(["setting", "scene", "scan", "repeat"])["cost"].last()
-    costs = frame.set_index(["setting", "scene", "scan", "repeat"])["cost"]
-    assert np.allclose(last.reindex(costs.index), costs)
-    assert (traces.groupby(["setting", "scene", "scan", "repeat"])["cost"].diff().dropna() < 0).all()
 
 
 def test_a_kill_at_any_moment_of_writing_leaves_whole_batches(study, whole, tmp_path):
@@ -157,18 +148,6 @@ def test_spoiled_bytes_are_read_or_refused_in_one_line(whole, count):
     assert refused > count / 4
 
 
-@pytest.mark.parametrize("value", [{"a": 1}, [1, 2], "high", None, True, 10**400])
-def test_parameters_of_any_kind_are_shown(whole, value):
-    """One setting has a value that no other has the like of: columns of mixed kinds are sorted all the same."""
-    with Store(whole) as store:
-        key, (_, parameters) = next(iter(store.settings().items()))
-    text = json.dumps({**parameters, "alpha": value})
-    spoiled(whole, "UPDATE settings SET parameters = ? WHERE key = ?", text, key)
-    frame = load(whole)
-    assert len(frame) == 40
-    assert str(value) in set(map(str, frame["alpha"])) or value in (None, True) and frame["alpha"].nunique() >= 1
-
-
 def test_a_changed_design_adds(study, whole):
     before = rows_of(whole)
     more = replace(study, settings=[*study.settings, *grid("greedy")], repeats=3)
@@ -177,13 +156,6 @@ def test_a_changed_design_adds(study, whole):
     assert {*before} <= {*rows_of(whole)}
     frame = load(whole)
     assert len(frame) == 75 and not frame.duplicated(["setting", "scene", "scan", "repeat"]).any()
-
-
-def test_a_run_is_kept_once(study, whole):
-    before = rows_of(whole)
-    with Store(whole, study.manifest) as store:
-        assert store.append(study.settings, [(*row[:5], 1.0, *row[6:]) for row in before]) == 0
-    assert rows_of(whole) == before
 
 
 def test_another_study_is_refused(study, whole, scene, tmp_path):
@@ -212,14 +184,6 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
     (tmp_path / "full" / "thesis.txt").write_text("mine")
     with pytest.raises(InvalidInputError, match="contains other files and no study"):
         study.run(tmp_path / "full")
-
-
-def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
-    scene.save(tmp_path / "b.npz")
-    again = StudySource(Scene.load(tmp_path / "b.npz"), "b.npz")
-    assert replace(study, sources=[again], scans=None).run(whole).new == 0
-    with pytest.raises(InvalidInputError, match="is the same as"):
-        named_sources([scene, again.content], ["a.npz", "b.npz"])
 
 
 def test_two_sweeps_at_once_share_a_study(study, whole, tmp_path):
@@ -266,23 +230,6 @@ def test_a_study_of_version_1_is_read_into_a_new_folder(scene, tmp_path):
     assert set(frame["scene"]) == {"scene.npz"} and set(frame["alpha"].dropna()) == {1.0, 2.0}
     with pytest.raises(InvalidInputError, match="holds no study of an earlier version"):
         import_study(tmp_path / "new", tmp_path / "again")
-
-
-def test_what_is_wrong_in_an_old_study_is_left_out_or_refused(tmp_path):
-    shutil.copytree(OLD, tmp_path / "old")
-    lines = (OLD / "runs.jsonl").read_bytes().splitlines(keepends=True)
-    for number, (name, value) in enumerate([("cost", "much"), ("scan", 10**30), ("trace", [[1, 2]]), ("seed", None)]):
-        changed = [*lines]
-        at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
-        entry = json.loads(lines[at][9:])
-        entry[name][-1] = value
-        body = json.dumps(entry).encode()
-        changed[at] = b"%08x %s\n" % (zlib.crc32(body), body)
-        (tmp_path / "old" / "runs.jsonl").write_bytes(b"".join(changed))
-        assert import_study(tmp_path / "old", tmp_path / str(number)) == (12 - len(entry["scan"]), 2)
-    (tmp_path / "old" / "study.json").write_text('{"format": "assoc.study", "version": 1, "seed": 1e999}')
-    with pytest.raises(InvalidInputError, match="study.json: is damaged"):
-        import_study(tmp_path / "old", tmp_path / "n")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes that have names")

@@ -5,14 +5,11 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from assoc.errors import InvalidInputError
-from assoc.plotting.study_figures import convergence, draw_convergence, draw_heat_maps, new_figure
 from assoc.problem import AssignmentProblem
-from assoc.sweeps import compare, grid, load, load_traces, summarize
-from assoc.sweeps.bootstrap import mean_interval, resampled_means, weighted_mean
+from assoc.sweeps import grid, load, summarize
+from assoc.sweeps.bootstrap import mean_interval, resampled_means
 from assoc.sweeps.comparison import paired
 from assoc.sweeps.study import Study
-from assoc.sweeps.summary import latex
 
 
 def test_one_problem_many_repeats_is_the_ordinary_bootstrap():
@@ -33,16 +30,6 @@ def test_the_interval_covers_the_mean_where_problems_differ():
         covered += low <= 0.0 <= high
     # 190 expected; repeats alone would cover about 40
     assert covered >= 180
-
-
-def test_gaps_weights_and_equal_values():
-    values = np.array([[1.0, np.nan], [3.0, 5.0]])
-    assert weighted_mean(values) == 3.0
-    low, high = mean_interval(values)
-    assert 1.0 <= low < 3.0 < high <= 5.0
-    assert weighted_mean(np.array([[1.0, 0.0]]), np.array([[1.0, 3.0]])) == 0.25
-    assert mean_interval(np.full((7, 3), 1e9 / 3)) == (1e9 / 3, 1e9 / 3)
-    assert np.isnan(mean_interval(np.full((2, 2), np.nan))).all() and np.isnan(weighted_mean(np.full((1, 1), np.nan)))
 
 
 def test_settings_are_compared_over_the_same_draws():
@@ -67,28 +54,6 @@ def test_the_summary_is_the_mean_of_the_rows(study, tmp_path):
         assert row["correct"] == pytest.approx(runs["correct_tuples"].sum() / runs["true_tuples"].sum())
         for name in ("cost", "gap", "optimal", "iterations", "time", "correct"):
             assert row[f"{name}_low"] <= row[name] + 1e-12 and row[name] <= row[f"{name}_high"] + 1e-12
-
-
-@pytest.mark.slow
-def test_every_kind_of_design_can_be_drawn(study, scene, tmp_path):
-    study.run(tmp_path / "a")
-    frame = load(tmp_path / "a")
-    drawn = [*draw_heat_maps(frame, tmp_path / "h.png"), draw_convergence(tmp_path / "a", tmp_path / "c.pdf")]
-    settings = [*grid("aco", {"alpha": [1, 2]}), *grid("milp", {"backend": ["scip", "highs"]}), *grid("greedy")]
-    Study(study.sources, settings, 1).run(tmp_path / "b")
-    drawn += draw_heat_maps(load(tmp_path / "b"), tmp_path / "h.svg")
-    assert [path.name for path in drawn] == ["h.png", "c.pdf", "h-aco.svg", "h-milp.svg"]
-    for path in drawn:
-        begin = {".png": b"\x89PNG\r\n", ".pdf": b"%PDF", ".svg": b"<?xml"}[path.suffix]
-        assert path.read_bytes().startswith(begin) and path.stat().st_size > 8_000
-    with pytest.raises(InvalidInputError, match="no runs yet"):
-        draw_heat_maps(frame.iloc[:0], tmp_path / "h.png")
-
-
-def test_the_curves_are_labelled(study, tmp_path):
-    study.run(tmp_path / "s")
-    figure = convergence(load(tmp_path / "s"), load_traces(tmp_path / "s"), new_figure())
-    assert [ax.get_xlabel() for ax in figure.axes] == ["iteration", "ms"]
 
 
 def made(rows):
@@ -120,29 +85,7 @@ def test_settings_are_compared_in_pairs():
     assert (row["low"], row["high"]) == pytest.approx((-pairs.mean() - half, -pairs.mean() + half), abs=half)
 
 
-def test_settings_are_named_by_words(study, tmp_path):
-    study.run(tmp_path / "s")
-    table = compare(tmp_path / "s", "aco,alpha=1,rho=0.3", "alpha=2,rho=0.9").set_index("measure")
-    frame = load(tmp_path / "s")
-    means = [frame[(frame["alpha"] == a) & (frame["rho"] == r)]["iterations"].mean() for a, r in ((1, 0.3), (2, 0.9))]
-    assert table.loc["iterations", ["first", "second"]].tolist() == pytest.approx(means)
-    assert table.loc["cost", "difference"] == pytest.approx(table.loc["excess", "difference"])
-    for words, message in (
-        ("alpha=1", "names 2 settings of the study, expected one; they differ in rho"),
-        ("greedy", "names 0 settings"),
-        ("colour=1", "no setting of the study has a parameter 'colour'"),
-    ):
-        with pytest.raises(InvalidInputError, match=message):
-            compare(frame, words, "alpha=2,rho=0.9")
-
-
 def test_the_excess_is_over_the_best_of_all_solvers(scene, tmp_path):
     problem = AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-3.0, -2.0, -2.0], [2, 2])
     Study(problem, [*grid("greedy"), *grid("exact")]).run(tmp_path / "s")
     assert load(tmp_path / "s").set_index("solver")["excess"].to_dict() == {"greedy": 1.0, "exact": 0.0}
-
-
-def test_a_table_for_latex():
-    text = latex(["solver", "mean cost", "95 %"], [["my_own", "-1.50", "-2 .. 3"], ["b", "-", "-"]])
-    assert text.splitlines()[0] == r"\begin{tabular}{lrr}"
-    assert r"my\_own & -1.50 & -2 -- 3 \\" in text and r"95 \%" in text

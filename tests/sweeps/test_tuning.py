@@ -2,13 +2,11 @@
 
 import json
 
-import numpy as np
 import pytest
 
-from assoc.errors import InvalidInputError
 from assoc.sweeps import load, tune
 from assoc.sweeps.space import Range, Values
-from assoc.sweeps.tuning import default_space, scores
+from assoc.sweeps.tuning import default_space
 
 
 def test_ranges_of_the_defaults_are_what_the_solver_takes():
@@ -18,20 +16,6 @@ def test_ranges_of_the_defaults_are_what_the_solver_takes():
     assert space["rho"].low == 0.075 and 0.99 < space["rho"].high < 1.0
     assert "iterations" not in space and "patience" not in space and "mode" not in space
     assert default_space("greedy") == {}
-
-
-def test_scores():
-    cost, bound = np.array([-5.0, -4.0, np.nan]), np.array([-5.0, -5.0, np.nan])
-    time = np.array([0.1, 0.01, np.nan])
-    assert scores(cost, bound, time, "gap", 1.0).tolist() == [0.0, 1.0, 1e6]
-    assert scores(cost, bound, time, "time", 2.0).tolist() == [0.1, 20.0, 20.0]
-
-
-@pytest.mark.parametrize(("name", "count"), [("trials", 0), ("trials", 2.0), ("repeats", 0), ("repeats", True)])
-def test_counts_that_are_none(tmp_path, name, count):
-    with pytest.raises(InvalidInputError, match=f"{name}: expected a whole number >= 1, got {count}"):
-        tune(tmp_path / "t", [], "aco", **{name: count})
-    assert not (tmp_path / "t").exists()
 
 
 def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_path):
@@ -53,15 +37,3 @@ def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_p
     # the same again only reads
     again = tune(tmp_path / "t", study.sources, "aco", space, 8, repeats=2, seed=1)
     assert again.tuned == report.tuned and len(load(tmp_path / "t")) == len(frame)
-
-
-def test_a_default_that_is_no_trial_is_compared_all_the_same(study, tmp_path):
-    report = tune(tmp_path / "t", study.sources, "aco", {"ants": Range(1, 5, whole=True)}, 1, repeats=1)
-    assert report.default.parameters["ants"] == 15 and np.isfinite(report.training).all()
-
-
-def test_nothing_to_tune(study, tmp_path):
-    with pytest.raises(InvalidInputError, match="nothing to tune"):
-        tune(tmp_path / "t", study.sources, "greedy", trials=2)
-    with pytest.raises(InvalidInputError, match="target"):
-        tune(tmp_path / "t", study.sources, "aco", trials=2, target="cost")

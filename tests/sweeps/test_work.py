@@ -1,13 +1,11 @@
 """The time of a run is the solver's own: never that of compiling, loading or importing."""
 
 import sys
-from dataclasses import replace
 
 import numba
 import numpy as np
 import pytest
 
-import assoc
 from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
@@ -68,11 +66,3 @@ def test_a_run_done_again_has_the_same_random_numbers(tmp_path, monkeypatch):
     Study([StudySource(chain(2), "two")], [Setting("restless", {})], 3).run(tmp_path / "s")
     # after one to warm up
     assert len(drawn) == 13 and [drawn.count(one) for one in dict.fromkeys(drawn[1:])] == [4, 4, 4]
-
-
-def test_a_worker_with_other_code_is_refused(study):
-    from assoc.sweeps.worker import Batch, Job, run_batch
-
-    job = Job(tuple(study.sources), replace(study.manifest, code="0" * 16))
-    with pytest.raises(assoc.InvalidInputError, match="other code"):
-        run_batch(job, Batch(study.settings, [(0, 0, 0, 0)]))
