@@ -103,6 +103,18 @@ def test_columns_that_do_not_fit_leave_nothing():
         assert remainder_of(full, basis, one, none, allowed.slack) is None
 
 
+def test_nothing_left_is_a_program_without_rows():
+    for packing in packings(2, 20):
+        program = program_with_cuts(packing, np.random.default_rng(0))
+        basis, allowed = solved(packing, program)
+        none = np.zeros(0, dtype=np.int64)
+        rest = remainder_of(program, basis, none, none, np.ones_like(allowed.slack))
+        assert rest.program.sides.size == rest.variable.size == rest.rows.size == 0
+        # rows that must be covered stay, although no column can cover them
+        rest = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
+        assert rest.rows.size == program.sides.size and rest.variable.size == rest.rows.size
+
+
 def test_where_no_variable_of_a_basis_is_left_it_begins_with_anchors():
     for packing in packings(2, 20):
         program = program_with_cuts(packing, np.random.default_rng(0))
