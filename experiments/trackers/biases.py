@@ -78,44 +78,27 @@ def gospa(scene: Scene, truth: Scene, registration: str | None = None) -> float:
     return float(distances(truth, done.tracks).mean())
 
 
-def accuracy(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim]:
-    """Errors of the biases from about 1,000 plots."""
-    claims = []
+def measured(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim]:
+    """Errors of the biases from about 1,000 plots, then GOSPA as a multiple of that without biases."""
+    scenes = [simulate(seed) for seed in seeds]
+    plain = np.array([gospa(scene, scene) for scene in scenes])
+    claims = [mean_claim(f"{label}, no biases: GOSPA", "m", plain)]
     for size in SIZES:
-        off = np.array([errors(first_plots(scene, PLOTS), wrong) for scene, wrong in _cases(simulate, size, seeds)])
+        start = f"{label}, {size[0]:g} m, {size[1]:g} deg"
+        cases = [biased(scene, size, seed) for scene, seed in zip(scenes, seeds, strict=True)]
+        off = np.array([errors(first_plots(scene, PLOTS), wrong) for scene, wrong in cases])
         for i, (name, unit, most) in enumerate((("range", "m", RANGE_GOAL), ("azimuth", "deg", AZIMUTH_GOAL))):
             each = np.sqrt((off[..., i] ** 2).mean(axis=1))
-            what = f"{label}, {words(size)}: RMS error of {name}"
-            claims.append(mean_claim(what, unit, each))
+            claims.append(mean_claim(f"{start}: RMS error of {name}", unit, each))
             if size == SIZES[-1]:
-                claims.append(goal(what, unit, each, most))
-    return claims
-
-
-def words(size: tuple[float, float]) -> str:
-    """Biases of this size in words."""
-    return f"{size[0]:g} m, {size[1]:g} deg"
-
-
-def _cases(simulate: Simulate, size: tuple[float, float], seeds: Sequence[int]) -> list[tuple[Scene, Array]]:
-    return [biased(simulate(seed), size, seed) for seed in seeds]
-
-
-def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim]:
-    """GOSPA with biases, registered before, and online, as multiples of that without biases."""
-    claims: list[Claim] = []
-    plain = np.array([gospa(scene, scene) for scene in map(simulate, seeds)])
-    claims.append(mean_claim(f"{label}, no biases: GOSPA", "m", plain))
-    for size in SIZES:
-        found: dict[str, list[float]] = {"with biases": [], "registered": [], "online": []}
-        for seed, (scene, _) in zip(seeds, _cases(simulate, size, seeds), strict=True):
-            truth = simulate(seed)
-            found["with biases"].append(gospa(scene, truth))
-            found["registered"].append(gospa(register(scene).correct(scene), truth))
-            found["online"].append(gospa(scene, truth, "online"))
-        for name, values in found.items():
-            ratio = np.array(values) / plain
-            what = f"{label}, {words(size)}, {name}: GOSPA / without biases"
+                claims.append(goal(f"{start}: RMS error of {name}", unit, each, most))
+        pairs = list(zip(scenes, (scene for scene, _ in cases), strict=True))
+        for name, values in {
+            "with biases": [gospa(scene, truth) for truth, scene in pairs],
+            "registered": [gospa(register(scene).correct(scene), truth) for truth, scene in pairs],
+            "online": [gospa(scene, truth, "online") for truth, scene in pairs],
+        }.items():
+            what, ratio = f"{start}, {name}: GOSPA / without biases", np.array(values) / plain
             claims.append(mean_claim(what, "", ratio))
             # the largest biases are to be found, and where there are none nothing is to be spoiled
             if name != "with biases" and size in (SIZES[0], SIZES[-1]):
@@ -132,8 +115,7 @@ def experiment(chosen: Namespace) -> list[Claim]:
     for label, simulate in kinds.items():
         scenes = chosen.seeds if label == "simulated" else chosen.seeds // 2
         seeds = [chosen.seed + k for k in range(2 if chosen.quick else max(2, scenes))]
-        claims += accuracy(label, simulate, seeds)
-        claims += tracking(label, simulate, seeds)
+        claims += measured(label, simulate, seeds)
     return claims
 
 
