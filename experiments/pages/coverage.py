@@ -1,24 +1,16 @@
-"""What of the five papers is where, and whether it holds: the tables of docs/papers.md, every element a row."""
+"""What of the five papers is where, and whether it holds: the tables of docs/papers.md, every element a row.
 
+The rows are written in papers/*.md, what stands in braces there is Python: of a function's names here, and of verdicts.
+"""
+
+import re
 from pathlib import Path
 from statistics import median
 
 from experiments.benchmarks.rows import load
 from experiments.common.claims import Claim
 from experiments.common.results import Results, number, table
-from experiments.pages.coverage_time_window import clustering_time_window
-from experiments.pages.verdicts import (
-    ABSENT,
-    CHANGES,
-    FOLDER,
-    HOLDS,
-    NOT,
-    at_the_edge,
-    below_one,
-    filled,
-    interval,
-    verdict,
-)
+from experiments.pages.verdicts import CHANGES, FOLDER, HOLDS, NOT, filled, interval, verdict
 from experiments.papers.dubins_enkf.ensemble import Q_SIGMA, R_SIGMA
 from experiments.papers.modified_ekf.paper_setting import STEPS, Q
 
@@ -52,34 +44,7 @@ def ant_colony() -> str:
     reading = nearest.quantity.removeprefix("reading, ").removesuffix(": mean cycles")
     sweep = Results("metaheuristics.sweep")
     many = {n: sweep.starting(f"ghosts {n}, paper: table 1's advice")[0] for n in (20, 40)}
-    return filled("ant-colony", [
-        f"{verdict(*settings)}: {number(cycles.ours)} on average of the settings ({interval(cycles)}) against "
-        f"{number(cycles.paper or 0.0)}, the mean of table 1; nearest of the readings of what is left open: "
-        f"{number(nearest.ours)} ({interval(nearest)}) against {number(nearest.paper or 0.0)}, {reading}",
-        f"{ABSENT}, not shown either way: {number(greater.ours, 2)} cycles ({interval(greater)}), all of it from the "
-        f"settings with alpha = 1; in table 1 {number(greater.paper or 0.0, 2)}",
-        f"{ABSENT}, nothing to show: all settings find the optimum of every scan; so does greedy on "
-        f"{greedy.ours:.0f} of 100",
-        f"{verdict(quick)}: place {number(quick.ours, 2)} of 24 by time ({interval(quick)}), as the paper means it, "
-        f"{number(rank.ours, 2)} by cycles ({interval(rank)})",
-        f"{verdict(alone, all_saw)}, on one run of the scene: {number(alone.ours)} % of {_of(alone)} false alarms are "
-        f"left alone; of {_of(all_saw)} targets that all 3 radars saw {number(all_saw.ours)} % are found with just "
-        "these measurements. A target that one radar alone saw is taken for a false alarm, by our reading of "
-        "equation 5",
-        f"{verdict(seen)}, on one run: {number(seen.ours)} % of {_of(seen)} targets that only 2 radars saw are found "
-        "with just these measurements",
-        f"{verdict(paper_solved)}: {paper_solved.ours:.0f} of 100 scans to the optimum, with its three targets. The "
-        "paper has no comparison with it, and no scene of the many targets that the conclusion names: on ghosts of "
-        f"20 and 40 targets its rho, alpha and beta end {number(many[20].ours, 2)} ({interval(many[20])}) and "
-        f"{number(many[40].ours, 2)} % ({interval(many[40])}) above it",
-        f"{ABSENT} of that problem; on ghosts of 20 and 40 targets annealing as in `docs/own_solver.md` ends "
-        f"{' and '.join(_excess('annealing', size) for size in ('20', '40'))} % above the optimum (median), greedy "
-        f"{' and '.join(_excess('greedy', size) for size in ('20', '40'))} %; the genetic algorithm "
-        f"{' and '.join(_excess('genetic', size) for size in ('20', '40'))} %, tabu search "
-        f"{' and '.join(_excess('tabu', size) for size in ('20', '40'))} % and the ants "
-        f"{' and '.join(_excess('aco', size) for size in ('20', '40'))} %. These three share dives in the linear "
-        "program and local search, which annealing has not: it is no comparison of the four ideas",
-    ])  # fmt: skip
+    return filled("ant-colony", locals(), _of=_of, _excess=_excess)
 
 
 def _of(claim: Claim) -> str:
@@ -91,6 +56,89 @@ def _excess(solver: str, size: str) -> str:
     """Median excess over the optimum in the family ghost of docs/benchmarks.csv, percent."""
     rows = [row for row in load(TABLE) if (row.family, row.size, row.solver) == ("ghost", size, solver)]
     return number(100.0 * median(row.excess for row in rows), 2)
+
+
+def clustering_time_window() -> str:
+    """The thesis on the clustering time window."""
+    r = Results("papers.clustering_time_window")
+    t = Results("papers.clustering_time_window.tables")
+    groups = [t[f"table 4.{n}: plots of our window {n} in it"] for n in (1, 2, 3)]
+    twice = [t[f"table 4.{n}: aircraft that are in the group twice"] for n in range(1, 9)]
+    turn = t["table 2.1: rotation time estimated"]
+    heading, grid = t.starting("headings")[0], t.starting("positions of tables")[0]
+    places = t["aircraft 2428: places in its track without the window"]
+    better = t["aircraft of the five whose plots the window's track holds more of"]
+    noise = t.starting("table 4.24")[0]
+    gain = r["CT gained by the window with constant step, Reid's MHT"]
+    o = Results("papers.clustering_time_window.own_tracker")
+    falls, fell = r.starting("MT of the last three rows")[0], o["recordings in which MT falls by 20 points or more"]
+    judged, most = o["recordings judged"], o.starting("largest fall of MT")[0]
+    at_10 = t["table 2.1: aircraft twice in one of our windows of 10 s"]
+    reid = {misses: f"Reid's MHT, constant step, {misses} misses" for misses in (3, 5, 8)}
+    oriented = "track-oriented MHT, time stamps"
+
+    def together(what: str, tracker: str = "") -> str:
+        suffix = f", times chosen by us, {tracker}" if tracker else ""
+        return f"{t[f'five aircraft: {what}{suffix}'].ours:.0f}"
+
+    def by_misses(what: str) -> str:
+        return ", ".join(together(what, name) for name in reid.values())
+
+    anew = "times that our track ends and another begins"
+
+    rates = {key: [r[f"{rate}, Reid's MHT, {key}"] for rate in ("CT", "MT", "IT")]
+             for key in ("irregular groups", "CTW")}  # fmt: skip
+    ours = {key: ", ".join(number(claim.ours) for claim in claims) for key, claims in rates.items()}
+    paper = {key: ", ".join(number(claim.paper or 0.0) for claim in claims) for key, claims in rates.items()}
+    pairs = {name: r.starting(f"{name}: pairs without an identity switch, MHT")[0]
+             for name in ("crossing", "parallel", "head-on")}  # fmt: skip
+    loss = r.starting("false start, at the same place: lost by it, first")[0]
+    alone = {}
+    for name in pairs:
+        three, five, swapped = (
+            o[f"{name}: pairs {what}, {reid[misses]}"]
+            for what, misses in (("without a switch", 3), ("without a switch", 5), ("with a swap", 3))
+        )
+        alone[name] = (
+            f"{HOLDS if five.ours == 100 else NOT} with the thesis's own tracker (Reid, constant step) if tracks end "
+            f"after 5 misses (the thesis gives no number): no switch in {number(five.ours, 2)} % of our pairs "
+            f"({interval(five)}); after 3 in {number(three.ours, 2)} % ({interval(three)}), "
+            f"{number(swapped.ours, 2)} % swapped, the rest begun anew"
+        )
+    beside = {"parallel": " (1694 and 3673), which begin 25 nmi apart (table 4.1), ours fly 5 nmi apart"}
+    m = Results("papers.clustering_time_window.spanning_tree")
+    place = "false start, at the same place: "
+    own_first = next(c for c in o.starting(f"{place}tracks that begin") if reid[3] in c.quantity)
+    own_right = next(c for c in o.starting(f"{place}tracks whose identity is right") if reid[3] in c.quantity)
+    own_loss = next(c for c in o.starting(f"{place}lost by it, first") if reid[3] in c.quantity)
+    straight = o.starting("straightness: mean change of direction from position to position, smoothed")
+
+    by_angle = "whole seconds, windows by the antenna's angle, 10 s"
+
+    def bends(name: str) -> str:
+        return number(o[f"straightness: mean change of direction from position to position, {name}"].ours, 2)
+
+    def clock(name: str) -> str:
+        twice = o[f"{name}: plots of aircraft that the window has already"]
+        ct = o[f"{name}: CT, Reid's MHT, constant step"]
+        return f"{number(twice.ours, 2)} % second plots of an aircraft in a window, CT {number(ct.ours)} %"
+
+    lost = r.starting("false start, at the same place: tracks whose identity is right")
+    weak = min(lost, key=lambda claim: claim.ours)
+    first = " and ".join(number(c.ours, 2) for c in r.starting("false start, at the same place: tracks that begin"))
+
+    def held(name: str, identity: int, what: str = "plots of") -> str:
+        return f"{next(c for c in t.starting(f'aircraft {identity}: {what}') if name in c.quantity).ours:.0f}"
+
+    aircraft = (902, 2467, 903, 958, 2428)
+    known = [t.starting(f"aircraft {a}: plots of its")[0].quantity for a in aircraft]
+    every = ", ".join(re.findall(r"of its (\d+)", text)[0] for text in known)
+    flown = [
+        f"{alone[name]}. With the track-oriented tracker and time stamps {number(pairs[name].ours, 2)} % have no "
+        f"switch ({interval(pairs[name])}). The thesis has pictures of one pair{beside.get(name, '')}"
+        for name in pairs
+    ]
+    return filled("clustering-time-window", locals())
 
 
 def modified_ekf() -> str:
@@ -128,43 +176,7 @@ def modified_ekf() -> str:
                                                                              "B1 in the plane, Radar2D"))  # fmt: skip
     ukf = b["B1 in the plane, Radar2D: full modified EKF / UKF (RMSE)"]
     products, (jacobian,) = b.starting("state-space matrices: largest"), b.starting("state-space matrices: A")
-    return filled("modified-ekf", [
-        f"{verdict(*debiased)} with the terms corrected (third rows of 2.17 and 2.18: sin phi; 2.19: C13; 2.24: T' "
-        "on the right, and its entry 2, 3; short form of R_c, which is not sampled: sigma_theta^4): mean and "
-        f"covariance against a million samples. The plain conversion is off by "
-        f"{number(b.starting('debiased measurements: bias')[0].ours, 2)} standard deviations there. The filter does "
-        "not use them: it debiases the residual",
-        f"{NOT}: an overconfident filter has it, too. On B1, chosen by us, the EKF's NEES is {number(nees[0].ours)} "
-        f"(ideal 6), the modified filter's {number(nees[1].ours)}",
-        *variables,
-        f"{NOT} with the paper's model: ratio {number(ratio['sigmas'].ours)} (sigmas), {number(ratio['R_k'].ours)} "
-        f"(R_k) against {number(ratio['sigmas'].paper or 0.0, 2)} by table 4.3. Two readings that are not the paper's "
-        f"are below 1: {number(ratio['moving'].ours)} ({interval(ratio['moving'])}) if the target moves, "
-        f"{number(ratio['mixed'].ours)} ({interval(ratio['mixed'])}, without the paper's) if the EKF alone is given "
-        "R_k, with x, y, z "
-        f"{' '.join(ours)} against {' '.join(printed)} and errors {number(min(larger), 2)} to {number(max(larger), 2)} "
-        "times the paper's",
-        f"{verdict(small, large)}: they are RMSE x 100 in metres, and table 4.3 has {number(small.ours)} and "
-        f"{number(large.ours)}, the one of y in m, the other of Vx in m/s; the text's upper end, 0.0115598, is the "
-        "EKF's Vz. Those of the EKF likewise",
-        f"{NOT} from the given start: the model ends at {', '.join(number(end, 4) for end in given)} m, with a "
-        f"standard deviation of {number((STEPS * Q) ** 0.5, 2)} m by Q, against "
-        f"{', '.join(number(c.paper or 0.0, 4) for c in ends)}. With the start drawn with P_0 it {verdict(*ends)}, "
-        "within two standard deviations",
-        f"{verdict(*errors)}: with x, y, z measured with R_k the errors after 100 steps are "
-        f"{', '.join(number(c.ours, 2) for c in errors)} m (RMSE), figure 4.9 less figure 4.8 is "
-        f"{', '.join(number(c.paper or 0.0, 2) for c in errors)}",
-        f"{NOT} in the paper's setting; {verdict(*b1)} on B1, chosen by us: {number(b1[0].ours)} times the EKF's error "
-        f"({interval(b1[0])})",
-        f"{verdict(*products)} as products with the state: they give equations 4.7 to 4.14 (to rounding), the first "
-        "but for z = 0, the second for x = 0, by which they divide. Their entries depend on the state: the model is "
-        "not linear, as section 1.3 says that it is, and A of section 4.1.2 not the Jacobian, from whose change in a "
-        f"step its own differs by {number(100 * jacobian.ours, 2)} % around the start of table 4.1",
-        f"{verdict(plane, ukf)} for a radar of range and azimuth: {number(plane.ours)} times the error of the EKF "
-        f"({interval(plane)}), {number(ukf.ours)} times a UKF's, on B1 in the plane, chosen by us",
-        f"{ABSENT} in the paper; here a prediction without a correction: {number(missed.ours)} times the error of the "
-        f"EKF ({interval(missed)}) on B1 with P_d 0.7, chosen by us",
-    ])  # fmt: skip
+    return filled("modified-ekf", locals(), Q=Q, STEPS=STEPS)
 
 
 def fuzzy_ekf() -> str:
@@ -199,30 +211,7 @@ def fuzzy_ekf() -> str:
                 for s in scenarios]  # fmt: skip
 
     against = [r[f"{s}: the paper's rules, tuned sets / best fixed EKF of constant acceleration"] for s in scenarios]
-    return filled("fuzzy-ekf", [
-        f"{HOLDS}, but for S of equation 35 in alpha: with R_0, where the paper has R_k. With R_k, scaled by the r "
-        "of the measurement before (r_k itself follows from alpha), and the tuned sets the errors are "
-        f"{', '.join(number(ratio) for ratio in current)} times as large in C to H",
-        f"{NOT} with sets tuned by us: alpha = 1 gives {free}, alpha = 0, which the rules call near zero, {zero}, so "
-        "that no alpha lowers them: the tuning is not held to the names of the sets. Sets held to their names give "
-        f"{held} at alpha = 1",
-        f"{ABSENT}: its flight is not given; ours are six manoeuvres chosen by us, with the angle noise that makes "
-        f"the raw RMSE the paper's ({span(raw)} m), and one run of the first is drawn",
-        f"{NOT} taken literally, in km and rad: {span(literal)} m without rules, worse than the raw measurements",
-        f"{NOT} on our flights, which are not the paper's: {span(plain)} m, the best of a grid for each",
-        f"{NOT} on our flights: {span(gained)} %",
-        f"{NOT} on our flights: {span(rules)} m",
-        f"{verdict(*below)} on our flights: {span(below)} %",
-        f"{below_one(against)} scenarios with its whole interval: "
-        f"{', '.join(number(c.ours) for c in against)} times the error, in C to H, of the fixed EKF of the same model "
-        "that is best for each in hindsight; against 0.69 in the paper",
-        f"{below_one(single)} scenarios with its whole interval: {', '.join(number(c.ours) for c in single)} times its "
-        "error in C to H, a few percent either way; against 0.69 in the paper. Sets held to their names: "
-        f"{', '.join(number(c.ours) for c in named)}",
-        f"{ABSENT} in the paper, which names them: EKFs tuned once on the same flights have "
-        f"{', '.join(against_acceleration('Singer'))} (Singer) and {', '.join(against_acceleration('jerk'))} (jerk) "
-        "times the error of constant acceleration in C to H",
-    ])  # fmt: skip
+    return filled("fuzzy-ekf", locals())
 
 
 def dubins_enkf() -> str:
@@ -267,51 +256,7 @@ def dubins_enkf() -> str:
     def beside(claims: list[Claim]) -> str:
         return ", ".join(f"{number(c.ours)} ({number(c.paper or 0.0)})" for c in claims)
 
-    return filled("dubins-enkf", [
-        f"{ABSENT}: the paper gives no values. Those of the published aircraft are 200 to 310 m/s and 1,000 to 6,000 "
-        f"N: in our two simulations speeds are {number(min(c.ours for c in speeds))} to "
-        f"{number(max(c.ours for c in speeds))} m/s, above the limit in both, the thrust chosen by us "
-        f"{number(thrust.ours)} N; L / (m g) is {number(min(loads), 2)} to {number(max(loads), 2)}",
-        f"{ABSENT} as a limit: none is given; with the noise chosen by us the least heights are {heights} m",
-        f"{verdict(steps)}: the paper's steps with r_s = r_f, as in both simulations, give our four lengths (to "
-        "rounding); the package has one radius. With r_s 100 and r_f 50 m the steps give "
-        + ", ".join(f"{word} {value}" for word, value in two_radii.items()) + " m",
-        f"{HOLDS} for 14, arcs and tangent; 15 and 16, which differentiates it, are not legible in our copy. The "
-        "paper prints no length; ours in m: "
-        + ", ".join(f"{word} {value}" for word, value in lengths.items()),
-        f"{verdict(best)} with headings from the x axis, as the points of figure 3 need; the text says from the "
-        "y axis, where it does not hold",
-        f"{verdict(*points)}: as tangent points of another RSL path, on which the heading is {number(tangent.ours)} "
-        "deg there, not the printed pi / 3 and 0",
-        f"{verdict(*srs)} as a path that can be flown: it turns at the obstacle's 30 m, where the radius is 100, and "
-        f"has kinks of {' and '.join(number(c.ours, 2) for c in srs[1:])} deg against the printed headings; the "
-        f"shortest that can be flown has {number(flown.ours, 4)} m",
-        f"{ABSENT} in the paper, whose filter flies on a model of height and speed. An aircraft that steers by its "
-        f"estimate along the paths of figures 2 and 3, noise chosen by us, is seen {along('estimate from the path')} m "
-        f"from the path (RMS, N 300; EKF {along('estimate from the path', 'EKF')}, within chance), and "
-        f"{along('estimate from the aircraft')} m from where it is",
-        f"{verdict(best)} without an obstacle, among the paper's four words; {verdict(*srs)} with one: figure 3 cannot "
-        "be flown",
-        f"{verdict(*fixed)} within 10 %, chosen by us ({at_the_edge(*fixed)}), and built in: ours (paper's) "
-        f"{beside(fixed)}, process noise chosen as the paper's errors, measurement noise as {number(min(noises), 3)} "
-        f"to {number(max(noises), 3)} times that; start (272 m/s) and step (0.0167 s) are chosen by us, too",
-        f"{verdict(*third)}: {beside(third)}",
-        f"{verdict(*treble)}: {beside(treble)}",
-        f"{verdict(*other)} within 10 % ({at_the_edge(*other)}), built in like the first: {beside(other)}; "
-        "noise and the course of the attack are chosen by us. The speed's error is printed 18291",
-        f"{verdict(*members['fixed attack'])}: of 100, 200 and 500 members' errors those of 300 are "
-        f"{sizes('fixed attack')} times; 0.98 and less would be better, chosen by us",
-        f"{verdict(*members['changing attack'])}: of 100, 300 and 500 members' errors those of 200 are "
-        f"{sizes('changing attack')} times; the text itself uses 100",
-        f"{verdict(*measured)} for climb angle and speed: with x and h alone their errors are "
-        f"{' and '.join(number(c.ours) for c in measured if 'x, h / all' in c.quantity)} times as large, with x alone "
-        f"{' and '.join(number(c.ours) for c in measured if 'x / x, h' in c.quantity)} times those, and the height's "
-        f"{number(high.ours)} times that with all",
-        f"{ABSENT}: without the paper's noise near has no measure. With ours the errors are "
-        f"{number(min(shares), 2)} to {number(max(shares), 2)} times the standard deviations of the measurements "
-        "(fixed attack, N 300)",
-        f"{NOT} together: of the same errors section d says \"far apart\" (terpaut jauh) and the conclusion \"near\"",
-    ])  # fmt: skip
+    return filled("dubins-enkf", locals())
 
 
 TABLES = {

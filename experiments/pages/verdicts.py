@@ -1,12 +1,13 @@
 """How the rows of the coverage tables say whether a claim holds, and what is filled into them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from experiments.common.claims import Claim
 from experiments.common.results import number
 
 FOLDER = Path(__file__).with_name("papers")
-"""The tables as they are written by hand, with {} where a result has figures."""
+"""The tables as they are written by hand, with {what gives it} where a result has figures."""
 HOLDS, NOT, ABSENT = "holds", "does not hold", "absent"
 CHANGES = ("new", "verdict", "words")
 """What a later reading of a paper changed of a row: there was none, whether it holds, how that is said."""
@@ -49,9 +50,7 @@ def interval(claim: Claim) -> str:
     return f"95 % interval {number(low, 2)} to {number(high, 2)}"
 
 
-def filled(name: str, results: list[str]) -> str:
-    """The table of a paper with its results, in their order."""
+def filled(name: str, found: Mapping[str, object], **more: object) -> str:
+    """The table of a paper: its file is an f-string of what was found and of what is above."""
     text = (FOLDER / f"{name}.md").read_text(encoding="utf-8").rstrip("\n")
-    if text.count("{}") != len(results):
-        raise ValueError(f"{name}.md: expected {len(results)} times {{}}, found {text.count('{}')}")
-    return text.format(*results)
+    return str(eval(f"f'''{text}'''", {**globals(), **found, **more}))
