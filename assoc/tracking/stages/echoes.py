@@ -22,7 +22,7 @@ from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import dwells
 
 # odds above which a track is hidden, and below which it is a target for good
-_HIDDEN, _TARGET = math.log(9.0), -8.0
+_HIDDEN, _TARGET = math.log(3.0), -8.0
 # a track is young up to so many detections
 _YOUNG = 12
 # standard deviations within which plots share a component, and beyond which they differ
@@ -55,7 +55,8 @@ def hide_echoes(progress: Progress) -> Progress:
 def _living(echoes: Echoes, ids: Array, shown: Array) -> Echoes:
     """The pairs of tracks that are left; those that ended without being shown are counted."""
     left, short = np.isin(echoes.ids, ids), echoes.short.copy()
-    ended = ~left[:, 0] & (echoes.counts[:, FRESH] > 0.0) & ~np.isin(echoes.ids[:, 0], shown)
+    tied = (echoes.counts[:, FRESH] > 0.0) & (echoes.counts[:, HITS] > 1.0)
+    ended = ~left[:, 0] & tied & ~np.isin(echoes.ids[:, 0], shown)
     once = np.unique(np.column_stack([echoes.ids[ended, 0], echoes.kinds[ended]]), axis=0)
     np.add.at(short, tuple(once[:, 1:].T), 1.0)
     return echoes.of(np.asarray(left.all(axis=1)))._replace(short=short)
@@ -105,7 +106,9 @@ def _counted(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Arra
 def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, s: int) -> Echoes:
     """Add pairs of young tracks and those at whose range or azimuth a plot of sensor s lies."""
     here = np.flatnonzero(plots[:-1, s])
-    young, here = here[tracks.hits[here] <= _YOUNG], here[tracks.hits[here] > 1]
+    # what may be an echo of one target may turn to the echo of another
+    open = np.isin(tracks.track_id[here], echoes.ids[:, 0])
+    young, here = here[(tracks.hits[here] <= _YOUNG) | open], here[tracks.hits[here] > 1]
     if not len(young) or not len(here):
         return echoes
     assert progress.before is not None
@@ -122,7 +125,8 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         around = _near(values, ours, theirs[tracks.confirmed[here]], _ROUND * spread[axis], sensor.angular[axis])[0]
         crowd = np.maximum((np.bincount(around, minlength=len(young)) - 1.0) / (2.0 * _ROUND), density)
         crowded = math.sqrt(2.0 * math.pi) * crowd >= 1.0
-        often = np.count_nonzero(fresh[young] & ~crowded) * 2.0 * _APART * density
+        # twice in a row, and other plots than false alarms are shown
+        often = np.count_nonzero(fresh[young] & ~crowded) * (2.0 * _APART * density) ** 2
         chance, crowded = np.full(len(first), math.sqrt(2.0 * math.pi) * density), crowded[first]
         first, second = young[first], here[second]
         off = _apart(progress, s, plots[first, s] - 1, plots[second, s] - 1)[0]
@@ -130,7 +134,7 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         if axis == AZIMUTH:
             # an echo is a little farther, at any scale: its detour is as likely between 1 and 2 km as between 2 and 4
             chance *= np.maximum(off[:, RANGE], 0.0) / width[RANGE] * math.log(width[RANGE] / spread[RANGE])
-            often *= 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
+            often *= (1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()) ** 2
         else:
             away = np.abs(away)
         expected[s, axis] += often
@@ -169,21 +173,37 @@ def _known(echoes: Echoes, ids: Array, s: int, axis: int) -> Array:
     return np.isin(ids @ [most, 1], ours @ [most, 1])
 
 
+def rather_echoes(progress: Progress, tracks: TrackBatch) -> Array:
+    """Which tracks, tentative ones too, are rather echoes than targets, bool (T,)."""
+    echoes = progress.state.echoes
+    if echoes is None or not len(echoes.ids):
+        return np.zeros(len(tracks), dtype=np.bool_)
+    return np.isin(tracks.track_id, echoes.ids[_log_odds(progress, echoes, tracks) > _HIDDEN, 0])
+
+
+def _log_odds(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Array:
+    """Log odds of each pair, (K,)."""
+    settings, (s, _) = progress.settings, echoes.kinds.T
+    P = np.array([sensor.detection_probability for sensor in settings.sensors])[s]
+    share: Any = np.append(settings.views.at_means(tracks.states), np.ones((1, len(settings.sensors))), axis=0)
+    return echoes.log_odds(P * share[_at(tracks.track_id, echoes.ids[:, 0]), s])
+
+
 def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
     """Decide which tracks are hidden, and forget pairs that are decided."""
-    settings = progress.settings
     echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
-    P = np.array([sensor.detection_probability for sensor in settings.sensors])[echoes.kinds[:, 0]]
-    share: Any = np.append(settings.views.at_means(tracks.states), np.ones((1, len(settings.sensors))), axis=0)
-    odds = echoes.log_odds(P * share[echo, echoes.kinds[:, 0]])
-    confirmed = np.append(tracks.confirmed, False)
-    above = (odds > _HIDDEN) & confirmed[target]
-    # echoes have no echoes of their own
-    above &= ~np.isin(echoes.ids[:, 1], echoes.ids[above, 0])
-    rows = np.flatnonzero(above & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden)))
-    hidden, first = np.unique(echoes.ids[rows, 0], return_index=True)
-    found, new = echoes.found.copy(), ~np.isin(hidden, echoes.hidden)
-    np.add.at(found, tuple(echoes.kinds[rows[first[new]]].T), 1.0)
+    odds, confirmed = _log_odds(progress, echoes, tracks), np.append(tracks.confirmed, False)
+    above = (odds > _HIDDEN) & confirmed[target] & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden))
+    # echoes have no echoes of their own; the surest first
+    rows, theirs, sure = {}, set[int](), np.flatnonzero(above)
+    for row in sure[np.argsort(-odds[sure], kind="stable")].tolist():
+        one, other = echoes.ids[row].tolist()
+        if one not in theirs and one not in rows and other not in rows:
+            rows[one] = row
+            theirs.add(other)
+    hidden, found = np.array(sorted(rows), dtype=np.int64), echoes.found.copy()
+    new = [rows[one] for one in hidden[~np.isin(hidden, echoes.hidden)].tolist()]
+    np.add.at(found, tuple(echoes.kinds[new].T), 1.0)
     # tracks are taken for targets when they are young no more
     grown = tracks.confirmed & (tracks.hits == _YOUNG + 1) & (tracks.missed == 0)
     targets = echoes.targets + np.count_nonzero(~np.isin(tracks.track_id[grown], hidden))

@@ -23,6 +23,7 @@ from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.life_cycle import OVERLOOKED
 from assoc.tracking.records.track import renamed
 from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.stages.echoes import rather_echoes
 
 # ends are kept for this share of a target's mean lifetime
 _KEPT = 0.25
@@ -43,6 +44,7 @@ def take_up(progress: Progress) -> Progress:
         tracks = method.current(progress.state)
         # single false alarms score less
         likely = (tracks.missed == 0) & (tracks.score > 0.0)
+        likely &= ~rather_echoes(progress, tracks)
         new = tracks[(tracks.confirmed | likely) & ~np.isin(tracks.track_id, sure)]
         coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
         # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
