@@ -62,16 +62,6 @@ def test_a_single_measurement_is_a_target_only_at_negative_cost():
     assert scan.false_alarms == 1 and scan.positions is None and scan.time is None
 
 
-def test_the_seed_of_a_scan_does_not_depend_on_what_was_solved_before():
-    scene = simulate("bearing-only", targets=6, scans=4)
-    plan = Plan((scene,), "aco", seed=5, parameters={"mode": "paper", "iterations": 40})
-    forward = [plan((0, k)) for k in range(4)]
-    backward = [plan((0, k)) for k in reversed(range(4))][::-1]
-    for one, other in zip(forward, backward, strict=True):
-        assert np.array_equal(one.solution.tuples, other.solution.tuples)
-        assert one.solution.iterations == other.solution.iterations
-
-
 def test_each_scan_has_random_numbers_of_its_own():
     drawn = []
 

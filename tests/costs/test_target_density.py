@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from assoc.costs import build_problem, tuple_costs
-from assoc.costs.prices import expected_targets
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor
@@ -84,21 +83,6 @@ def test_growing_finds_what_trying_all_tuples_finds(name, density):
         assert found.keys() == wanted.keys() and wanted
         for row, cost in found.items():
             assert cost == pytest.approx(wanted[row], abs=1e-6)
-
-
-def test_the_expected_number_of_targets():
-    scene = simulate("crowd", 0, targets=200, scans=4)
-    assert expected_targets(scene) == pytest.approx(200, rel=0.05)
-    empty = Scene(scene.sensors, [0.0], [[np.zeros((0, s.dim)) for s in scene.sensors]])
-    assert expected_targets(empty) == 1.0
-    # and the density is that number over the region
-    volume = float(np.prod(scene.region[:, 1] - scene.region[:, 0]))
-    row = [scene.scan(0).true_tuples()[0].tolist()]
-    np.testing.assert_allclose(
-        tuple_costs(scene, 0, row, target_density="auto"),
-        tuple_costs(scene, 0, row, target_density=expected_targets(scene) / volume),
-        rtol=0, atol=0.7,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("density", [0.0, -1.0, math.nan, math.inf, "many", True, [1.0]])

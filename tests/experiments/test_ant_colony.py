@@ -11,7 +11,7 @@ import assoc
 from assoc.simulation import simulate
 from experiments.common.claims import load_json
 from experiments.papers.ant_colony import __main__ as experiment
-from experiments.papers.ant_colony import readings, truth
+from experiments.papers.ant_colony import readings
 
 
 def measured(cycles):
@@ -76,14 +76,3 @@ def test_the_walk_written_twice_takes_as_many_cycles():
     # and the start matters: ants that all start on the best tour agree much sooner
     quick = [readings.cycles(tuples, costs, readings.READINGS[6], rng) for _ in range(80)]
     assert np.mean(quick) < np.mean(plain) - 5 * error
-
-
-def test_the_truth_is_counted():
-    scene = simulate("three-radar", seed=3, scans=5)
-    found = truth.shares(scene, assoc.associate(scene, "exact"))
-    sources = [np.concatenate(scene.scan(k).sources) for k in range(5)]
-    assert found["false alarms left alone"][1] == sum(int((one < 0).sum()) for one in sources)
-    seen = [np.unique(one[one >= 0], return_counts=True)[1] for one in sources]
-    for n in (2, 3):
-        every = found[f"targets seen by {n} radars, found with just these"][1]
-        assert every == sum(int((one == n).sum()) for one in seen)

@@ -12,7 +12,6 @@ from experiments.papers.clustering_time_window import (
     pairs,
     published,
     spanning_tree,
-    tables,
     traffic,
 )
 from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
@@ -121,24 +120,3 @@ def test_the_thesiss_own_tracker(tmp_path):
     )
     assert ours[one] > 5 * ours[other]
     assert ours["head-on: pairs without a switch, Reid's MHT, time stamps"] == 100
-
-
-def test_the_thesiss_tables_are_on_the_radars_grid():
-    # three rows of its table 4.9 (aircraft 902): 117, 118 and 120 nautical miles at 220.8352 degrees, as in table 2.1
-    places = np.array([(-54.6461, 63.22964), (-55.1132, 63.77006), (-56.0473, 64.85091)])
-    assert tables.polar(places)[:, 0] == pytest.approx([117, 118, 120], abs=1e-3)
-    assert tables.polar(places)[:, 1] == pytest.approx([220.8352] * 3, abs=1e-3)
-    # it flies away from the radar along that bearing
-    assert tables.headings(places) == pytest.approx([220.8352] * 2, abs=0.1)
-    # north, east, south, west on a screen whose y points down
-    square = np.array([(0, 0), (0, -1), (1, -1), (1, 0), (0, 0.0)])
-    assert tables.headings(square) % 360 == pytest.approx([0, 90, 180, 270])
-
-
-def test_tables_become_a_recording_with_times():
-    rows = [{"x_px": 0.0, "y_px": -y, "altitude_fl": 100.0} for y in (50.0, 50.8, 51.6, 58.0)]
-    recording = tables.as_recording({7: rows})
-    # 220 m/s for a turn of 9.5 s are 0.8 pixels: the last step took eight turns
-    assert np.diff(recording.times) / traffic.ROTATION == pytest.approx([1, 1, 8], abs=0.02)
-    assert recording.ranges / 1852 == pytest.approx(np.array([50.0, 50.8, 51.6, 58.0]) * 7 / 5)
-    assert recording.bearings == pytest.approx([0.0] * 4, abs=1e-9)

@@ -1,6 +1,5 @@
-"""Kalman filter, EKF and UKF give what filterpy gives, to 1e-9; a motion model what Stone Soup gives."""
+"""Kalman filter, EKF and UKF give what filterpy gives, to 1e-9."""
 
-import datetime
 import math
 import warnings
 
@@ -12,7 +11,6 @@ from assoc.filters import (
     ExtendedKalmanFilter,
     Gaussian,
     KalmanFilter,
-    Singer,
     UnscentedKalmanFilter,
 )
 from assoc.sensors import Radar3D
@@ -21,7 +19,6 @@ from tests.filters.common import PLACE
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     filterpy = pytest.importorskip("filterpy.kalman")
-    pytest.importorskip("stonesoup")
 
 START = Gaussian([30e3, 20e3, 5e3, -150.0, -100.0, 10.0], np.diag([1e4, 2e4, 3e4, 400.0, 300.0, 200.0]))
 RADAR = Radar3D(
@@ -91,16 +88,3 @@ def test_filterpy_unscented():
         same(state, theirs.x, theirs.P)
         assert done.log_likelihood[0] == pytest.approx(theirs.log_likelihood, abs=1e-6)
         np.testing.assert_allclose(done.covariance[0], theirs.S, rtol=1e-9, atol=1e-12)
-
-
-def test_singers_model_is_that_of_stone_soup():
-    from stonesoup.models.transition.linear import Singer as Peer
-
-    sigma, seconds = 3.0, 20.0
-    ours = Singer(sigma, seconds, dimensions=2)
-    theirs = Peer(noise_diff_coeff=2 * sigma**2 / seconds, damping_coeff=1 / seconds)
-    for dt in (0.5, 4.0, 30.0):
-        step = datetime.timedelta(seconds=dt)
-        F, Q = (one[0][::2, ::2] for one in ours.matrices(dt))
-        np.testing.assert_allclose(F, theirs.matrix(time_interval=step), rtol=1e-8, atol=1e-12)
-        np.testing.assert_allclose(Q, theirs.covar(time_interval=step), rtol=1e-6)

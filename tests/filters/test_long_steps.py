@@ -10,7 +10,6 @@ from assoc.filters import (
     CoordinatedTurn,
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
-    FunctionMeasurement,
     FuzzyAdaptiveEKF,
     Gaussian,
     InteractingMultipleModel,
@@ -22,7 +21,7 @@ from assoc.filters import (
     paper_rules,
 )
 from assoc.filters.kernels import gaussian, points
-from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
+from tests.filters.common import MOTION, PLACE, RADAR, random_state
 from tests.sizes import sample
 
 MIXED = [
@@ -92,23 +91,6 @@ def test_a_run_is_its_steps(name, dt):
         ):
             assert np.array_equal(ours, theirs)
     assert np.array_equal(whole.state.mean, state.mean) and type(whole.state) is type(state)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "sensor",
-    [BEARING, LinearMeasurement(np.eye(2, 6, 3), np.eye(2)), FunctionMeasurement(lambda x: x[:, :1], np.eye(1))],
-    ids=["bearing", "velocities", "function"],
-)
-def test_a_step_with_other_sensors(sensor):
-    ekf, state = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(4))
-    z = np.full((1, sensor.dim), 0.3)
-    for dt in (1.0, 2.0):
-        quick, slow = ekf.step(state, dt, z, sensor), ekf.update(ekf.predict(state, dt), z, sensor)
-        assert np.array_equal(quick.state.mean, slow.state.mean) and np.array_equal(quick.nis, slow.nis)
-        assert np.array_equal(quick.state.covariance, slow.state.covariance)
-        # one filter, two sensors in turn
-        assert ekf.step(state, dt, RADAR.measure(state.mean[:, :3]), RADAR).innovation.shape == (1, 3)
 
 
 @pytest.mark.parametrize("dt", [-1.0, np.nan, np.inf, "1"])

@@ -7,7 +7,6 @@ import pytest
 from assoc.errors import InvalidInputError
 from assoc.filters import (
     ConstantVelocity,
-    EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     Gaussian,
     InteractingMultipleModel,
@@ -51,17 +50,6 @@ def test_textbook():
     ll, square = ekf.compare(state, z, RADAR)
     np.testing.assert_allclose(np.diag(square), done.nis, rtol=1e-8)
     np.testing.assert_allclose(np.diag(ll), done.log_likelihood, rtol=1e-8)
-
-
-@pytest.mark.parametrize("make", [UnscentedKalmanFilter, lambda m: EnsembleKalmanFilter(m, 4000, 0)])
-def test_filters_of_points_agree(make):
-    rng = np.random.default_rng(1)
-    state = random_state(5, rng)
-    z, other = measured(state, rng), make(MOTION)
-    wanted = ExtendedKalmanFilter(MOTION).update(state, z, RADAR).state
-    found = other.update(other.start(state), z, RADAR).state
-    sigma = np.sqrt(np.einsum("bii->bi", wanted.covariance))
-    assert (np.abs(found.mean - wanted.mean) < 0.35 * sigma).all()
 
 
 def test_what_is_refused():

@@ -67,16 +67,6 @@ def test_pairs_are_as_many_as_brute_force_finds(seed):
         assert found.motp == pytest.approx(-best[1] / best[0])
 
 
-def test_label_switches():
-    #           a  b  a  -  a  b  a
-    sources = [0, 1, 0, -1, 0, 1, 0]
-    assert label_switches(sources, [7, 8, 7, 9, 7, 8, 7]) == 0
-    assert label_switches(sources, [7, 8, 8, 9, 8, 7, 8]) == 2
-    assert label_switches(sources, [7, 8, -1, 9, 7, -1, 6]) == 1
-    with pytest.raises(InvalidInputError, match="one shape|have one shape"):
-        label_switches([0, 1], [0])
-
-
 def test_identity_switches_of_plots():
     every = np.ones(40, dtype=bool)
     sources = np.tile([0, 1], 20)

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from assoc.errors import InvalidInputError
 from assoc.recordings import (
-    Recording,
     clustering_time_window,
     estimate_rotation,
     fixed_groups,
@@ -73,20 +72,6 @@ def test_stamps_in_whole_seconds_and_an_estimated_rotation():
 @pytest.mark.parametrize("turn", [2.5, 4.8, 9.5, 12.0, 28.0])
 def test_the_rotation_is_found(turn):
     assert estimate_rotation(circling(turn=turn, turns=60)) == pytest.approx(turn, rel=1e-3)
-
-
-def test_a_drifting_motor():
-    # the rotation slows down by 2 %: at the end the antenna is four turns behind the first rotation time
-    bearings = np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60])
-    recording = circling(turns=400, bearings=bearings, drift=5e-4)
-    stretched = recording.times + 2.5e-6 * (recording.times - 1000.0) ** 2
-    slowing = Recording(
-        stretched, recording.ranges, recording.azimuths, recording.identities, sources=recording.sources
-    )
-    windows = clustering_time_window(slowing, 9.5)
-    holds_each_once(slowing, windows)
-    # turns are counted, not multiples of the first rotation time
-    assert abs(len(windows) - 400) <= 1
 
 
 def test_groupings_without_a_window(tmp_path):

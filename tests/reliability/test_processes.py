@@ -150,18 +150,6 @@ def test_an_installation_that_cannot_be_written(tmp_path):
     assert os.listdir(temporary) == []
 
 
-@pytest.mark.slow
-def test_no_folder_for_temporary_files_either(tmp_path):
-    """A kernel is compiled all the same where nothing at all can be written."""
-    folder = copied(tmp_path / "site")
-    (folder / "assoc" / "__pycache__").write_text("")
-    (tmp_path / "home").write_text("")
-    (folder / "sitecustomize.py").write_text("import tempfile\ntempfile.tempdir = '/missing'\n")
-    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
-    one = first_run(folder, "assert not double.stats.cache_path", PYTHONDONTWRITEBYTECODE="1", **home)
-    assert (one.communicate(timeout=600)[1], one.returncode) == ("", 0)
-
-
 def test_this_process_works_while_others_start(tmp_path):
     """The first items are done here; others, as soon as the other process is there, by both."""
     here, there = os.getpid(), tmp_path / "there"

@@ -161,14 +161,6 @@ def test_a_stream_that_takes_a_part_is_an_error(tmp_path):
         file.write(b"x")
 
 
-@pytest.mark.parametrize("other", [FileNotFoundError(2, "No such file"), BrokenPipeError(32, "Broken pipe")])
-def test_errors_of_other_files_are_not_blamed_on_what_is_written(tmp_path, other):
-    with pytest.raises(OSError) as raised, written_gradually(tmp_path / "out") as file:
-        file.write(b"x")
-        raise other
-    assert raised.value is other and os.listdir(tmp_path) == []
-
-
 INTERRUPTED = """
 import sys, time
 from assoc._files.output import write_atomically

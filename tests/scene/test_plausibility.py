@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import assoc
-from assoc.errors import AssocWarning, InvalidInputError
+from assoc.errors import AssocWarning
 from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import simulate
@@ -144,17 +144,3 @@ def test_dates_become_seconds():
         np.testing.assert_allclose(Scene(scene.sensors, times, scene.measurements).times, wanted, rtol=0, atol=1e-5)
     apart = [one - dates[0] for one in dates]
     np.testing.assert_allclose(Scene(scene.sensors, apart, scene.measurements).times, [0, 1.5, 3], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("times", "message"),
-    [
-        ([datetime.datetime(2024, 1, 1), 1.0, 2.0], "times must be all dates or all seconds, got both"),
-        (np.array(["2024-01-01", "NaT", "2024-01-02"], "datetime64[s]"), "times must be complete"),
-        (["2024-01-01", "2024-01-02", "2024-01-03"], "times must be numbers"),
-    ],
-)
-def test_dates_that_are_refused(times, message):
-    scene = simulate("three-radar", scans=3)
-    with pytest.raises(InvalidInputError, match=message):
-        Scene(scene.sensors, times, scene.measurements)

@@ -140,41 +140,6 @@ def test_probability_of_a_cycle():
         assert state.probability[node] == pytest.approx(np.mean(shares), rel=1e-9)
 
 
-def _starts(problem):
-    """Number of the first measurement of each sensor, counted through."""
-    return np.cumsum(problem.sizes) - problem.sizes
-
-
-@pytest.mark.parametrize("mode", ["paper", "mmas"])
-def test_pheromone_by_tuple(mode):
-    """Histories are in the problem's tuples, and end where `assign` does."""
-    problem = assoc.build_problem(assoc.simulation.simulate("crowd", 0, targets=12, scans=1), 0)
-    limits = {"mode": mode, "iterations": 12, "refinement": "none"}
-    cycles = []
-    history = assoc.solvers.pheromone(problem, seed=2, watch=cycles.append, **limits)
-    solution = assoc.assign(problem, "aco", seed=2, **limits)
-    assert history.solution.cost == solution.cost
-    assert history.pheromone.shape == (len(history.cycles), len(history.tuples))
-    assert len(history.cycles) == max((one.number for one in cycles), default=0)
-    prices = dict(zip(map(tuple, problem.tuples.tolist()), problem.costs, strict=True))
-    assert history.costs == pytest.approx([prices[tuple(row)] for row in history.tuples.tolist()])
-    packing = assoc.packing.prepare.prepare(problem).packing
-    for one in cycles:
-        number = {tuple(row): i for i, row in enumerate(history.tuples.tolist())}
-        at = [number[tuple(row)] for row in problem.tuples[packing.origin[one.columns]].tolist()]
-        # the nodes' tuples, false alarms of measurements among them, are told with each cycle
-        assert one.tuples[: len(at)].tolist() == problem.tuples[packing.origin[one.columns]].tolist()
-        through = packing.row_origin[one.rows]
-        of_rows = np.where(one.tuples[len(at) :] > 0, one.tuples[len(at) :] - 1 + _starts(problem), -1).max(axis=1)
-        assert of_rows.tolist() == through.tolist()
-        assert (np.count_nonzero(one.tuples[len(at) :], axis=1) == 1).all()
-        np.testing.assert_array_equal(history.pheromone[one.number - 1, at], one.pheromone[: len(at)])
-        np.testing.assert_array_equal(history.visibility[one.number - 1, at], one.visibility[: len(at)])
-        np.testing.assert_array_equal(history.probability[one.number - 1, at], one.probability[: len(at)])
-    top = history.top(7)
-    assert top.tuples.shape == (7, 3) and top.chosen.all()
-
-
 def test_a_colony_learns_what_others_found():
     """A better cover from elsewhere is what every third cycle lays pheromone for."""
     one = with_greedy_cover(component(open_problem()))

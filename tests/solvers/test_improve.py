@@ -102,13 +102,6 @@ def test_what_is_worse_or_incomplete_is_not_kept():
     assert one.weight == weight
 
 
-def test_a_cover_that_is_kept_weighs_what_its_columns_do():
-    """Even if moves have accumulated rounding errors in it."""
-    one = component(PROBLEM)
-    (owner,) = random_covers(one, 1.0, 1)
-    assert one.offer(owner, one.weight_of(owner) + 1e-7) and one.weight == one.weight_of(owner)
-
-
 @pytest.mark.parametrize("name", ["mixed", "four"])
 def test_how_much_new_covers_are_improved(name):
     """none: not at all; local: halves are re-matched; full: exact sub-steps, too."""

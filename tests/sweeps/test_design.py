@@ -23,22 +23,6 @@ def test_equal_settings_have_equal_keys_whatever_was_left_out():
     assert copy == Setting("aco", {"alpha": 3}) and copy.parameters == Setting("aco", {"alpha": 3}).parameters
 
 
-def test_a_longer_random_design_begins_with_the_shorter_one():
-    space = {
-        "alpha": {"low": 0.5, "high": 3},
-        "ants": {"low": 2, "high": 200, "log": True},
-        "mode": ["paper", "mmas"],
-    }
-    short, long = random_settings("aco", space, 10, 4), random_settings("aco", space, 40, 4)
-    assert long[: len(short)] == short and len(long) > 30
-    assert all(0.5 <= s.parameters["alpha"] <= 3 and 2 <= s.parameters["ants"] <= 200 for s in long)
-    assert all(type(s.parameters["ants"]) is int for s in long)
-    assert {s.parameters["mode"] for s in long} == {"paper", "mmas"}
-    # logarithmic: about half of them lie below the geometric mean, 20
-    assert 10 < sum(s.parameters["ants"] < 20 for s in long) < 30
-    assert random_settings("aco", space, 10, 5) != short
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

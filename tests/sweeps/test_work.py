@@ -51,18 +51,3 @@ def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
     assert len(frame) == 6 and frame["time"].max() < 1.0
     # the warm-up, and one more run where something was loaded
     assert lazy.count(1) == 3 and lazy.count(2) == 3 and lazy.count(3) == 3
-
-
-def test_a_run_done_again_has_the_same_random_numbers(tmp_path, monkeypatch):
-    """Where something is imported in every run, each is done four times."""
-    drawn = []
-
-    def solve(packing, parameters, run):
-        monkeypatch.setitem(sys.modules, f"a_module_{len(drawn)}", sys)
-        drawn.append(run.rng.random())
-        return Outcome(np.arange(packing.num_columns), 1)
-
-    registry.register("restless", GreedyParameters, solve)
-    Study([StudySource(chain(2), "two")], [Setting("restless", {})], 3).run(tmp_path / "s")
-    # after one to warm up
-    assert len(drawn) == 13 and [drawn.count(one) for one in dict.fromkeys(drawn[1:])] == [4, 4, 4]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assoc import filters, simulation
+from assoc import simulation
 from assoc._files.npz import save_npz
 from assoc.errors import AssocError, InvalidInputError
 from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
@@ -147,23 +147,3 @@ def test_settings_that_cannot_be_read(settings, tmp_path):
     save_npz(path, FORMAT, VERSION, arrays_of(tracker) | {"settings": np.array(settings)})
     with pytest.raises(InvalidInputError, match="was saved by a tracker with other settings"):
         kind.for_scene(SCENE).restore(path)
-
-
-@pytest.mark.parametrize("callable_noise", [False, True])
-def test_a_state_under_another_process_noise_of_a_users_model_is_refused(tmp_path, callable_noise):
-    scene = simulation.simulate("three-radar", 1, scans=2)
-
-    def tracker(q):
-        def move(x, dt):
-            return np.column_stack([x[:, :3] + dt * x[:, 3:], x[:, 3:]])
-
-        noise = (lambda x, dt: q * dt * np.eye(6)) if callable_noise else q * np.eye(6)
-        motion = filters.FunctionMotion(move, noise, 6)
-        return TRACKERS["nearest-neighbour"].for_scene(scene, filters.ExtendedKalmanFilter(motion))
-
-    one = tracker(5.0)
-    one.step(0.0, scene.scan(0).measurements)
-    one.save(tmp_path / "state.npz")
-    tracker(5.0).restore(tmp_path / "state.npz")
-    with pytest.raises(InvalidInputError, match="other settings: filter was"):
-        tracker(7.0).restore(tmp_path / "state.npz")

@@ -7,9 +7,8 @@ from assoc import filters
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
-from assoc.tracking import TRACKERS, IdentityParameters, LatePlots
+from assoc.tracking import TRACKERS, LatePlots
 from tests.sizes import sample
-from tests.tracking.crossing import TURN, crossing, radar
 from tests.tracking.stepping import stepped
 
 KINDS = ["multi-sensor", "mht", "nearest-neighbour", "joint-probabilistic"]
@@ -110,39 +109,6 @@ def test_a_step_that_fails_leaves_all_as_it_was(scene):
         late.past_tracks(99)
     with pytest.raises(InvalidInputError, match="tracker must be"):
         LatePlots(None)
-
-
-def test_late_plots_keep_their_identities():
-    """A third of the plots come two turns late; the tracks are those in order, and not those without identities."""
-    recording = crossing(2, begin=1.0)
-    told = np.stack([recording.identities, recording.addresses], axis=1)
-    rng = np.random.default_rng(1)
-    turn = np.floor(recording.times / TURN).astype(int)
-    arrives = turn + np.where(rng.random(len(turn)) < 0.3, rng.integers(1, 3, len(turn)), 0)
-    found = []
-    for identity in (IdentityParameters(), None):
-        plain, late = (TRACKERS["nearest-neighbour"]([radar(recording)], identity=identity) for _ in range(2))
-        late = LatePlots(late)
-        for k in range(turn.max() + 3):
-            for tracker, number in ((plain, turn), (late, arrives)):
-                rows = number == k
-                given = [recording.measurements[rows]], [recording.times[rows]], None, [told[rows]]
-                tracker.step(TURN * (k + 1), *given)
-        assert late.late > 20 and late.refused == 0
-        expected, mine = states(plain.tracks), states(late.tracks)
-        assert len(expected) == len(mine) == 2
-        for mean in expected.values():
-            assert min(np.abs(mean - other).max() for other in mine.values()) < 1e-6
-        found.append(sorted(mean[1] for mean in expected.values()))
-        if identity is not None:
-            # what was told of tracks is what was told in order
-            kept = [one.state.identities.arrays()["identity.told"] for one in (plain, late.tracker)]
-            np.testing.assert_array_equal(*(np.sort(one, axis=0) for one in kept))
-            assert kept[0].any()
-    with pytest.raises(InvalidInputError, match="identities of sensor 0"):
-        LatePlots(TRACKERS["mht"]([radar(recording)], identity=IdentityParameters())).step(
-            1.0, [recording.measurements[:1]], None, None, [np.array([[-2, 0]])]
-        )
 
 
 @pytest.mark.parametrize("kind", ["mht", "mht-hypothesis"])
