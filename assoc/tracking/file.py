@@ -18,6 +18,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
+from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.echoes import Echoes
@@ -29,7 +30,7 @@ from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import Starter, TrackerState
 
 FORMAT = "assoc.tracker"
-VERSION = 6
+VERSION = 7
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
@@ -111,6 +112,8 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= {f"estimates.{name}": np.array(value) for name, value in state.estimates._asdict().items()}
     if state.clutter is not None:
         found |= {f"clutter.{name}": value for name, value in state.clutter.arrays().items()}
+    if state.biases is not None:
+        found |= {f"biases.{name}": value for name, value in state.biases._asdict().items()}
     if state.echoes is not None:
         found |= {f"echoes.{name}": np.array(value) for name, value in state.echoes._asdict().items()}
     if settings.starter is not None and state.starter is not None:
@@ -146,6 +149,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
         clutter=None if model.clutter is None else _clutter(settings, model.clutter, saved.part("clutter.")),
+        biases=None if model.biases is None else _biases(model.biases, saved.part("biases.")),
         echoes=None if model.echoes is None else _echoes(model.echoes, saved.part("echoes.")),
     )  # fmt: skip
     state = state._replace(method_state=settings.method.restored(settings, saved, state))
@@ -220,6 +224,16 @@ def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> Clut
         good = votes.shape == (count,) and bool((np.abs(votes) <= 1.0).all())
         saved.require(good, f"votes.{s}", f"{count} numbers from -1 to 1")
     return model.restored(saved)
+
+
+def _biases(model: Biases, saved: Saved) -> Biases:
+    """Biases in these arrays, checked."""
+    for name, value in model._asdict().items():
+        good = saved[name].shape == value.shape and np.isfinite(saved[name]).all()
+        saved.require(good, name, f"finite numbers of the shape {value.shape}")
+    some = (np.linalg.eigvalsh(saved["information"] + saved["information"].swapaxes(1, 2)) > -1e-6).all()
+    saved.require(some, "information", "matrices that are not negative")
+    return Biases(**saved)
 
 
 def _echoes(model: Echoes, saved: Saved) -> Echoes:

@@ -61,9 +61,7 @@ class Method(ABC):
     def life_cycle(self, progress: Progress, association: Association) -> Progress:
         """Confirm tracks, report decisions, delete tracks."""
         settings, scan = progress.settings, progress.scan
-        tracks = association.tracks.confirm(
-            settings.life_cycle, false_alarms_at(progress, association.tracks, association.assigned)
-        )
+        tracks = association.tracks.confirm(settings.life_cycle, false_alarms_at(progress, association.tracks))
         now = decision(scan.index, scan.time, association.assigned, tracks.track_id[tracks.confirmed])
         gone = to_delete(progress, tracks)
         ended = np.sort(tracks.track_id[gone & tracks.confirmed])

@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.registration.online import OnlineRegistration
+from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.echoes import Echoes
@@ -52,6 +53,8 @@ class TrackerState(NamedTuple):
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None
     """Where false alarms come from; None where the tracker does not adapt."""
+    biases: Biases | None = None
+    """Biases of sensors that see the same targets; None where the tracker does not adapt, or registers."""
     echoes: Echoes | None = None
     """Tracks that may be echoes of others; None where the tracker does not adapt."""
     starter: Starter | None = None
@@ -86,6 +89,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,
         clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
+        biases=Biases.none(settings.sensors) if settings.adapt and settings.registration is None else None,
         echoes=Echoes.none(count) if settings.adapt else None,
         starter=starter,
         rng=rng_of(settings),

@@ -23,7 +23,7 @@ from assoc.filters.base import predict_each
 from assoc.filters.batches import concatenate
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
-from assoc.tracking.adapting.learning import learn, remember_tracks, use_estimates
+from assoc.tracking.adapting.learning import correct, learn, remember_tracks, use_estimates
 from assoc.tracking.adapting.speeds import use_speeds
 from assoc.tracking.progress import Progress, Work
 from assoc.tracking.records.identity_evidence import checked_identities
@@ -47,7 +47,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
     starting = settings.starter is not None
     return [
         *([register] if settings.registration is not None else []),
-        *([use_estimates, use_speeds] if settings.adapt else []),
+        *([correct, use_estimates, use_speeds] if settings.adapt else []),
         keep_pace,
         *([take_over] if starting else [share]),
         predict,

@@ -73,7 +73,7 @@ class Tracker:
         How to weigh Mode 3/A codes and addresses that `step` is given. Without it they are ignored.
     adapt : bool
         Whether to estimate noise, detection probabilities, false alarms and manoeuvres while tracking, and to use the
-        estimates where they are surely not as declared; see `health`.
+        estimates while they predict better than what was declared; see `health`.
     **options
         Settings of this kind of tracker.
 
@@ -196,8 +196,9 @@ class Tracker:
         found, echoes = self.state.estimates, self.state.echoes
         if found is None or echoes is None:
             return None
-        flown = speed_of_tracks(self.settings, self.state.tracks)
-        return health(self.sensors, found, self.settings.initiation.speed, echoes.found, flown)
+        flown = speed_of_tracks(self.settings, self.state.tracks, at_most=True)
+        speed, known = self.settings.initiation.speed, (self.state.unresolved, self.state.biases)
+        return health(self.sensors, found, speed, echoes.found, flown, *known)
 
     @property
     def solver_calls(self) -> int:

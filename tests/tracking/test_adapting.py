@@ -10,12 +10,14 @@ from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
 from assoc.scene.scan import Scan
 from assoc.sensors import PositionSensor
+from assoc.sensors.base import wrap_angle
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
-from assoc.tracking.adapting.residuals import Predicted, Seen, variances
+from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
 from assoc.tracking.records.clutter import ClutterMap
+from assoc.tracking.records.prequential import trusted
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
@@ -123,7 +125,9 @@ def test_misses_and_detections_count_by_range(at_once):
 def test_right_declarations_are_left_as_they_are():
     for seed in range(3):
         tracker = tracked(scene_of(radars(), seed), radars())
-        assert in_use(tracker.settings, tracker.state.estimates) is tracker.settings
+        # these targets fly straight: quiet flight may be quieter than declared
+        told = in_use(tracker.settings, tracker.state.estimates._replace(manoeuvres=1.0))
+        assert told is tracker.settings and tracker.state.estimates.manoeuvres <= 1.0
         assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
 
 
@@ -150,9 +154,9 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
         z = sensor.measure(where) + rng.normal(size=(T, 3)) * sensor.noise * np.sqrt(factor)
         seen.append(Seen(np.arange(T), z, predicted))
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
-    prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)))
-    matrix, right = variances(sensors, seen, prior, factors)
-    assert np.linalg.solve(matrix, right) == pytest.approx(1.0, abs=0.1)
+    prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
+    shown = shown_by(sensors, seen, prior, factors, factors)
+    assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
 
 
 def with_returns(scene, count, seed):
@@ -196,13 +200,13 @@ def test_density_of_clutter_by_place():
     patch, alone = empty, empty
     for k in range(30):
         plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, 1e3, (1, 2))])
-        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns)
+        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full(6, 0.5)])
         alone = alone.after([sensor], Scan(k, float(k), (rng.normal(25.0, 1.0, (1, 2)),)), turns)
     there = Scan(30, 30.0, (np.array([[25.0, 25.0], [700.0, 700.0]]),))
-    inside, outside = patch.densities([sensor], there)[0]
+    inside, outside = patch.used_and_found([sensor], there)[0][0]
     # five in 50 x 50 m against one in 1000 x 1000 m
     assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
-    assert not alone.densities([sensor], there)[0].any()
+    assert not alone.used_and_found([sensor], there)[1][0].any()
 
 
 def test_no_track_starts_in_a_closed_area():
@@ -240,3 +244,55 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     for k, z in enumerate(plots):
         tracker.step(float(k), [z])
     assert sum(track.reported for track in tracker.tracks) >= 11
+
+
+@pytest.mark.parametrize("bias", [0.0, 1.0])
+def test_estimates_are_used_while_they_predict_better(bias):
+    """Right declarations are hardly ever left; wrong ones are."""
+    rng, left, runs = np.random.default_rng(8), 0, 200
+    for _ in range(runs):
+        evidence, used, mean = np.array(0.0), np.array(False), 0.0
+        for seen in range(100):
+            value = bias + rng.normal()
+            # one step ahead: what it is compared with was found before
+            evidence = evidence + 0.5 * (value**2 - (value - mean) ** 2)
+            used = trusted(evidence, used)
+            left += bool(used) and bias == 0.0
+            mean += (value - mean) / (seen + 3.0)
+        assert bool(used) or bias == 0.0
+    # Ville's bound: of 200 at most 2 in the mean, each for some steps
+    assert left <= 0.02 * runs * 100
+    assert not trusted(np.array(0.0), np.array(True)) and trusted(np.array(0.1), np.array(True))
+
+
+def test_biases_and_clocks_are_found_and_taken_out():
+    """Of radars whose azimuths, and one whose clock, are off; of the same ones that are right nothing is."""
+    rng, sensors = np.random.default_rng(7), radars()
+    start, velocity = rng.uniform(-12e3, 12e3, (TARGETS, 3)), rng.uniform(-250.0, 250.0, (TARGETS, 3))
+    start[:, 2], velocity[:, 2] = rng.uniform(2e3, 9e3, TARGETS), 0.0
+    for wrong in (0.0, 1.0):
+        tracker = TRACKERS["multi-sensor"](sensors, region=REGION, adapt=True)
+        for k in range(40):
+            plots = []
+            for sensor, turned, late in zip(sensors, (5e-3, -5e-3, 0.0), (0.0, 0.0, 1.0), strict=True):
+                z = sensor.measure(start + (2.0 * k - wrong * late) * velocity)
+                z += rng.normal(size=z.shape) * sensor.noise + [0.0, wrong * turned, 0.0]
+                plots.append(np.column_stack([z[:, 0], wrap_angle(z[:, 1]), z[:, 2]]))
+            tracker.step(2.0 * k, plots)
+        assert tracker.state.biases.used.any() == bool(wrong)
+    found = tracker.state.biases.of(sensors)
+    assert found[0]["azimuth"] - found[1]["azimuth"] == pytest.approx(0.01, abs=0.003)
+    assert found[2]["time"] == pytest.approx(1.0, abs=0.2) and found[0]["time"] == pytest.approx(0.0, abs=0.2)
+    assert "azimuth" in tracker.health.sensors[0].verdict and "s late" in tracker.health.sensors[2].verdict
+
+
+def test_a_sensor_that_is_off_misses_nothing():
+    """Tracks go on unseen while no radar looks, and are shown; with the same silence untold they end."""
+    scene, off, shown = scene_of(radars(), 1, scans=20), range(10, 18), []
+    for told in (True, False):
+        tracker = TRACKERS["multi-sensor"].for_scene(scene)
+        for k in range(18):
+            sectors = np.array([[0.0, 0.0] if k in off else [-np.pi, np.pi]] * 3) if told else None
+            tracker.step(4.0 * k, [z[:0] if k in off else z for z in scene.measurements[k]], sectors=sectors)
+        shown.append(sum(track.reported for track in tracker.tracks))
+    assert shown == [TARGETS, 0]

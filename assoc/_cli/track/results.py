@@ -69,7 +69,7 @@ def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: flo
         (given["output"], found.finish or (lambda: _write_tracks(given["output"], found.table))),
         (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
         (given["report"], lambda: _write_report(given, found)),
-        (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
+        (given, lambda: _print_counts(given["output"], found, elapsed, compiling, given["check"])),
         (given["check"], lambda: print_lines(str(found.tracker.health))),
         (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
         (found.plots, lambda: _print_rates(found.plots, given["identity"])),
@@ -149,7 +149,7 @@ def _print_rates(plots: Judged, identity: str | None) -> None:
     print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
 
 
-def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float) -> None:
+def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float, check: bool) -> None:
     from assoc.tracking.filter_choice import height_note
 
     tracker, rows = found.tracker, found.table
@@ -164,9 +164,11 @@ def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float)
     if worst:
         shown = ", ".join(f"{track} ({nis:.2g})" for track, nis in worst[:5]) + (", ..." if len(worst) > 5 else "")
         print_lines(f"tracks that do not agree with their measurements (NIS, at most 1 expected): {shown}")
-    note = height_note(tracker.sensors, len(tracker.filter.motion.position))
+    note, health = height_note(tracker.sensors, len(tracker.filter.motion.position)), tracker.health
     if note is not None:
         print_lines(note)
+    if health is not None and health.speed and not check:
+        print_lines(health.speed)
 
 
 def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:

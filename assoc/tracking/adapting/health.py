@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,15 +11,21 @@ import numpy as np
 
 from assoc._system.imports import removed_attribute
 from assoc._types import Array
+from assoc.costs.tracks.unresolved import resolutions
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.folding import assumed_folding
+from assoc.tracking.records.biases import CLOCK, Biases
 from assoc.tracking.records.echoes import AZIMUTH, RANGE
 from assoc.tracking.records.estimates import ALARMS, DETECTION, NOISE, Estimates, declared_values
+from assoc.tracking.records.unresolved import Unresolved
+from assoc.tracking.target_kinds import TARGETS
 
 _WIDTH = 1.96
 # so many times slower or faster than the prior of speeds is worth a word
 _SLOWER, _FASTER = 15.0, 3.0
+# of a clock, seconds, that is worth a word
+_LATE = 0.02
 # differences smaller than this share are not worth a word, nor those within so many standard deviations
 _SMALL, _UNSURE = 0.1, 3.0
 _WORDS = {2.0: "twice", 3.0: "three times", 4.0: "four times", 0.5: "half", 1 / 3: "a third of", 0.25: "a quarter of"}
@@ -81,6 +88,10 @@ class SensorHealth:
     by_range: tuple[tuple[float, Quantity], ...] = ()
     folding: float | None = None
     ghosts: tuple[int, int] = (0, 0)
+    merges: str = ""
+    """Within what two targets give one plot, though nobody said so."""
+    biases: str = ""
+    """What measurements, and the clock, are corrected for."""
 
     @property
     def verdict(self) -> str:
@@ -94,6 +105,10 @@ class SensorHealth:
         ]
         if any(self.ghosts):
             found.append(f"ghosts: {self.ghosts[0]} tracks by side lobes, {self.ghosts[1]} by multipath, not shown")
+        if self.biases:
+            found.append(f"corrected by tracks that others see, too: {self.biases}")
+        if self.merges:
+            found.append(f"unresolved: targets within {self.merges} give one plot (resolution=)")
         if self.folding is not None:
             found.append(f"range rates taken to fold at {self.folding:g} m/s (folding= says, inf: they do not)")
         return "; ".join(found) or "as declared"
@@ -132,7 +147,7 @@ class Health:
             else ("no harder manoeuvres than the filter expects")
         )
         sensors = (f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors)
-        return (*sensors, f"targets: {targets}{self.speed}")
+        return (*sensors, "; ".join([f"targets: {targets}", *([self.speed] if self.speed else [])]))
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
@@ -154,12 +169,19 @@ def _times(factor: float) -> str:
 
 
 def health(
-    sensors: Sequence[Sensor], estimates: Estimates, speed: float | Sequence[float], ghosts: Array, flown: float = 0.0
+    sensors: Sequence[Sensor],
+    estimates: Estimates,
+    speed: float | Sequence[float],
+    ghosts: Array,
+    flown: float,
+    unresolved: Unresolved,
+    biases: Biases | None,
 ) -> Health:
     """Compare estimates with what was declared of these sensors.
 
     `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known;
-    `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`).
+    `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`), `unresolved` says what was learnt of
+    resolutions, `biases` what measurements are corrected for.
     """
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
@@ -173,14 +195,55 @@ def health(
             for b in (np.flatnonzero(estimates.dwells[s] >= 1.0).tolist() if reach(sensor) else ())
         ]
         folding, hidden = assumed_folding(sensor, speed), (int(ghosts[s, RANGE]), int(ghosts[s, AZIMUTH]))
-        rows.append(SensorHealth(sensor.name or f"sensor {s + 1}", noise, P, alarms, tuple(bands), folding, hidden))
-    manoeuvres = _quantity(1.0, float(estimates.factors[-1]), float(estimates.spreads[-1]), NOISE)
-    prior = max(speed) if isinstance(speed, Sequence) else speed
-    text = ""
-    if flown and not prior / _SLOWER < flown < _FASTER * prior:
-        text = f"; {'faster' if flown > prior else 'slower'} than assumed: about {flown:.3g} m/s along an axis, "
-        text += f"the prior is {prior:.3g} (--targets, --speed)"
-    return Health(tuple(rows), manoeuvres, text)
+        rows.append(
+            SensorHealth(
+                sensor.name or f"sensor {s + 1}",
+                noise,
+                P,
+                alarms,
+                tuple(bands),
+                folding,
+                hidden,
+                _merges(s, sensor, unresolved),
+                "" if biases is None or not biases.used.any() else _off(sensor, biases.of(sensors)[s]),
+            )
+        )
+    manoeuvres = _quantity(1.0, *estimates.agile, NOISE)
+    return Health(tuple(rows), manoeuvres, _of_speed(float(np.max(speed)), flown))
+
+
+def _merges(s: int, sensor: Sensor, unresolved: Unresolved) -> str:
+    """See `SensorHealth.merges`; nothing where the resolution was said, or is rather none."""
+    likeliest = int(np.argmax(unresolved.weights(s)))
+    if sensor.resolution is not None or not likeliest:
+        return ""
+    parts = zip(sensor.components[: sensor.dim], resolutions(sensor)[likeliest].tolist(), strict=True)
+    texts = [_value(name, value) for name, value in parts if math.isfinite(value)]
+    return " and ".join(texts)
+
+
+def _off(sensor: Sensor, biases: Mapping[str, float]) -> str:
+    """See `SensorHealth.biases`: those that are noticeable beside the noise, and the clock's."""
+    part, late = sensor.position_part, biases[CLOCK]
+    noise = zip(part.components[: part.dim], np.sqrt(np.diagonal(part.covariance)).tolist(), strict=True)
+    texts = [_value(name, biases[name]) for name, unit in noise if abs(biases[name]) > _SMALL * unit]
+    if abs(late) > _LATE:
+        texts.append(f"clock {abs(late):.2g} s {'late' if late > 0 else 'early'}")
+    return ", ".join(texts)
+
+
+def _value(name: str, value: float) -> str:
+    text = f"{math.degrees(value):.2g} deg" if name in ("azimuth", "elevation") else f"{value:.2g} m"
+    return f"{name} {text}"
+
+
+def _of_speed(prior: float, flown: float) -> str:
+    """What a prior of speeds that does not suit targets of this speed is to be replaced by; nothing if it does."""
+    if not flown or prior / _SLOWER < flown < _FASTER * prior:
+        return ""
+    kind = min(TARGETS, key=lambda name: abs(math.log(TARGETS[name].speed / flown)))
+    slower = "faster" if flown > prior else "slower"
+    return f"targets look {slower} than assumed: --targets {kind} (about {flown:.2g} m/s, assumed {prior:.3g})"
 
 
 def _quantity(declared: float, seen: float, spread: float, column: int) -> Quantity:

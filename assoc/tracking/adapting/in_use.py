@@ -15,6 +15,7 @@ from assoc.filters.base import Filter
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.folding import with_folding
+from assoc.tracking.adapting.residuals import scales
 from assoc.tracking.records.estimates import DETECTION, Estimates
 from assoc.tracking.settings import TrackerSettings
 
@@ -66,19 +67,20 @@ def _scene(sensors: Sequence[Sensor], scene: Scene) -> Scene:
 def noisier(filter: Filter[Any], factor: float) -> Filter[Any]:
     """A filter like this one with `factor` times the process noise's variance.
 
-    Of several models only the one that manoeuvres most: the others are for quiet flight. Filters of sigma points,
-    ensembles and fuzzy rules stay as they are.
+    Of several models only some, see `scales`. Filters of sigma points, ensembles and fuzzy rules stay as they are.
     """
     if factor == 1.0:
         return filter
     if type(filter) in _SCALABLE:
-        return type(filter)(filter.motion.noisier(factor))
+        return type(filter)(filter.motion.noisier(max(factor, 1.0)))
     if type(filter) is InteractingMultipleModel:
         models: list[Any] = list(filter.filters)
-        origin = np.zeros((1, filter.motion.dim))
-        most = int(np.argmax([np.trace(model.motion.noise(origin, 1.0)[0]) for model in models]))
-        models[most] = noisier(models[most], factor)
+        sizes = np.array([np.trace(model.motion.noise(np.zeros((1, filter.motion.dim)), 1.0)[0]) for model in models])
         made = copy.copy(filter)
-        made.filters = tuple(models)
+        own = scales(np.array([factor]), sizes).tolist()
+        made.filters = tuple(
+            type(model)(model.motion.noisier(change)) if type(model) in _SCALABLE else model
+            for model, change in zip(models, own, strict=True)
+        )
         return made
     return filter

@@ -12,18 +12,40 @@ from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.tuples import gate_of
 from assoc.costs.views import bands_of, bands_of_measured, places_of
 from assoc.filters.base import Expected, predict_each
-from assoc.filters.imm import Mixture
+from assoc.filters.imm import InteractingMultipleModel, Mixture
 from assoc.filters.measurement import periods_of
+from assoc.registration.correction import corrected_measurements
 from assoc.scene.own_times import FULL_TURN
 from assoc.tracking.adapting.in_use import in_use
-from assoc.tracking.adapting.residuals import Predicted, Seen, variances
+from assoc.tracking.adapting.residuals import Predicted, Seen, Shown, shown_by
 from assoc.tracking.progress import Progress
-from assoc.tracking.records.estimates import ALARMS, declared_values
+from assoc.tracking.records.biases import CLOCK
+from assoc.tracking.records.clutter import YOUNG
+from assoc.tracking.records.estimates import ALARMS, NOISE, declared_values
+from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.track_batch import TrackBatch
-from assoc.tracking.stages.coverage import dwells
+from assoc.tracking.stages.coverage import densities_at, dwells
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
 _WIDER, _FALSE = 4.0, 0.05
+# residuals of so many tracks are weighed in a scan
+_MOST = 64
+
+
+def correct(progress: Progress) -> Progress:
+    """Stage: go on with measurements without the biases, and clocks' errors, that are in use."""
+    biases, scan, sensors = progress.state.biases, progress.scan, progress.settings.sensors
+    if biases is None or not biases.used.any():
+        return progress
+    known = biases.of(sensors)
+    pairs = zip(sensors, scan.measurements, known, strict=True)
+    scan = replace(scan, measurements=tuple(corrected_measurements(*each) for each in pairs))
+    late = [own[CLOCK] for own in known]
+    if any(late) and progress.state.time is not None and progress.settings.method.own_times:
+        times = zip(scan.own_times(), late, strict=True)
+        before = progress.state.time
+        scan = replace(scan, times=tuple(np.clip(stamps - lag, before, scan.time) for stamps, lag in times))
+    return progress._replace(scan=scan)
 
 
 def use_estimates(progress: Progress) -> Progress:
@@ -55,19 +77,25 @@ def learn(progress: Progress) -> Progress:
     state, step, settings = progress.state, progress.step, progress.settings
     estimates, tracks = state.estimates, progress.before
     assert estimates is not None and step is not None and tracks is not None
-    tracks = tracks[tracks.confirmed]
+    tracks = tracks[tracks.confirmed | (tracks.hits >= 2)]
     late = tracks
     if progress.timed is not None and len(tracks):
         late = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
+    assert state.clutter is not None
+    used, there = (found > 0.0 for found in densities_at(progress, late, state.clutter))
+    votes = _votes(progress, late, there)
+    sure = np.flatnonzero(tracks.confirmed)
+    tracks, late, used = tracks[sure], late[sure], used[sure]
     dwelled = dwells(progress, late.states)
-    rows = _rows(progress, tracks.track_id) if len(tracks) else np.zeros((0, len(settings.sensors)), dtype=np.int64)
+    rows = _rows(progress, tracks.track_id)
     if len(tracks):
         _seek(progress, late, rows, dwelled)
     if progress.shared is not None:
         hidden = progress.shared.hidden(tracks.track_id)
         rows[hidden], dwelled[hidden] = 0, False
     # tracks in dense clutter say little about sensors
-    plain = ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
+    plain = ~used.any(axis=1)
+    plain &= ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
     hits = (rows > 0) & plain[:, None]
     dwelled = hits | (dwelled & plain[:, None])
     turns = _turns(progress)
@@ -75,36 +103,42 @@ def learn(progress: Progress) -> Progress:
     usual = zip(step.confirmed, progress.dense, strict=True)
     alarms = np.array([np.count_nonzero(~taken & ~dense) for taken, dense in usual])
     # before tracks are confirmed, targets look like false alarms
+    declared = progress.work.settings.sensors
     if state.scan >= 3:
-        estimates = estimates._replace(alarms=estimates.alarms + alarms, turns=estimates.turns + turns)
+        estimates = estimates.heard(declared, alarms, turns)
     where = places_of(settings.filter, late.states)[0]
     bands = np.stack([bands_of(sensor, where) for sensor in settings.sensors], axis=1)
-    estimates = estimates.counted(tracks.track_id, dwelled, hits, bands)
+    estimates = estimates.counted(declared, tracks.track_id, dwelled, hits, bands)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
+    # in turns, if there are many: these are enough
+    fresh = np.roll(fresh, -_MOST * state.scan)[:_MOST]
     if len(fresh):
-        estimates = estimates.weighed(*_residuals(progress, tracks, late, rows, fresh))
-    declared = progress.work.settings.sensors
-    assert state.clutter is not None
-    clutter = state.clutter.after(declared, progress.scan, turns, _votes(progress))
+        shown = _residuals(progress, tracks, late, rows, fresh)
+        estimates = estimates.gained(shown.noise, shown.manoeuvres).weighed(shown.matrix, shown.right)
+        if state.biases is not None:
+            progress = progress.with_state(biases=state.biases.after(declared, *shown.biases))
+    clutter = state.clutter.after(declared, progress.scan, turns, votes)
+    grown = np.flatnonzero((state.clutter.clock < YOUNG) & (clutter.clock >= YOUNG))
+    if len(grown) and not state.tracks.confirmed.all():
+        # what tracks gained before a place was sure, they gained too easily
+        crowd = densities_at(progress, state.tracks, clutter)[0][:, grown].sum(axis=1)
+        gained = np.where(state.tracks.confirmed, 0.0, crowd * state.tracks.hits)
+        progress = progress.with_state(tracks=state.tracks.scored(state.tracks.states, -gained))
     return progress.with_state(estimates=estimates.forgotten(turns).settled(declared), clutter=clutter)
 
 
-def _votes(progress: Progress) -> list[Array]:
-    """How much better places predicted each measurement than tracks did that had two of them, (n_s,) for each sensor.
+def _votes(progress: Progress, tracks: TrackBatch, there: Array) -> list[Array]:
+    """How much better places predicted each measurement than predicted tracks did, (n_s,) for each sensor.
 
-    Differences of log likelihoods, from -1 to 1; 0 outside of places, and in the first turns, before tracks could.
+    Differences of log likelihoods, from -1 to 1; 0 outside of places, and in the first turns, before tracks could. Both
+    are intensities of Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
     """
-    settings, tracks, clutter = progress.settings, progress.before, progress.state.clutter
-    assert tracks is not None and clutter is not None
+    settings, clutter = progress.settings, progress.state.clutter
+    assert clutter is not None
     votes = [np.zeros(len(z)) for z in progress.crowds]
-    if not any(found.any() for found in progress.crowds):
-        return votes
-    tracks = tracks[tracks.hits >= 2]
-    if progress.timed is not None and len(tracks):
-        tracks = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
     for s, (sensor, found) in enumerate(zip(settings.sensors, progress.crowds, strict=True)):
         rows = np.flatnonzero(found)
-        if clutter.clock[s] < 2.0 or not len(rows):
+        if clutter.clock[s] < YOUNG - 1.0 or not len(rows):
             continue
         dense, z = np.zeros(len(rows)), progress.scan.measurements[s][rows]
         if len(tracks):
@@ -116,7 +150,8 @@ def _votes(progress: Progress) -> list[Array]:
             size = np.sqrt(np.linalg.det(2.0 * np.pi * expected.covariance))[track]
             density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
             np.add.at(dense, near, density * np.exp(-0.5 * square) / size)
-        votes[s][rows] = np.clip(found[rows] - np.log1p(dense), -1.0, 1.0)
+        more = (sensor.detection_probability * there[:, s].sum() - len(rows)) / len(rows)
+        votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -1.0, 1.0)
     return votes
 
 
@@ -132,7 +167,7 @@ def _rows(progress: Progress, ids: Array) -> Array:
     """1-based measurements of tracks with these ids, ascending, 0 for none, int (T, S)."""
     assert progress.step is not None
     rows = np.zeros((len(ids), len(progress.settings.sensors)), dtype=np.int64)
-    for s, taken in enumerate(progress.step.assigned):
+    for s, taken in enumerate(progress.step.assigned if len(ids) else ()):
         index = np.minimum(np.searchsorted(ids, taken), len(ids) - 1)
         known = np.flatnonzero(ids[index] == taken)
         rows[index[known], s] = known + 1
@@ -165,9 +200,7 @@ def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> 
                 rows[missed[t], s] = free[m] + 1
 
 
-def _residuals(
-    progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: Array, fresh: Array
-) -> tuple[Array, Array]:
+def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: Array, fresh: Array) -> Shown:
     """What the measurements of these tracks say about variances."""
     settings, estimates = progress.settings, progress.state.estimates
     assert estimates is not None
@@ -187,14 +220,34 @@ def _residuals(
             position[:, : len(axes)] = at.mean[:, axes]
         seen.append(Seen(track, z[number], position))
     declared = progress.work.settings.sensors
-    return variances(declared, seen, _predicted(states, axes), estimates.used[:, 0])
+    filter, dt = progress.work.settings.filter, progress.elapsed
+    models = filter.filters if isinstance(filter, InteractingMultipleModel) else (filter,)
+    at = states.mean[:1]
+    noises = np.stack(
+        [model.motion.noise(at, dt)[0][np.ix_(axes, axes)] if dt else np.zeros((len(axes),) * 2) for model in models]
+    )
+    velocities, moving = np.zeros((len(states), len(axes))), velocity_components(settings.filter.motion)
+    velocities[:, : len(moving)] = states.mean[:, moving]
+    factors = estimates.found(declared)[0][:, NOISE]
+    return shown_by(
+        declared,
+        seen,
+        _predicted(states, axes, velocities, noises),
+        estimates.used[:, NOISE],
+        factors,
+        estimates.manoeuvres,
+    )
 
 
-def _predicted(states: Any, axes: list[int]) -> Predicted:
+def _predicted(states: Any, axes: list[int], velocities: Array, noises: Array) -> Predicted:
     """Positions of predicted states."""
     mean, covariance = states.mean[:, axes], states.covariance[:, axes][:, :, axes]
     if not isinstance(states, Mixture):
         weights = np.ones((len(mean), 1))
-        return Predicted(covariance, np.zeros((len(mean), 1, len(axes))), covariance[:, None], weights)
+        return Predicted(
+            covariance, np.zeros((len(mean), 1, len(axes))), covariance[:, None], weights, velocities, noises
+        )
     offsets = states.means[:, :, axes] - mean[:, None]
-    return Predicted(covariance, offsets, states.covariances[:, :, axes][:, :, :, axes], states.weights)
+    return Predicted(
+        covariance, offsets, states.covariances[:, :, axes][:, :, :, axes], states.weights, velocities, noises
+    )

@@ -2,12 +2,15 @@
 
 A sensor's measurement is compared with the position that the other sensors of the scan give; so the target's motion
 does not matter. Where there is no other, it is compared with the prediction of the filter's quietest model, by its
-probability. The variance of a residual is a sum of parts, each proportional to the variance of one sensor's noise or
-of the process noise of the model that manoeuvres.
+probability. The variance of a residual is a sum of parts, each proportional to the variance of one sensor's noise.
+
+How hard targets manoeuvre is asked of the predictions of all models together, with more process noise and with less: a
+measurement that fits none of them may be a false alarm, and is as likely by each.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,11 +18,13 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.sensors import Sensor
+from assoc.tracking.records.estimates import FACTORS
+from assoc.tracking.records.prequential import gain_of_variances
 
 # beside other sensors the prediction only fills the directions that they leave open
 _BESIDE = 0.01
-# squares beyond so many variances are taken for wrong associations; manoeuvres may be much harder than expected
-_MOST, _HARDEST = 10.0, 50.0
+# squares beyond so many variances are taken for wrong associations
+_MOST = 10.0
 
 
 class Seen(NamedTuple):
@@ -44,18 +49,43 @@ class Predicted(NamedTuple):
     """(T, M, n, n)."""
     weights: Array
     """Probabilities of the models, (T, M)."""
+    velocities: Array
+    """Of the tracks, (T, n)."""
+    noises: Array
+    """Of each model, covariance of the process noise since the last scan as declared, (M, n, n)."""
 
 
-def variances(
-    sensors: Sequence[Sensor], seen: Sequence[Seen], predicted: Predicted, noise: Array
-) -> tuple[Array, Array]:
-    """Normal matrix and right side of the factors of variances, (S + 1, S + 1) and (S + 1,), relative to those in use.
+class Shown(NamedTuple):
+    """What residuals show."""
 
-    The sensors are as declared; `noise` (S,) are the factors of the noise's variances in use.
+    matrix: Array
+    """Normal matrix of the factors of the noise's variances, relative to those in use, (S, S)."""
+    right: Array
+    """Its right side, (S,)."""
+    noise: Array
+    """Gain of the evidence for each estimated factor, (S,)."""
+    manoeuvres: Array
+    """Log likelihood with the process noise times each of `FACTORS` (of estimates), relative to declared, (G,)."""
+    biases: tuple[Array, Array]
+    """Normal equations of the biases (`assoc.tracking.records.biases`), (K, K) and (K,)."""
+
+
+def shown_by(
+    sensors: Sequence[Sensor],
+    seen: Sequence[Seen],
+    predicted: Predicted,
+    noise: Array,
+    estimates: Array,
+    now: float = 1.0,
+) -> Shown:
+    """What residuals of measurements say.
+
+    The sensors are as declared, with P_d and false alarms in use; `noise` (S,) are the factors of the noise's variances
+    in use, `estimates` (S,) the estimated ones, and `now` is that of the process noise.
     """
     T, _, n = predicted.offsets.shape
     S = len(sensors)
-    matrix, right = np.zeros((S + 1, S + 1)), np.zeros(S + 1)
+    sums = _Sums(noise, estimates)
     prior = np.linalg.inv(predicted.covariance)
     parts = [sensor.position_part for sensor in sensors]
     whites = [np.linalg.inv(np.linalg.cholesky(part.covariance)) for part in parts]
@@ -84,10 +114,11 @@ def variances(
     white_off = _times(factor, off)
     fit = np.log(predicted.weights + 1e-300) - 0.5 * (white_off**2).sum(axis=2)
     fit += np.log(np.einsum("tmii->tmi", factor)).sum(axis=2)
+    biases = _biases(whites, rows, noise, predicted.velocities, _BESIDE**2 * prior)
     weights = np.exp(fit - fit.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     size = np.einsum("tmii->m", predicted.covariances)
-    quiet, m = int(np.argmin(size)), int(np.argmax(size))
+    quiet = int(np.argmin(size))
     for s, (track, H, y) in enumerate(rows):
         alone = count[track] == 1
         beside = np.flatnonzero(~alone)
@@ -96,24 +127,90 @@ def variances(
             others = information[:, t].copy()
             others[s] = 0.0
             gain = h @ np.linalg.inv(_BESIDE * prior[t] + others.sum(axis=0))
-            shares = np.zeros((*y[beside].shape, S + 1))
+            shares = np.zeros((*y[beside].shape, S))
             for r in range(S):
                 shares[..., r] = _diagonal(gain, others[r])
             shares[..., s] = noise[s]
             known = _diagonal(gain, _BESIDE**2 * prior[t])
             rest = y[beside] - _times(gain, vectors[:, t].sum(axis=0) - vectors[s, t])
-            _add(matrix, right, shares, known, rest**2, np.ones(len(t)), _MOST)
+            sums.add(shares, known, rest**2, np.ones(len(t)))
         if alone.any():
             t, h = track[alone], H[alone]
-            shares = np.zeros((*y[alone].shape, S + 1))
+            shares = np.zeros((*y[alone].shape, S))
             shares[..., s] = noise[s]
             rest = y[alone] - _times(h, predicted.offsets[t, quiet])
             known = _diagonal(h, predicted.covariances[t, quiet])
-            _add(matrix, right, shares, known, rest**2, weights[t, quiet], _MOST)
-    shares = np.zeros((T, n, S + 1))
-    shares[..., S] = _diagonal(factor[:, m], predicted.covariances[:, m])
-    _add(matrix, right, shares, 1.0 - shares[..., S], white_off[:, m] ** 2, weights[:, m], _HARDEST)
-    return matrix, right
+            sums.add(shares, known, rest**2, weights[t, quiet])
+    manoeuvres = _manoeuvres(parts, rows, predicted, np.maximum(noise, estimates), now)
+    return Shown(sums.matrix, sums.right, sums.gain, manoeuvres, biases)
+
+
+def _biases(
+    whites: Sequence[Array], rows: Sequence[tuple[Array, Array, Array]], noise: Array, velocities: Array, prior: Array
+) -> tuple[Array, Array]:
+    """See `Shown`: by tracks that several sensors measured, whose positions are eliminated."""
+    T, n = velocities.shape
+    sizes = [len(white) for white in whites]
+    A, B, Y = (
+        np.zeros((T, sum(sizes), n)),
+        np.zeros((T, sum(sizes), sum(sizes) + len(sizes))),
+        np.zeros((T, sum(sizes))),
+    )
+    seen, row, column = np.zeros(T, dtype=np.int64), 0, 0
+    for white, d, factor, (track, H, y) in zip(whites, sizes, noise.tolist(), rows, strict=True):
+        scale, at = factor**-0.5, slice(row, row + d)
+        A[track, at], Y[track, at] = scale * H, scale * y
+        B[track, at, column : column + d] = scale * white
+        # stamped late: where the target was before
+        B[track, at, column + d] = -scale * _times(H, velocities[track])
+        seen[track] += 1
+        row, column = row + d, column + d + 1
+    gain = np.linalg.inv(A.swapaxes(1, 2) @ A + prior) @ A.swapaxes(1, 2)
+    rest = Y - _times(A, _times(gain, Y))
+    good = (seen > 1) & ((rest**2).sum(axis=1) < _MOST * sum(sizes))
+    B, rest = B[good], rest[good]
+    left = B - A[good] @ (gain[good] @ B)
+    return np.einsum("tdi,tdj->ij", B, left), np.einsum("tdi,td->i", B, rest)
+
+
+def _manoeuvres(
+    parts: Sequence[Sensor], rows: Sequence[tuple[Array, Array, Array]], predicted: Predicted, noise: Array, now: float
+) -> Array:
+    """See `Shown`; `rows` are tracks, Jacobians and measurements relative to the prediction, in units of noise."""
+    gain, free = np.zeros(len(FACTORS)), np.ones(len(predicted.offsets), dtype=np.bool_)
+    for part, (track, H, y), factor in zip(parts, rows, noise.tolist(), strict=True):
+        # one measurement of each track: several are not independent
+        first = free[track]
+        free[track] = False
+        if first.any():
+            P, units = part.detection_probability, math.sqrt(np.linalg.det(part.covariance))
+            other = (1.0 - P) / P * part.false_alarm_rate / part.volume * units
+            gain += _of_factors(predicted, track[first], H[first], y[first], factor, now, other)
+    return gain
+
+
+def _of_factors(
+    predicted: Predicted, track: Array, H: Array, y: Array, noise: float, now: float, other: float
+) -> Array:
+    """Log likelihoods of measurements by the process noise, see `Shown`; `other` is the density of false ones."""
+    scale, d = scales(FACTORS[:, None], np.einsum("mii->m", predicted.noises)[None]), y.shape[1]
+    change = scale - scales(np.array([[now]]), np.einsum("mii->m", predicted.noises)[None])
+    spread = _around(H[:, None], predicted.covariances[track]) + noise * np.eye(d)
+    more = _around(H[:, None], np.broadcast_to(predicted.noises, (len(track), *predicted.noises.shape)))
+    total = spread[:, None] + change[..., None, None] * more[:, None]
+    off = y[:, None] - (H[:, None] @ predicted.offsets[track][..., None])[..., 0]
+    square = np.einsum("kmi,kgmij,kmj->kgm", off, np.linalg.inv(total), off)
+    density = np.exp(-0.5 * square) / np.sqrt(np.linalg.det(2.0 * np.pi * total))
+    fit = np.log((density * predicted.weights[track][:, None]).sum(axis=2) + other).sum(axis=0)
+    return np.asarray(fit - fit[FACTORS == 1.0])
+
+
+def scales(factor: Array, sizes: Array) -> Array:
+    """By what a factor multiplies the process noise of models of these sizes.
+
+    More is that of the largest alone, less that of all others: who has flown quietly so far may turn at any time.
+    """
+    return np.where((factor > 1.0) == (sizes == sizes.max()), factor, 1.0)
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
@@ -125,10 +222,26 @@ def _diagonal(rows: Array, matrices: Array) -> Array:
     return np.asarray(np.einsum("kij,kjl,kil->ki", rows, matrices, rows))
 
 
-def _add(matrix: Array, right: Array, parts: Array, known: Array, squares: Array, weights: Array, most: float) -> None:
-    """Add squares (K, d), given the parts of their variances (K, d, S + 1), and parts that are known (K, d)."""
-    variance = parts.sum(axis=-1) + known
-    share = (parts / variance[..., None]).reshape(-1, parts.shape[-1])
-    weighted = share * np.repeat(0.5 * weights, parts.shape[1])[:, None]
-    matrix += weighted.T @ share
-    right += weighted.T @ (np.minimum(squares / variance, most) - known / variance).ravel()
+def _around(rows: Array, matrices: Array) -> Array:
+    """A B A' for many A and B."""
+    return np.asarray(rows @ matrices @ np.swapaxes(rows, -1, -2))
+
+
+class _Sums:
+    """Sums over residuals, with the factors of noise in use and as estimated, (S,) each."""
+
+    def __init__(self, now: Array, estimates: Array) -> None:
+        S = len(now)
+        self.matrix, self.right, self.gain = np.zeros((S, S)), np.zeros(S), np.zeros(S)
+        self._now, self._estimates = now, estimates
+
+    def add(self, parts: Array, known: Array, squares: Array, weights: Array) -> None:
+        """Add squares (K, d), given the parts of their variances (K, d, S), and parts that are known (K, d)."""
+        variance = parts.sum(axis=-1) + known
+        squares = np.minimum(squares, _MOST * variance)
+        share = (parts / variance[..., None]).reshape(-1, parts.shape[-1])
+        weighted = share * np.repeat(0.5 * weights, parts.shape[1])[:, None]
+        self.matrix += weighted.T @ share
+        self.right += weighted.T @ ((squares - known) / variance).ravel()
+        either = [variance[..., None] + parts * (factor / self._now - 1.0) for factor in (self._estimates, 1.0)]
+        self.gain += np.einsum("k,kds->s", weights, gain_of_variances(squares[..., None], *either))

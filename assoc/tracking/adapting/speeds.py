@@ -63,15 +63,20 @@ def falling(filter: Filter[Any]) -> Filter[Any]:
     return ExtendedKalmanFilter(FreeFlight(motion.sigma)) if motion.kind == "continuous" else filter
 
 
-def speed_of_tracks(settings: TrackerSettings, tracks: TrackBatch) -> float:
-    """Root mean square of the speeds of confirmed tracks that are sure of them, along an axis."""
+def speed_of_tracks(settings: TrackerSettings, tracks: TrackBatch, at_most: bool = False) -> float:
+    """Root mean square of the speeds of confirmed tracks that are sure of them, along an axis.
+
+    If none is: 0, or `at_most` what they may be.
+    """
     components, tracks = velocity_components(settings.filter.motion), tracks[tracks.confirmed]
     if not len(tracks) or not len(components):
         return 0.0
     square = (tracks.states.mean[:, components] ** 2).sum(axis=1)
     unsure = np.einsum("bii->bi", tracks.states.covariance[:, components][:, :, components]).sum(axis=1)
     sure = square > 9.0 * unsure
-    return math.sqrt(float(square[sure].mean()) / len(components)) if sure.any() else 0.0
+    if not sure.any():
+        return math.sqrt(float((square + unsure).mean()) / len(components)) if at_most else 0.0
+    return math.sqrt(float(square[sure].mean()) / len(components))
 
 
 def _of_starts(progress: Progress, prior: float) -> float:

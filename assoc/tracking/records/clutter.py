@@ -27,14 +27,14 @@ _LOOKED_AT, _TARGETS, _OTHERS = 64, 3, 6
 # it is clutter of a place at so many times the density of false alarms, and so many plots a turn within this distance:
 # traffic is less dense
 _LEAST, _IN_GATE, _GATE = 30.0, 0.002, 4.0
-# of so many turns before, these at least must have had plots: then it is 90 % sure that more than half of all have
-_SURE = 0.9
+# of so many turns before, these at least must have had plots: then it is 95 % sure that more than half of all have
+_SURE = 0.95
 _NEEDED = [
     next((h for h in range(n) if sum(math.comb(n + 1, k) for k in range(h + 1)) >= _SURE * 2.0 ** (n + 1)), n)
     for n in range(int(_TURNS) + 1)
 ]
-# by how much tracks must predict plots of a place better on average; among clutter they fit about as well, by chance
-_AGAINST = -0.05
+YOUNG = float(math.ceil(-math.log2(1.0 - _SURE)) - 1)
+"""With fewer turns before no place is sure: what is dense may be targets that fly together."""
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 
@@ -72,21 +72,24 @@ class ClutterMap(NamedTuple):
         places, clocks, votes = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in names)
         return ClutterMap(places, clocks, arrays["clock"], votes)
 
-    def densities(self, sensors: Sequence[Sensor], scan: Scan) -> tuple[Array, ...]:
-        """Logarithms of the densities at a scan's measurements relative to that of the sensors' false alarms, >= 0."""
-        return self.used_and_found(sensors, scan)[0]
+    def used_and_found(
+        self, sensors: Sequence[Sensor], scan: Scan, elsewhere: Sequence[Array] | None = None
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """Logarithms of densities relative to that of the sensor's false alarms, >= 0: those in use, and all.
 
-    def used_and_found(self, sensors: Sequence[Sensor], scan: Scan) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """The `densities`, and beside them those that also hold places where tracks predict better."""
+        All also hold places where tracks predict better, and of which nobody is sure yet. At the scan's measurements,
+        or ``elsewhere``: at others, (m_s, d_s) for each sensor.
+        """
         found = []
         for s, sensor in enumerate(sensors):
             here = _places(sensor, scan.measurements[s])
+            at = here if elsewhere is None else _places(sensor, elsewhere[s])
             if scan.sectors is not None and scan.sectors[s, 0] == scan.sectors[s, 1]:
                 # what reports by itself, and does not look, returns no clutter of a place
-                found.append((np.zeros(len(here)), np.zeros(len(here))))
+                found.append((np.zeros(len(at)), np.zeros(len(at))))
             else:
                 known = self.places[s], self.clocks[s], self.votes[s]
-                found.append(_densities(sensor, here, *known, float(self.clock[s])))
+                found.append(_densities(sensor, at, here, *known, float(self.clock[s])))
         used, every = zip(*found, strict=True)
         return used, every
 
@@ -123,14 +126,14 @@ def _places(sensor: Sensor, measured: Array) -> Array:
 
 
 def _densities(
-    sensor: Sensor, here: Array, places: Array, clocks: Array, votes: Array, now: float
+    sensor: Sensor, at: Array, here: Array, places: Array, clocks: Array, votes: Array, now: float
 ) -> tuple[Array, Array]:
-    """See `ClutterMap.densities`."""
-    n, part = len(here), sensor.position_part
+    """See `ClutterMap.used_and_found`: of these places ``at``, with the plots ``here``."""
+    n, part = len(at), sensor.position_part
     result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
     before = int(min(round(now), _TURNS))
-    age = np.append(np.rint(now - clocks), np.zeros(n))
-    places, votes, turns = np.concatenate([places, here]), np.append(votes, np.zeros(n)), before + 1
+    age = np.append(np.rint(now - clocks), np.zeros(len(here)))
+    places, votes, turns = np.concatenate([places, here]), np.append(votes, np.zeros(len(here))), before + 1
     if len(places) <= _OTHERS or not n:
         return result, result
     units, d = _units(sensor), part.dim
@@ -143,11 +146,11 @@ def _densities(
     least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
     tree, near_by = cKDTree(places, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
     # few places are dense: only there many neighbours are sought
-    farther = np.asarray(tree.query(here, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
+    farther = np.asarray(tree.query(at, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
     dense = np.flatnonzero(farther < near_by)
     if not len(dense):
         return result, result
-    distance, near = (np.asarray(array) for array in tree.query(here[dense], min(_LOOKED_AT, len(places))))
+    distance, near = (np.asarray(array) for array in tree.query(at[dense], min(_LOOKED_AT, len(places))))
     turn = age[near]
     nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
     others = np.cumsum(nearer >= _TARGETS, axis=1)
@@ -155,8 +158,13 @@ def _densities(
     radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
     within = np.arange(near.shape[1]) <= last[:, None]
     hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
-    ratio = (last + 1) / (radius**d * usual)
+    # the volume of an ellipsoid as they lie: many places are flat
+    off = places[near] - at[dense, None]
+    off -= np.array(around)[:d] * np.rint(off / np.where(np.array(around)[:d] > 0.0, around[:d], np.inf))
+    spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
+    size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
+    ratio = (last + 1) / (size * usual)
     found = (others[:, -1] >= _OTHERS) & (ratio > least) & (hits >= _NEEDED[before])
     result[dense] = np.where(found, np.log(np.maximum(ratio, 1.0)), 0.0)
-    used[dense] = votes[near].mean(axis=1) > _AGAINST
+    used[dense] = (votes[near].mean(axis=1) > 0.0) & (before >= YOUNG)
     return np.where(used, result, 0.0), result

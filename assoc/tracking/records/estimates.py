@@ -1,8 +1,9 @@
 """Estimates of what is declared but may be wrong: noise, detection probabilities, false alarms, manoeuvres.
 
-All of them are sums that forget exponentially, over a prior at the declared values. The noise of S sensors and the
-manoeuvres are S + 1 factors of variances, x: the square of a residual has the mean g x with known g, so that weighted
-least squares finds them together, whoever is to blame (`assoc.tracking.adapting.residuals`).
+All of them are sums that forget exponentially, over a prior at the declared values. The noise of S sensors is S factors
+of variances, x: the square of a residual has the mean g x with known g, so that weighted least squares finds them
+together, whoever is to blame (`assoc.tracking.adapting.residuals`). Of the process noise a few factors are tried.
+Each estimate is used while it predicts better than what was declared (`assoc.tracking.records.prequential`).
 
 A track's detections and misses count once it is detected again later: what follows the last detection may be the
 target's end. Read backwards from the last detection, the earlier ones are independent of the choice.
@@ -10,6 +11,7 @@ target's end. Read backwards from the last detection, the earlier ones are indep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,27 +20,30 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
+from assoc.tracking.records.prequential import gain_of_rates, gain_of_shares, mean_evidence, trusted
 
 KEEP = 0.98
 """Share of a sum that is kept from turn to turn."""
 
+FACTORS = 4.0 ** np.arange(-3, 5)
+"""By which the variance of the process noise may be multiplied."""
+
 # the priors count as so many squared residuals, dwells on targets, and scans
-_RESIDUALS, _MANOEUVRES, _DWELLS, _SCANS = 50.0, 10.0, 20.0, 5.0
+_RESIDUALS, _DWELLS, _SCANS = 50.0, 20.0, 5.0
+# and are forgotten like all else, but for this share
+_LEFT = 0.05
 # log odds of detection differ by so much from band to band of range, and from the sensor's
 _FROM_BAND, _FROM_SENSOR, _NEWTON = 0.7, 2.0, 2
 # beyond these log odds a probability is no other number than 0 or 1
 _ODDS = 12.0
 _WALK = np.diff(np.eye(BANDS), axis=0) / _FROM_BAND
 _BY_RANGE = _WALK.T @ _WALK + np.eye(BANDS) / _FROM_SENSOR**2
-# an estimate is used where it is this many standard deviations from what was declared, until it is closer than these
-_SURE, _UNSURE = 3.5, 2.0
-# and is changed in steps of this share
+# what is used is changed in steps of this share
 _STEP = 0.1
-_AXES = 3.0
 _LARGEST = 100.0
 """Variances are multiplied by at most this, and divided by at most this."""
-NOISE, DETECTION, ALARMS = 0, 1, 2
-"""Columns of `Estimates.used`."""
+NOISE, DETECTION, ALARMS, RANGES = 0, 1, 2, 3
+"""Columns of `Estimates.used`, and of its evidence."""
 PER_TRACK = ("ids", "open_hits", "open_dwells")
 """Those of the `Estimates` that have a row for each track."""
 
@@ -47,9 +52,9 @@ class Estimates(NamedTuple):
     """What S sensors and the targets have shown so far."""
 
     factors: Array
-    """Factors of the variances of the sensors' noise, and of the predictions, (S + 1,)."""
+    """Factors of the variances of the sensors' noise, (S,)."""
     weights: Array
-    """Their information, relative to the factors in use, (S + 1, S + 1)."""
+    """Their information, relative to the factors in use, (S, S)."""
     hits: Array
     """Detections of tracks by bands of range, (S, B)."""
     dwells: Array
@@ -68,6 +73,10 @@ class Estimates(NamedTuple):
     """Factor of the noise's variance, P_d, false alarms a scan in use, (S, 3)."""
     bands: Array
     """P_d in use by bands of range, (S, B): the sensor's where there is no better."""
+    evidence: Array
+    """Logarithm of how much better each estimate predicted than what was declared, (S, 4); of P_d by range than P_d."""
+    agility: Array
+    """The same of `FACTORS` of the process noise, (G,)."""
     manoeuvres: float = 1.0
     """Factor of the process noise's variance in use."""
 
@@ -77,19 +86,21 @@ class Estimates(NamedTuple):
         S, used = len(sensors), declared_values(sensors)
         none, nothing = np.zeros((0, S)), np.zeros((S, BANDS))
         return Estimates(
-            np.ones(S + 1), np.diag(_prior(S)), nothing, nothing, np.zeros(S), np.zeros(S),
+            np.ones(S), 0.5 * _RESIDUALS * np.eye(S), nothing, nothing, np.zeros(S), np.zeros(S),
             np.zeros(0, dtype=np.int64), none, none, used, np.repeat(used[:, DETECTION, None], BANDS, axis=1),
+            np.zeros((S, 4)), np.zeros(len(FACTORS)),
         )  # fmt: skip
 
     def found(self, sensors: Sequence[Sensor]) -> tuple[Array, Array]:
         """Estimates as in `used`, and standard deviations of their logarithms (P_d: of ln(P / (1 - P))), (S, 3)."""
         P, rate = declared_values(sensors).T[1:]
-        dwells, alarms = self.dwells.sum(axis=1) + _DWELLS, self.alarms + _SCANS * rate
-        seen = (self.hits.sum(axis=1) + _DWELLS * P) / dwells
+        left = np.maximum(1.0 - (1.0 - KEEP) * self.turns, _LEFT)
+        dwells, alarms = self.dwells.sum(axis=1) + _DWELLS * left, self.alarms + _SCANS * left * rate
+        seen = (self.hits.sum(axis=1) + _DWELLS * left * P) / dwells
         # beside a filter's cautious predictions alone, noise looks smaller than it is
-        factors = self.factors[:-1] if len(sensors) > 1 else np.maximum(self.factors[:-1], 1.0)
-        values = [factors, seen, alarms / (self.turns + _SCANS)]
-        spreads = [self.spreads[:-1], 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
+        factors = self.factors if len(sensors) > 1 else np.maximum(self.factors, 1.0)
+        values = [factors, seen, alarms / (self.turns + _SCANS * left)]
+        spreads = [self.spreads, 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
         return np.stack(values, axis=1), np.stack(spreads, axis=1)
 
     def by_range(self, seen: Array) -> tuple[Array, Array]:
@@ -109,20 +120,37 @@ class Estimates(NamedTuple):
 
     @property
     def spreads(self) -> Array:
-        """Standard deviations of the factors' logarithms, (S + 1,)."""
+        """Standard deviations of the factors' logarithms, (S,)."""
         return np.sqrt(np.diagonal(np.linalg.inv(self.weights)))
 
     @property
-    def _in_use(self) -> Array:
-        return np.append(self.used[:, NOISE], self.manoeuvres)
+    def agile(self) -> tuple[float, float]:
+        """Factor of the process noise that predicts best on average, and the standard deviation of its logarithm."""
+        weights, values = np.exp(self.agility - self.agility.max()), np.log(FACTORS)
+        weights /= weights.sum()
+        mean = float(weights @ values)
+        # within half a step nothing was tried
+        return math.exp(mean), math.sqrt(float(weights @ (values - mean) ** 2) + (values[1] - values[0]) ** 2 / 12.0)
+
+    def gained(self, noise: Array, agility: Array) -> Estimates:
+        """Add evidence for the factors of noise (S,) and of the process noise (G,)."""
+        evidence = self.evidence.copy()
+        evidence[:, NOISE] += noise
+        return self._replace(evidence=evidence, agility=self.agility + agility)
 
     def weighed(self, matrix: Array, right: Array) -> Estimates:
         """Take in residuals by their normal equations, relative to the factors in use."""
-        weights = self.weights + matrix
-        factors = self._in_use * np.linalg.solve(weights, self.weights @ (self.factors / self._in_use) + right)
+        weights, noise = self.weights + matrix, self.used[:, NOISE]
+        factors = noise * np.linalg.solve(weights, self.weights @ (self.factors / noise) + right)
         return self._replace(weights=weights, factors=np.clip(factors, 1.0 / _LARGEST, _LARGEST))
 
-    def counted(self, ids: Array, dwells: Array, hits: Array, bands: Array) -> Estimates:
+    def heard(self, sensors: Sequence[Sensor], alarms: Array, turns: Array) -> Estimates:
+        """Count measurements of no target in so many turns, (S,) each."""
+        rates, evidence = self.found(sensors)[0][:, ALARMS], self.evidence.copy()
+        evidence[:, ALARMS] += gain_of_rates(alarms, turns, rates, declared_values(sensors)[:, ALARMS])
+        return self._replace(alarms=self.alarms + alarms, turns=self.turns + turns, evidence=evidence)
+
+    def counted(self, sensors: Sequence[Sensor], ids: Array, dwells: Array, hits: Array, bands: Array) -> Estimates:
         """Count a scan's detections and misses of T confirmed tracks, by ascending ids; others are forgotten.
 
         `dwells` and `hits` (T, S) say which sensors could see each track, and detected it; `bands` (T, S) is the
@@ -140,46 +168,48 @@ class Estimates(NamedTuple):
             for counts in (open_hits, open_dwells)
         )
         open_hits[again] = open_dwells[again] = 0.0
+        seen, evidence = self.found(sensors)[0][:, DETECTION], self.evidence.copy()
+        P = declared_values(sensors)[:, DETECTION]
+        evidence[:, DETECTION] += gain_of_shares(done_hits.sum(axis=1), done_dwells.sum(axis=1), seen, P)
+        of_range = gain_of_shares(done_hits, done_dwells, self.by_range(seen)[0], seen[:, None])
+        evidence[:, RANGES] += of_range.sum(axis=1)
         return self._replace(
-            hits=self.hits + done_hits, dwells=self.dwells + done_dwells,
+            evidence=evidence, hits=self.hits + done_hits, dwells=self.dwells + done_dwells,
             ids=ids, open_hits=open_hits + hits, open_dwells=open_dwells + dwells,
         )  # fmt: skip
 
     def forgotten(self, turns: Array) -> Estimates:
         """The sums after a scan in which each sensor made so many turns, (S,)."""
-        kept, prior = KEEP**turns, (1.0 - KEEP ** float(turns.mean())) * np.diag(_prior(len(self.used)))
-        weights = self.weights * KEEP ** float(turns.mean())
-        fading = self._replace(weights=weights).weighed(prior, prior @ (1.0 / self._in_use))
+        mean, S = float(turns.mean()), len(turns)
+        kept, prior = KEEP**turns, (1.0 - KEEP**mean) * _LEFT * 0.5 * _RESIDUALS * np.eye(S)
+        fading = self._replace(weights=self.weights * KEEP**mean).weighed(prior, prior @ (1.0 / self.used[:, NOISE]))
         return fading._replace(
             hits=self.hits * kept[:, None], dwells=self.dwells * kept[:, None],
             alarms=self.alarms * kept, turns=self.turns * kept,
+            evidence=self.evidence * kept[:, None], agility=self.agility * KEEP**mean,
         )  # fmt: skip
 
     def settled(self, sensors: Sequence[Sensor]) -> Estimates:
         """The estimates with what is to be used from now on."""
-        found, spreads = self.found(sensors)
+        found, declared, before = self.found(sensors)[0], declared_values(sensors), self.used
         # less noise than declared does no harm
         found[:, NOISE] = np.maximum(found[:, NOISE], 1.0)
-        S, noise = len(sensors), self.used[:, NOISE]
-        declared = declared_values(sensors)
-        choice = _choice(_scales(self.used), _scales(declared), _scales(found), spreads)
-        used = np.choose(choice, [declared, self.used, found])
-        of_sensor, before = (np.broadcast_to(own[:, DETECTION, None], self.bands.shape) for own in (used, self.used))
-        bands = np.where(self.bands == before, of_sensor, self.bands)
-        seen, spreads_of_bands = self.by_range(found[:, DETECTION])
-        # all bands of a sensor as soon as one is surely different
-        choice = _choice(_odds(bands), _odds(of_sensor), _odds(seen), spreads_of_bands, axis=1)
-        choice[[not reach(sensor) for sensor in sensors]] = 0
-        self = self._replace(bands=np.choose(choice, [of_sensor, bands, seen]))
-        if (used[:, NOISE] > noise).any():
+        chosen = np.where(trusted(self.evidence[:, :RANGES], before != declared), found, declared)
+        used = np.where((chosen != declared) & ~_moved(_scales(chosen), _scales(before)), before, chosen)
+        # all bands of a sensor, or none
+        of_sensor = np.broadcast_to(used[:, DETECTION, None], self.bands.shape)
+        differ = (self.bands != before[:, DETECTION, None]).any(axis=1)
+        by_range = trusted(self.evidence[:, RANGES], differ) & [bool(reach(sensor)) for sensor in sensors]
+        seen = self.by_range(found[:, DETECTION])[0]
+        still = differ & ~_moved(_odds(seen), _odds(self.bands)).any(axis=1)
+        bands = np.where(by_range[:, None], np.where(still[:, None], self.bands, seen), of_sensor)
+        if (used[:, NOISE] > before[:, NOISE]).any():
             # what looked like manoeuvres may have been noise
-            factors, weights = self.factors.copy(), self.weights.copy()
-            factors[S], weights[S], weights[:, S], weights[S, S] = 1.0, 0.0, 0.0, 0.5 * _MANOEUVRES
-            return self._replace(used=used, manoeuvres=1.0, factors=factors, weights=weights)
-        # manoeuvres that do not occur may begin at any time; each is along one axis, and a gate too narrow ends a track
-        now, factor = max(self.manoeuvres / _AXES, 1.0), max(float(self.factors[S]), 1.0)
-        choice = _choice(np.log([now]), np.zeros(1), np.log([factor]), self.spreads[S:])
-        return self._replace(used=used, manoeuvres=(1.0, self.manoeuvres, _AXES * factor)[int(choice[0])])
+            return self._replace(used=used, bands=bands, manoeuvres=1.0, agility=np.zeros(len(FACTORS)))
+        better = mean_evidence(self.agility[FACTORS != 1.0])
+        best = float(FACTORS[np.argmax(self.agility)])
+        agile = best if trusted(better, np.array(self.manoeuvres != 1.0)) else 1.0
+        return self._replace(used=used, bands=bands, manoeuvres=agile)
 
 
 def declared_values(sensors: Sequence[Sensor]) -> Array:
@@ -199,14 +229,6 @@ def _odds(probabilities: Array) -> Array:
     return np.asarray(np.log(probabilities) - np.log1p(-probabilities))
 
 
-def _prior(sensors: int) -> Array:
-    """Information of the prior about the factors of variances, (S + 1,)."""
-    return np.append(np.full(sensors, 0.5 * _RESIDUALS), 0.5 * _MANOEUVRES)
-
-
-def _choice(now: Array, declared: Array, found: Array, deviation: Array, axis: tuple[int, ...] | int = ()) -> Array:
-    """Whether to use what is declared (0), what is in use now (1), or the estimate (2); of an axis all or none."""
-    away = np.abs(found - declared) / deviation
-    trusted = ((away > _SURE) | ((now != declared) & (away > _UNSURE))).any(axis=axis, keepdims=True)
-    moved = (np.abs(found - now) > np.maximum(_STEP, 0.5 * deviation)).any(axis=axis, keepdims=True)
-    return np.broadcast_to(np.where(trusted, np.where(moved, 2, 1), 0), found.shape).copy()
+def _moved(scales: Array, now: Array) -> Array:
+    """Whether values are worth a change: each makes settings anew."""
+    return np.asarray(np.abs(scales - now) > _STEP)

@@ -7,7 +7,6 @@ predicted density in its view (`assoc.costs.views`).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from assoc.costs.views import log_missed, places_of
 from assoc.filters import FreeFlight
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.clutter import YOUNG, ClutterMap
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 
@@ -26,6 +26,8 @@ _LEAST_TURN = 1e-3
 # a scan counts for a track if this share of it is in view of a sensor
 _COVERED = 0.5
 _HOUR = 3600.0
+# logarithm beyond which numbers of false alarms are as good as infinite
+_SURELY_FALSE = 500.0
 # standard deviations below the region's floor
 _SURELY = 3.0
 
@@ -43,12 +45,16 @@ def keep_pace(progress: Progress) -> Progress:
 
 
 def count_out_of_view(progress: Progress) -> Progress:
-    """Add the time since the last scan to that for which no sensor could see a track, for those inside the region."""
-    dt, tracks, settings = progress.elapsed, progress.state.tracks, progress.settings
+    """Add the time since the last scan to that for which no sensor could see a track, for those inside the region.
+
+    Neither can one that is off: a sector without width.
+    """
+    dt, tracks, settings, sectors = progress.elapsed, progress.state.tracks, progress.settings, progress.scan.sectors
     if dt == 0.0 or not len(tracks):
         return progress
     states = tracks.states if progress.timed is None else progress.timed.late
-    hidden = ~in_view(progress, states).any(axis=1)
+    seen = in_view(progress, states)
+    hidden = ~(seen if sectors is None else seen & (sectors[:, 0] != sectors[:, 1])).any(axis=1)
     if not hidden.any():
         return progress
     hidden &= _inside(settings, states, 3)
@@ -115,18 +121,36 @@ def false_alarms(progress: Progress) -> float:
     return float(rates @ state.turns) * _HOUR / state.pace
 
 
-def false_alarms_at(progress: Progress, tracks: TrackBatch, assigned: Sequence[Array]) -> Array | float:
-    """The same where each track was detected in this scan, (T,): denser at some places, as false tracks are."""
-    alarms, clutter = false_alarms(progress), progress.scan.clutter
-    if clutter is None or math.isinf(alarms):
+def false_alarms_at(progress: Progress, tracks: TrackBatch) -> Array | float:
+    """The same where tracks are that may be confirmed: denser at some places, as false tracks are; (T,).
+
+    At what may yet turn out to be a place, all that a track has gained so far may be as much too much.
+    """
+    alarms, life, clutter = false_alarms(progress), progress.settings.life_cycle, progress.state.clutter
+    new = np.flatnonzero(~tracks.confirmed & life.confirms(tracks.score, tracks.detections, alarms))
+    if clutter is None or not len(new) or not any(crowd.any() for crowd in progress.crowds):
         return alarms
-    order = np.argsort(tracks.track_id, kind="stable")
-    ids, crowd = tracks.track_id[order], np.zeros(len(tracks))
-    for taken, dense in zip(assigned, clutter, strict=True):
-        row = np.minimum(np.searchsorted(ids, taken), max(len(ids) - 1, 0))
-        known = np.flatnonzero(ids[row] == taken) if len(ids) else row[:0]
-        np.maximum.at(crowd, order[row[known]], dense[known])
-    return np.asarray(alarms * np.exp(crowd))
+    used, found = densities_at(progress, tracks[new], clutter)
+    doubtful = (found * (clutter.clock < YOUNG)).sum(axis=1) * tracks.hits[new]
+    usual = life.false_tracks_per_hour / float(life.false_share(alarms)) if math.isinf(alarms) else alarms
+    at = np.full(len(tracks), usual)
+    at[new] *= np.exp(np.minimum(np.maximum(used.max(axis=1), doubtful), _SURELY_FALSE))
+    return at
+
+
+def densities_at(progress: Progress, tracks: TrackBatch, clutter: ClutterMap) -> Array:
+    """Logarithms of the densities where each sensor expects tracks: in use, and all, see `ClutterMap`; (2, T, S)."""
+    crowded = [bool(crowd.any()) for crowd in progress.crowds]
+    found = np.zeros((2, len(tracks), len(crowded)))
+    if any(crowded) and len(tracks):
+        expected = [
+            progress.settings.filter.expected(tracks.states, sensor).mean if some else np.zeros((0, sensor.dim))
+            for sensor, some in zip(progress.settings.sensors, crowded, strict=True)
+        ]
+        both = clutter.used_and_found(progress.work.settings.sensors, progress.scan, expected)
+        for s in np.flatnonzero(crowded).tolist():
+            found[:, :, s] = [values[s] for values in both]
+    return found
 
 
 def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
