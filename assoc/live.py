@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from typing import IO, TYPE_CHECKING, Any
 
 from assoc._cli.options import Given, Parser
@@ -25,6 +25,7 @@ from assoc._text.times import moment
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.plot_lines import Lines
     from assoc.plotting.live import LivePage
     from assoc.scene.scene import Scene
@@ -43,7 +44,7 @@ def _live(words: list[str]) -> None:
     given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
     from assoc._cli.track.plot_lines import Lines, header_of
 
-    scene = _scene(given, settings)
+    scene, form = _scene(given, settings)
     going_on = given["state"] is not None and os.path.exists(given["state"])
     _check_output(given["output"], header_of(scene.origin), going_on)
     with announcement.silenced() if given["quiet"] else nullcontext():
@@ -79,23 +80,38 @@ def _live(words: list[str]) -> None:
         _say(given, tracker.summary())
 
     with _INTERRUPTION.reported(end):
-        _take_plots(lines, scene, tracker, given, show)
+        _take_plots(lines, scene, tracker, given, show, form)
     end()
 
 
-def _scene(given: Given, settings: dict[str, Any]) -> Scene:
-    """The scene of the sensors; radars.toml gives the turns of their antennas and closed areas, too."""
+def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
+    """The scene of the sensors, and how lines are read; radars.toml says more of radars than a scene does."""
+    from assoc._cli.biases import print_biases
+    from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.radars_file import read_radars
+    from assoc.registration import register
     from assoc.scene.scene import Scene
 
     if not given["file"].lower().endswith(".toml"):
-        return Scene.load(given["file"])
+        if given["registration"] is not None:
+            raise InvalidInputError("--registration: first takes the plots of radars.toml; register a scene before")
+        scene = Scene.load(given["file"])
+        return scene, LineForm(scene)
     if given["turns"] is not None:
         raise InvalidInputError(f"--turns: {given['file']} says how the antennas turn")
-    found = read_radars(given["file"])
-    given["turns"] = found.sensor_turns
-    settings["initiation"] = closing(settings["initiation"], found.closed)
-    return found.scene
+    radars = read_radars(given["file"])
+    given["turns"] = radars.sensor_turns
+    settings["initiation"] = closing(settings["initiation"], radars.closed)
+    scene, biases = radars.scene, radars.biases
+    if given["registration"] is not None:
+        found = register(scene, components=("range", "azimuth", "gain"), seed=settings.get("seed", 0))
+        with redirect_stdout(sys.stderr):
+            print_biases(found)
+        if found.significant:
+            scene, biases = found.correct(scene), radars.with_further(found)
+    numbers = radars.numbers
+    places = [radars.places[number] for number in numbers]
+    return scene, LineForm(scene, places, [biases[number] for number in numbers])
 
 
 class _StateFile:
@@ -174,7 +190,12 @@ def _page(scene: Scene, given: Given, heights: bool) -> LivePage | None:
 
 
 def _take_plots(
-    lines: Lines | None, scene: Scene, tracker: LiveTracker, given: Given, show: Callable[[list[Picture]], None]
+    lines: Lines | None,
+    scene: Scene,
+    tracker: LiveTracker,
+    given: Given,
+    show: Callable[[list[Picture]], None],
+    form: LineForm,
 ) -> None:
     """Pass the plots of the lines (of the scene if there are none) to the tracker, and show its pictures."""
     from assoc._cli.track.plot_lines import IdentityError, OwnPosition, parse_line, replayed
@@ -185,7 +206,7 @@ def _take_plots(
         return
     for line in lines:
         try:
-            found = parse_line(line, scene)
+            found = parse_line(line, scene, form)
         except IdentityError as error:
             tracker.leave_out("identities not understood", f"identity left out: {error}")
             found = error.plot

@@ -156,6 +156,8 @@ LIVE = (
     Option("replay", "X", "take the scene's own plots, X times as quickly as they were made (0: at once)",
            kinds.not_negative),
     Option("page", "PORT", "show the tracks moving on a page on 127.0.0.1 (0: any free port)", kinds.whole(0)),
+    Option("registration", "NAME", "first: estimate biases from the plots of radars.toml, and take them off all others",
+           kinds.OneOf(("first",))),
     Option("interval", "S", "seconds of plots taken in together (default 1 or a quarter turn)", kinds.number),
     Option("turns", "S,...", "seconds for a turn of each radar's antenna (default: all measure at the same time)",
            kinds.listed(kinds.number)),

@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from assoc._cli.track.line_form import LineForm
 from assoc._text.times import decimals
 from assoc.errors import InvalidInputError
 from assoc.exports.maps import COORDINATES, coordinates
@@ -71,12 +72,14 @@ class OwnPosition(NamedTuple):
     heading: float | None = None
 
 
-def parse_line(line: str, scene: Scene) -> Plot | OwnPosition | None:
+def parse_line(line: str, scene: Scene, form: LineForm | None = None) -> Plot | OwnPosition | None:
     """Read a line of CSV or JSON; None for an empty line, a comment or the header.
 
-    CSV: sensor, time, the components of the measurement, then optionally mode3 and address. JSON: an object with
-    sensor, time, and either values (an array) or the components by name; optionally mode3 and address.
-    Metres, seconds, radians; a code is a whole number, an address has hexadecimal digits (in JSON it may be a number).
+    CSV: sensor, time, the components of the measurement, then optionally mode3 and address; or what the header says,
+    which the ``form`` of the stream remembers. JSON: an object with sensor, time, and either values (an array) or the
+    components by name; optionally mode3 and address. Metres, seconds, radians; but names of recordings, as bearing or
+    range_nmi, have the units of recordings. A code is a whole number, an address has hexadecimal digits (in JSON it may
+    be a number).
 
     The own position of a platform: CSV "platform", a sensor that it carries, time, x, y, z, and optionally the heading;
     JSON an object with platform (the sensor), time, position (an array) and optionally heading.
@@ -91,23 +94,30 @@ def parse_line(line: str, scene: Scene) -> Plot | OwnPosition | None:
         return None
     if len(text) > LONGEST:
         raise InvalidInputError(f"a line of {len(text)} characters, expected at most {LONGEST}")
-    if text.partition(",")[0].strip().lower() == "sensor":
+    form = form or LineForm(scene)
+    cells = [part.strip() for part in text.split(",")]
+    if not text.startswith("{") and form.takes_header(cells):
         return None
     try:
-        found: Any = json.loads(text) if text.startswith("{") else _from_csv(text, scene)
+        found: Any = json.loads(text) if text.startswith("{") else form.named(cells) or _from_csv(cells, scene)
         if "platform" in found:
             x, y, z = (float(value) for value in found["position"])
             heading = found.get("heading")
             heading = None if heading in (None, "") else float(heading)
             return OwnPosition(str(found["platform"]), float(found["time"]), [x, y, z], heading)
         name, time = str(found["sensor"]), float(found["time"])
-        sensor, values = _sensor(name, scene), found.get("values")
+        s = _index(name, scene)
+        sensor = None if s is None else scene.sensors[s]
+        form.in_compass(found, s)
+        values = found.get("values")
         if values is None:
             # of an unknown sensor only the name is read: the tracker reports it
             parts = sensor.components[: sensor.dim] if sensor is not None else ()
             values = [found.get(part, "") if part == "height" else found[part] for part in parts]
         if sensor is not None and sensor.components[sensor.dim - 1] == "height":
             name, values = _with_height(name, list(values), scene, sensor)
+        if s is not None:
+            time, values = form.unbiased(s, time, values)
         plot = Plot(name, time, [float(value) for value in values])
     except (ValueError, TypeError, LookupError, RecursionError, AttributeError, OverflowError) as error:
         raise InvalidInputError(_refusal(text, f"no {error}" if isinstance(error, KeyError) else str(error))) from None
@@ -121,9 +131,9 @@ def _refusal(text: str, what: str) -> str:
     return f"expected sensor, time and values, as CSV or a JSON object, got {text[:60]!r} ({what[:80]})"
 
 
-def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
+def _from_csv(cells: list[str], scene: Scene) -> dict[str, Any]:
     """Sensor, time, values, and identity; or a platform's own position."""
-    name, time, *rest = (part.strip() for part in text.split(","))
+    name, time, *rest = cells
     if name == "platform" and _sensor(name, scene) is None:
         when, *values = rest
         if len(values) not in (3, 4):
@@ -152,7 +162,13 @@ def _with_height(name: str, values: list[Any], scene: Scene, sensor: Sensor) -> 
 
 def _sensor(name: str, scene: Scene) -> Sensor | None:
     """The sensor of this name or number; None if unknown."""
-    return next((sensor for k, sensor in enumerate(scene.sensors, 1) if name in (sensor.name, str(k))), None)
+    s = _index(name, scene)
+    return None if s is None else scene.sensors[s]
+
+
+def _index(name: str, scene: Scene) -> int | None:
+    """Number, from 0, of the sensor of this name or number; None if unknown."""
+    return next((s for s, sensor in enumerate(scene.sensors) if name in (sensor.name, str(s + 1))), None)
 
 
 def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
