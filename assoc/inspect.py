@@ -95,6 +95,15 @@ def _lines(found: Radars) -> list[str]:
             *(f"{what}: {number}" for what, number in recording.notes.items() if number),
         ]
         lines.append(printable(f"{radar.name}: {'; '.join(parts)}"))
+    for one, sensor in found.reports:
+        targets = len({*one.identities[:, 1].tolist()} - {0})
+        parts = [
+            f"{len(one)} reports of {targets} targets, {moment(one.times[0])} to {moment(one.times[-1])}",
+            f"noise {sensor.covariance[0, 0] ** 0.5:.4g} m",
+            "with altitudes" if sensor.dim == 3 else "without altitudes",
+            *(f"{what}: {number}" for what, number in one.notes.items()),
+        ]
+        lines.append(printable(f"{sensor.name}: {'; '.join(parts)}"))
     return lines
 
 
@@ -132,23 +141,34 @@ def suspicious(found: Radars) -> list[str]:
 
 def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
     """What agrees with what, what does not, and what was compared with nothing: nothing else may be called right."""
-    from assoc.registration.agreement import compare, noise_of
+    import numpy as np
+
+    from assoc.registration.agreement import compare, noise_of, reported
 
     agreed, wrong, unknown = [], [], []
     assert found.scene.origin is not None
-    for s, one in enumerate(compare(found.recordings, found.radars, found.turns, found.scene.origin)):
+    reports = [
+        reported(
+            one.times,
+            one.in_scene(found.scene.origin)[:, :2],
+            one.identities[:, 1],
+            float(np.sqrt(sensor.covariance[0, 0])),
+        )
+        for one, sensor in found.reports
+    ]
+    for s, one in enumerate(compare(found.recordings, found.radars, found.turns, found.scene.origin, reports)):
         radar = found.radars[s]
         declared = radar.covariance.diagonal() ** 0.5
         if one.change is None:
             if one.places >= _MANY:
                 wrong.append(
-                    f"{radar.name}: {one.places} places where another radar looks, and no turn of north, unit of "
+                    f"{radar.name}: {one.places} places where another sensor looks, and no turn of north, unit of "
                     "ranges or clock with which they see the same targets: is the place right?"
                 )
             else:
-                unknown.append(f"{radar.name}: bearings, ranges and times: too few targets that another radar sees")
+                unknown.append(f"{radar.name}: bearings, ranges and times: too few targets that another sensor sees")
         else:
-            agreed.append(f"{radar.name}: another radar sees the same target at {one.common} of {one.places} places")
+            agreed.append(f"{radar.name}: another sensor sees the same target at {one.common} of {one.places} places")
             wrong += [f"{radar.name}: {text}" for text in _differences(one, declared)]
         noise = noise_of(found.recordings[s], found.turns[s])
         if noise.plots < _MANY:
@@ -160,6 +180,8 @@ def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
         if not all(1 / 3 < ratio < 3 for ratio in ratios):
             said = f"{declared[0]:.3g} m and {math.degrees(declared[1]):.2g} deg"
             wrong.append(f"{radar.name}: noise: {said} are declared, {seen} are seen")
+    if found.reports and not found.radars:
+        unknown.append("positions that are reported: no radar sees the targets")
     return agreed, wrong, unknown
 
 

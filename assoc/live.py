@@ -89,6 +89,7 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
     from assoc._cli.biases import print_biases
     from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.radars_file import read_radars
+    from assoc.recordings.on_earth import Bias
     from assoc.registration import register
     from assoc.scene.scene import Scene
 
@@ -104,14 +105,20 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
     settings["initiation"] = closing(settings["initiation"], radars.closed)
     scene, biases = radars.scene, radars.biases
     if given["registration"] is not None:
-        found = register(scene, components=("range", "azimuth", "gain"), seed=settings.get("seed", 0))
+        found = register(
+            scene,
+            components=("range", "azimuth", "gain"),
+            reference=radars.references,
+            seed=settings.get("seed", 0),
+        )
         with redirect_stdout(sys.stderr):
             print_biases(found)
         if found.significant:
             scene, biases = found.correct(scene), radars.with_further(found)
     numbers = radars.numbers
-    places = [radars.places[number] for number in numbers]
-    return scene, LineForm(scene, places, [biases[number] for number in numbers])
+    others = len(scene.sensors) - len(numbers)
+    places = [radars.places[number] for number in numbers] + [(0.0, 0.0, 0.0)] * others
+    return scene, LineForm(scene, places, [biases[number] for number in numbers] + [Bias()] * others)
 
 
 class _StateFile:

@@ -79,6 +79,8 @@ def _write(given: Given, values: dict[str, Any]) -> None:
     if given["verbose"]:
         used = ", ".join(f"{name} {value}" for name, value in values.items())
         print_lines(f"{printable(file)}: {scene!r}; {used or 'all defaults'}")
+    if radars is not None and "reference" not in values:
+        values["reference"] = radars.references
     started = time.perf_counter()
     found = register(scene, **values)
     elapsed = time.perf_counter() - started

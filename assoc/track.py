@@ -136,9 +136,9 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) 
         raise InvalidInputError("--registration: online needs scans of one instant; take first")
     found = read_radars(file)
     settings["initiation"] = closing(settings["initiation"], found.closed)
-    scene = _registered(found.scene, given, settings)
+    scene = _registered(found.scene, given, settings, found.references)
     tracker = make_tracker(
-        given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, min(found.turns)
+        given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, found.shortest
     )
     return _of_scans(scene, tracker, given, None if given["identity"] == "ignore" else found.identities)
 
@@ -181,8 +181,8 @@ def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = No
     return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
-def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
-    """The scene without the biases of its sensors, if they are to be found first."""
+def _registered(scene: Scene, given: Given, settings: dict[str, Any], references: Sequence[str] = ()) -> Scene:
+    """The scene without the biases of its sensors, if they are to be found first; references have none."""
     from assoc.registration import register
     from assoc.tracking.offline.smoothing import check_smoothable
 
@@ -191,7 +191,12 @@ def _registered(scene: Scene, given: Given, settings: dict[str, Any]) -> Scene:
         if given["smooth"]:
             check_smoothable(corrects="registration" in settings)
         return scene
-    found = register(scene, components=("range", "azimuth", "elevation", "gain"), seed=settings.get("seed", 0))
+    found = register(
+        scene,
+        components=("range", "azimuth", "elevation", "gain"),
+        reference=references,
+        seed=settings.get("seed", 0),
+    )
     print_biases(found)
     return found.correct(scene)
 

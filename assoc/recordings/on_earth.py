@@ -45,7 +45,12 @@ class Bias:
 
 
 def placed(
-    recording: Recording, radar: Radar2D, place: Origin, origin: Origin, height_noise: float | None = None
+    recording: Recording,
+    radar: Radar2D,
+    place: Origin,
+    origin: Origin,
+    height_noise: float | None = None,
+    usual: float = USUAL_ALTITUDE,
 ) -> tuple[Recording, Radar2D]:
     """Put a radar that stands at its own origin, with its plots, where it stands in a scene.
 
@@ -54,13 +59,13 @@ def placed(
     the radar measures none.
 
     Azimuths are then in the scene's plane: where the radar stands, north and up have other directions than at the
-    origin. Of plots without an altitude, that of the others (their median) is assumed.
+    origin. Of plots without an altitude, that of the others (their median) is assumed, or the ``usual`` one.
     """
     latitude, longitude, height = (np.array([value]) for value in place)
     here = east_north_up(latitude, longitude, height, origin)[0]
     altitudes = recording.trusted_altitudes
     known = altitudes[np.isfinite(altitudes)]
-    assumed = float(np.median(known)) if len(known) else USUAL_ALTITUDE
+    assumed = float(np.median(known)) if len(known) else usual
     azimuths = azimuths_in_plane(recording.measurements, altitudes, place, origin, assumed)
     radar = replace(radar, position=here)
     if height_noise is not None:

@@ -38,7 +38,9 @@ _SHARE = 0.3
 _INSTANTS, _MOST_PLOTS, _MOST_POINTS = 60, 40_000, 1_000
 _STEP = math.radians(0.5)
 _AROUND = 10
-_APART = 1e8
+_APART, _FAR = 1e8, 1e5
+# seconds between two reports of one target that make a leg
+_LONGEST = 60.0
 
 
 class Noise(NamedTuple):
@@ -76,7 +78,7 @@ class Agreement:
     length: tuple[float, float] = (0.0, math.inf)
 
 
-class _Legs(NamedTuple):
+class Legs(NamedTuple):
     """Legs of a radar in the order of their beginnings; places as complex numbers, x + iy."""
 
     place: complex
@@ -142,7 +144,7 @@ def _rows(times: Array, positions: Array, turn: float, names: Array) -> Array:
     return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
-def _legs(recording: Recording, radar: Radar2D, turn: float, origin: Origin, change: Change) -> _Legs:
+def _legs(recording: Recording, radar: Radar2D, turn: float, origin: Origin, change: Change) -> Legs:
     """Legs of a radar, its plots scaled, shifted and mirrored, but not turned."""
     if len(recording) > _MOST_PLOTS:
         start = (len(recording) - _MOST_PLOTS) // 2
@@ -153,7 +155,9 @@ def _legs(recording: Recording, radar: Radar2D, turn: float, origin: Origin, cha
         noise = Noise(float(sigma[0]), float(sigma[1]), noise.plots)
     slant, altitudes = change.scale * recording.ranges, recording.trusted_altitudes
     known = np.isfinite(altitudes)
-    usual = float(np.median(altitudes[known])) if known.any() else USUAL_ALTITUDE
+    reach = change.scale * float(radar.field_of_view[0, 1])
+    # a radar without heights that reaches less far sees ships, or targets that are low
+    usual = float(np.median(altitudes[known])) if known.any() else USUAL_ALTITUDE if reach > _FAR else 0.0
     z = np.stack([slant, recording.azimuths], axis=1)
     up = heights_above(z, np.where(known, altitudes, usual), radar.position, origin) - radar.position[2]
     ground = np.sqrt(np.maximum(slant**2 - up**2, (0.5 * slant) ** 2))
@@ -162,11 +166,21 @@ def _legs(recording: Recording, radar: Radar2D, turn: float, origin: Origin, cha
     ends = -np.conj(ends) if change.mirrored else ends
     times = recording.times + change.shift
     rows = _rows(times, np.stack([ends.real, ends.imag], axis=1), turn, _names(recording))
-    reach = change.scale * float(radar.field_of_view[0, 1])
-    return _Legs(complex(*radar.position[:2]), reach, times[rows], ends[rows], doubt[rows[:, 0]], noise)
+    return Legs(complex(*radar.position[:2]), reach, times[rows], ends[rows], doubt[rows[:, 0]], noise)
 
 
-def _at(legs: _Legs, instants: Array) -> tuple[Array, Array, Array]:
+def reported(times: Array, places: Array, names: Array, noise: float) -> Legs:
+    """Legs of targets that report where they are: x, y (n, 2) at times (n,), and who they are (n,), 0 if unknown."""
+    order = np.lexsort((times, names))
+    rows = np.stack([order[:-1], order[1:]], axis=1)
+    apart = times[rows[:, 1]] - times[rows[:, 0]]
+    rows = rows[(names[rows[:, 0]] == names[rows[:, 1]]) & (names[rows[:, 0]] > 0) & (apart > 0) & (apart <= _LONGEST)]
+    rows = rows[np.argsort(times[rows[:, 0]], kind="stable")]
+    ends = places[rows] @ np.array([1.0, 1j])
+    return Legs(0j, math.inf, times[rows], ends, np.zeros(len(rows)), Noise(noise, 0.0, len(times)))
+
+
+def _at(legs: Legs, instants: Array) -> tuple[Array, Array, Array]:
     """Where legs are at instants, from the radar (complex); the number of the instant; standard deviations, metres."""
     places, number, spread = [np.zeros(0, dtype=complex)], [np.zeros(0, dtype=int)], [np.zeros(0)]
     longest = float(np.diff(legs.times, axis=1).max(initial=0.0))
@@ -187,7 +201,7 @@ def _at(legs: _Legs, instants: Array) -> tuple[Array, Array, Array]:
 class _Beside:
     """Places of one radar at some instants, and those of the others in a tree."""
 
-    def __init__(self, mine: _Legs, others: Sequence[_Legs], turn: float) -> None:
+    def __init__(self, mine: Legs, others: Sequence[Legs], turn: float) -> None:
         self.mine, self.others = mine, others
         begin = max(float(mine.times.min(initial=math.inf)), min(float(o.times.min(initial=math.inf)) for o in others))
         end = min(float(mine.times.max(initial=-math.inf)), max(float(o.times.max(initial=-math.inf)) for o in others))
@@ -255,12 +269,16 @@ class _Radar(NamedTuple):
     turn: float
     origin: Origin
 
-    def legs(self, change: Change) -> _Legs:
+    def legs(self, change: Change) -> Legs:
         return _legs(*self, change)
 
 
 def compare(
-    recordings: Sequence[Recording], radars: Sequence[Radar2D], turns: Sequence[float], origin: Origin
+    recordings: Sequence[Recording],
+    radars: Sequence[Radar2D],
+    turns: Sequence[float],
+    origin: Origin,
+    reports: Sequence[Legs] = (),
 ) -> list[Agreement]:
     """Compare each radar with the others.
 
@@ -270,6 +288,8 @@ def compare(
         In one frame, as `assoc.recordings.on_earth.placed` gives them.
     turns : sequence of float
         Seconds of a turn.
+    reports : sequence of Legs, optional
+        What targets report, see `reported`.
     origin : tuple
         Of the frame: latitude and longitude, radians, and height, metres.
 
@@ -278,12 +298,14 @@ def compare(
     list of Agreement
     """
     known = [_Radar(*each, origin) for each in zip(recordings, radars, turns, strict=True)]
-    if len(known) < 2:
+    if len(known) + len(reports) < 2:
         return [Agreement() for _ in known]
     settled: dict[int, Agreement] = {}
     legs = [radar.legs(Change()) for radar in known]
     while True:
-        seen = {s: _beside(known[s], [*legs[:s], *legs[s + 1 :]]) for s in range(len(known)) if s not in settled}
+        seen = {
+            s: _beside(known[s], [*legs[:s], *legs[s + 1 :], *reports]) for s in range(len(known)) if s not in settled
+        }
         wrong = {s: one for s, one in seen.items() if one.change not in (None, Change())}
         if not wrong:
             return [{**seen, **settled}[s] for s in range(len(known))]
@@ -296,7 +318,7 @@ def compare(
         legs[s] = turned._replace(ends=turned.ends * np.exp(1j * (change.turn + wrong[s].turn[0])))
 
 
-def _beside(radar: _Radar, others: Sequence[_Legs]) -> Agreement:
+def _beside(radar: _Radar, others: Sequence[Legs]) -> Agreement:
     """The change by which a radar agrees with others, none if possible."""
     plain = _Beside(radar.legs(Change()), others, radar.turn)
     turn = plain.best_turn()

@@ -11,9 +11,10 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.columns import COLUMNS, UNITS, choose, code, number, plain_name, seconds
+from assoc.recordings.flights.positions import ENDINGS, NAMES
 from assoc.recordings.on_earth import USUAL_ALTITUDE, Bias, azimuths_in_plane
-from assoc.scene.geodesy import geodetic
-from assoc.sensors import Radar2D
+from assoc.scene.geodesy import east_north_up, geodetic
+from assoc.sensors import PositionSensor, Radar2D
 
 if TYPE_CHECKING:
     from assoc.scene.geodesy import Origin
@@ -80,7 +81,7 @@ class LineForm:
             if own is not None:
                 found[name] = found[own]
         found.setdefault("sensor", "1")
-        found["time"] = seconds(found["time"])[0]
+        found["time"] = seconds(str(found["time"]))[0]
         return found
 
     def in_compass(self, found: dict[str, Any], s: int | None) -> bool:
@@ -88,6 +89,8 @@ class LineForm:
 
         ``found`` then has values, and mode3 as its octal digits.
         """
+        if s is not None and isinstance(self.scene.sensors[s], PositionSensor):
+            return self._reported(found, self.scene.sensors[s].dim)
         names = tuple(map(str, found))
         if names not in self._known:
             self._known[names] = _columns(names)
@@ -116,6 +119,20 @@ class LineForm:
         except (ValueError, OverflowError):
             bits = -1
         found["mode3"] = int(f"{bits:o}") if 0 <= bits <= 0o7777 else -1
+        return True
+
+    def _reported(self, found: dict[str, Any], dim: int) -> bool:
+        """Replace latitude and longitude, degrees, and altitude, metres, by x, y (and z); False if there are none."""
+        plain = {plain_name(str(name)): value for name, value in found.items()}
+        values = []
+        for meaning in ("latitude", "longitude", "altitude"):
+            names = [name + ending for name in NAMES[meaning] for ending in ENDINGS]
+            values.append(next((plain[name] for name in names if plain.get(name) not in (None, "")), None))
+        if values[0] is None or values[1] is None or self.scene.origin is None:
+            return False
+        latitude, longitude, altitude = (float(value or 0.0) for value in values)
+        angles = np.radians([[latitude], [longitude]])
+        found["values"] = east_north_up(angles[0], angles[1], np.array([altitude]), self.scene.origin)[0, :dim].tolist()
         return True
 
     def unbiased(self, s: int, time: float, values: Sequence[Any]) -> tuple[float, list[Any]]:

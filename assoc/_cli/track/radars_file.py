@@ -17,11 +17,12 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc._types import Array
     from assoc.recordings import Recording
+    from assoc.recordings.flights.positions import Positions
     from assoc.recordings.on_earth import Bias
     from assoc.registration import Registration
     from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
-    from assoc.sensors import Radar2D
+    from assoc.sensors import PositionSensor, Radar2D
 
 ASTERIX = (".ast", ".asterix", ".pcap")
 KEYS = (
@@ -29,8 +30,12 @@ KEYS = (
     "resolution", "turn", "bias",
 )  # fmt: skip
 """Keys of a table [[radar]]."""
-_TOP = ("name", "origin", "interval", "closed", "radar")
+REPORT_KEYS = ("name", "file", "source", "columns", "units", "noise")
+"""Keys of a table [[reports]]."""
+_TOP = ("name", "origin", "interval", "closed", "heights", "radar", "reports")
 DAY = 86_400.0
+# metres: of positions by satellites, and of altitudes by pressure
+_REPORT_NOISE = (10.0, 30.0)
 # metres, where a radar's heights by Mode C have no noise of their own: steps of 100 feet, and a pressure that drifts
 _HEIGHT_NOISE = 30.0
 
@@ -49,6 +54,8 @@ class Radars(NamedTuple):
     places: list[Origin]
     biases: list[Bias]
     """What was taken off the plots of each radar."""
+    reports: list[tuple[Positions, PositionSensor]]
+    """What targets report themselves, and the sensors of the scene that follow those of the radars."""
 
     def with_further(self, found: Registration) -> list[Bias]:
         """The biases of all radars, with those found in the scene."""
@@ -72,7 +79,17 @@ class Radars(NamedTuple):
     @property
     def sensor_turns(self) -> list[float]:
         """Seconds for a turn of each sensor of the scene."""
-        return [self.turns[number] for number in self.numbers]
+        return [self.turns[number] for number in self.numbers] + [one.pace for one, _ in self.reports]
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Sensors without bias: satellites give the positions that are reported."""
+        return tuple(sensor.name for _, sensor in self.reports)
+
+    @property
+    def shortest(self) -> float:
+        """Seconds after which a target is seen again at the earliest."""
+        return min(self.turns or [one.pace for one, _ in self.reports])
 
 
 def read_radars(path: str) -> Radars:
@@ -83,33 +100,121 @@ def read_radars(path: str) -> Radars:
     InvalidInputError
         A key or a file is not as expected; the message names the file, the radar and the key.
     """
+    import numpy as np
+
+    from assoc.recordings.flights.positions import scene_with, sensors_of
     from assoc.recordings.on_earth import placed
-    from assoc.recordings.several import identities_of_radars, scene_of_radars
+    from assoc.recordings.several import EARTH, identities_of_radars, scene_of_radars
 
     top = read_toml(path)
     _check_keys(path, top, _TOP)
-    tables = top.get("radar")
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise InvalidInputError(f"{path}: expected a table [[radar]] for each radar")
+    tables, of_reports = (_tables(top, key) for key in ("radar", "reports"))
+    if not tables and not of_reports:
+        raise InvalidInputError(f"{path}: expected a table [[radar]] for each radar, or [[reports]]")
     read = [_read_radar(path, number, table) for number, table in enumerate(tables, 1)]
-    origin = _place(top["origin"], f"{path}: origin") if "origin" in top else read[0][3]
-    recordings, radars = [], []
+    told = [_read_reports(path, number, table) for number, table in enumerate(of_reports, 1)]
+    if "origin" in top:
+        origin = _place(top["origin"], f"{path}: origin")
+    else:
+        origin = read[0][3] if read else told[0].middle
+    heights = _heights(top, path)
+    usual = {} if heights is None else {"usual": 0.5 * sum(heights)}
     biases = [_bias(table, f"{path}: radar {printable(str(table.get('name', number)))}")
               for number, table in enumerate(tables, 1)]  # fmt: skip
-    days = _days([recording for recording, *_ in read])
-    for (recording, radar, _, place, height_noise), day, bias in zip(read, days, biases, strict=True):
+    days = _days([float(one.times[0]) for one in (*(recording for recording, *_ in read), *told)])
+    recordings, radars = [], []
+    for (recording, radar, _, place, height_noise), day, bias in zip(read, days, biases, strict=False):
         plots = bias.off(replace(recording, times=recording.times + day))
-        own = placed(plots, radar, place, origin, height_noise)
+        own = placed(plots, radar, place, origin, height_noise, **usual)
         recordings.append(own[0])
         radars.append(own[1])
     turns = [turn for _, _, turn, _, _ in read]
     interval = None if "interval" not in top else _number(top["interval"], f"{path}: interval")
-    scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
-    scene = replace(scene, name=str(top.get("name", scene.name)))
-    identities = identities_of_radars(recordings, radars, scene.times)
+    scene = None
+    identities: list[tuple[Array, ...]] = []
+    if read:
+        scene = scene_of_radars(recordings, radars, rotations=turns, interval=interval, origin=origin)
+        identities = identities_of_radars(recordings, radars, scene.times)
+    reports = []
+    for one, table, day in zip(told, of_reports, days[len(read) :], strict=True):
+        moved = replace(one, times=one.times + day)
+        name, noise = str(table.get("name", "reports")), _report_noise(path, table)
+        for rows, sensor in sensors_of(moved, name, noise, moved.in_scene(origin)):
+            reports.append((moved.take(rows), sensor))
+    if reports:
+        pace = interval or 0.5 * min(turns or [one.pace for one, _ in reports])
+        scene, identities = scene_with(scene, identities, reports, origin, pace)
+    assert scene is not None
+    region = np.array(scene.region)
+    if heights is not None:
+        # far from the origin the ground lies below the plane
+        drop = float((np.abs(region[:2]).max(axis=1) ** 2).sum()) / (2.0 * EARTH)
+        region[2] = heights[0] - origin[2] - drop, heights[1] - origin[2]
+    scene = replace(scene, name=str(top.get("name", scene.name)), region=region)
     closed = _areas(top.get("closed", []), f"{path}: closed", origin)
     places = [place for _, _, _, place, _ in read]
-    return Radars(scene, recordings, radars, turns, identities, closed, places, biases)
+    return Radars(scene, recordings, radars, turns, identities, closed, places, biases, reports)
+
+
+def _heights(top: dict[str, Any], path: str) -> tuple[float, float] | None:
+    """Lowest and highest altitude of targets, metres, if it is said."""
+    value = top.get("heights")
+    if value is None:
+        return None
+    good = isinstance(value, list) and [type(number) in (int, float) for number in value] == [True, True]
+    if not good or not -1e3 <= value[0] < value[1] <= 1e6:
+        raise InvalidInputError(
+            f"{path}: heights: expected [lowest, highest] altitude of targets, metres, got {value!r}"
+        )
+    return float(value[0]), float(value[1])
+
+
+def _tables(top: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    found = top.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(table, dict) for table in found):
+        raise InvalidInputError(f"{key}: expected a table [[{key}]] for each")
+    return found
+
+
+def _read_reports(path: str, number: int, table: dict[str, Any]) -> Positions:
+    """Reports of AIS, ADS-B, or a system that gives positions."""
+    from assoc.recordings.flights.positions import positions_of, read_positions
+
+    where = f"{path}: reports {printable(str(table.get('name', number)))}"
+    _check_keys(where, table, REPORT_KEYS)
+    file = table.get("file")
+    if not isinstance(file, str):
+        raise InvalidInputError(f"{where}: file: expected the name of a file with its reports")
+    file = os.path.join(os.path.dirname(path), file)
+    if not file.lower().endswith(ASTERIX):
+        return read_positions(file, **_texts(table, where))
+    from assoc.integrations.asterix import read_asterix
+    from assoc.integrations.asterix.parts import chosen_radar
+
+    content = read_asterix(file)
+    sources = {**content.multilateration, **content.adsb}
+    if not sources or content.origin is None:
+        raise InvalidInputError(f"{file}: has no reports of positions (categories 021, 020, 010)")
+    source = chosen_radar(file, sources, table.get("source"), f"{where}: source")
+    return positions_of(sources[source], content.origin)
+
+
+def _report_noise(path: str, table: dict[str, Any]) -> tuple[float, float]:
+    """Noise of positions and of altitudes, metres."""
+    noise, where = table.get("noise", []), f"{path}: reports: noise"
+    if not isinstance(noise, list) or len(noise) > 2:
+        raise InvalidInputError(f"{where}: expected [metres] or [metres, metres of altitude], got {noise!r}")
+    given = [_number(value, where) for value in noise]
+    return (*given, *_REPORT_NOISE[len(given) :])  # type: ignore[return-value]
+
+
+def _texts(table: dict[str, Any], where: str) -> dict[str, dict[str, str]]:
+    """Columns and units that a table says."""
+    options = {key: table.get(key, {}) for key in ("columns", "units")}
+    for key, value in options.items():
+        if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
+            raise InvalidInputError(f"{where}: {key}: expected a table such as {{ range = 'm' }}")
+    return options
 
 
 def _bias(table: dict[str, Any], where: str) -> Bias:
@@ -204,9 +309,8 @@ def _is_corner(value: object) -> bool:
     return isinstance(value, list) and [type(number) in (int, float) for number in value] == [True, True]
 
 
-def _days(recordings: list[Recording]) -> list[float]:
+def _days(starts: list[float]) -> list[float]:
     """Seconds that bring times of day, as of ASTERIX, to the day of the files with dates, if there are such."""
-    starts = [float(recording.times[0]) for recording in recordings]
     dated = [start for start in starts if start > UNIX]
     if not dated:
         return [0.0] * len(starts)
@@ -273,10 +377,7 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
         raise InvalidInputError(f"{where}: file: expected the name of a file with its plots")
     file = os.path.join(os.path.dirname(path), file)
     if not file.lower().endswith(ASTERIX):
-        options = {key: table.get(key, {}) for key in ("columns", "units")}
-        for key, value in options.items():
-            if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
-                raise InvalidInputError(f"{where}: {key}: expected a table such as {{ range = 'm' }}")
+        options: dict[str, Any] = _texts(table, where)
         try:
             return read_plots(file, **options), None, None
         except InvalidInputError as error:

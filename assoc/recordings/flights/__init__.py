@@ -1,1 +1,1 @@
-"""Reports of aircraft from files, and their cleaning."""
+"""Reports of aircraft and ships from files, and their cleaning."""
