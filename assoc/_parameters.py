@@ -148,6 +148,11 @@ class Parameters:
         """
         return None
 
+    @property
+    def every_tuple(self) -> bool:
+        """Whether the solver is to see tuples, too, that cost no less than their singletons."""
+        return False
+
     def _require(self, condition: bool, name: str, expected: str) -> None:
         if not condition:
             raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")

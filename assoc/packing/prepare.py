@@ -132,16 +132,19 @@ def _lower_to_least(
                     least[r] = costs[k]
 
 
-def prepare(problem: AssignmentProblem) -> Prepared:
-    """Convert a problem to packing form; the result is cached with the problem, which is immutable."""
-    if problem._prepared is not None:
+def prepare(problem: AssignmentProblem, *, every_tuple: bool = False) -> Prepared:
+    """Convert a problem to packing form; the result is cached with the problem, which is immutable.
+
+    With ``every_tuple`` also tuples that cost no less than their singletons become columns; this is not cached.
+    """
+    if problem._prepared is not None and not every_tuple:
         return problem._prepared
     sizes = problem.sizes.astype(np.int64)
     offsets = sizes.cumsum() - sizes
     arrays: Any
     if problem.dummy:
         arrays, whole, single, single_cost = _prepare_with_dummies(
-            problem.tuples, problem.costs, offsets, int(sizes.sum())
+            problem.tuples, problem.costs, offsets, int(sizes.sum()), math.inf if every_tuple else 0.0
         )
     else:
         slack = np.repeat(sizes > sizes.min(), sizes)
@@ -151,16 +154,17 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     # every bound contains this sum: exact to the last digit
     offset = math.fsum(single_cost.tolist()) if single_cost.any() else 0.0
     prepared = Prepared(packing, offset, single, single_cost)
-    problem._prepared = prepared
+    if not every_tuple:
+        problem._prepared = prepared
     return prepared
 
 
 @njit
 def _prepare_with_dummies(
-    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int, limit: float
 ) -> Any:
     """Arrays of the packing, whether its weights are whole numbers, and the singletons with their costs."""
-    rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
+    rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total, limit)
     arrays = assembled(rows, weights, np.ones(total, np.bool_), origin)
     return arrays, _whole_numbers(weights), single, single_cost
 
@@ -195,9 +199,9 @@ def _whole_numbers(weights: NDArray[np.float64]) -> bool:
 
 @inner_njit
 def _columns_with_dummies(
-    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int, limit: float
 ) -> Any:
-    """Cheapest singleton of each row, and the columns of negative weight."""
+    """Cheapest singleton of each row, and the columns whose weight is below the limit."""
     num_tuples, num_sensors = tuples.shape
     single = np.full(total, -1, np.int64)
     single_cost = np.zeros(total)
@@ -221,7 +225,7 @@ def _columns_with_dummies(
             if tuples[j, s] > 0:
                 size += 1
                 weight -= single_cost[offsets[s] + tuples[j, s] - 1]
-        if size > 1 and weight < 0.0:
+        if size > 1 and weight < limit:
             weights[count] = weight
             origin[count] = j
             count += 1

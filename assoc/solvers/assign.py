@@ -169,7 +169,7 @@ def _answer(
     Where costs were lowered for the solver, answer and start are compared by the original costs.
     """
     solver, solve = called
-    prepared = prepare(problem)
+    prepared = prepare(problem, every_tuple=chosen.every_tuple)
     run.offset = prepared.offset
     packing = prepared.packing
     if run.watch is not None:

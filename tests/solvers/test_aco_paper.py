@@ -9,6 +9,7 @@ import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.simulation import simulate
 from assoc.solvers.aco import paper
 from assoc.solvers.aco.parameters import AcoParameters
 from tests.solvers.pieces import is_complete, problems, rows_of
@@ -24,6 +25,7 @@ SETTINGS = [
     {"alpha": 2.0, "beta": 1.0, "rho": 0.3},
     {"alpha": 1.0, "beta": 3.0, "rho": 0.6, "ants": 7, "visibility": "shifted", "scale": 4.0},
     {"alpha": 0.0, "beta": 1.5, "rho": 0.5, "ants": 40, "scale": 3.0},
+    {"alpha": 2.0, "beta": 1.0, "rho": 0.3, "start_on": "any", "nodes": "all"},
 ]
 
 
@@ -71,6 +73,8 @@ def reference(packing, parameters, seed, cycles):
         yield tours, tau
         if len({frozenset(tour) for tour in tours}) == 1:
             return
+        if parameters.get("start_on") == "any":
+            tours = [tours[k] for k in rng.integers(0, ants, ants)]
         starts = [tour[place] for tour, place in zip(tours, rng.integers(0, [len(t) for t in tours]), strict=True)]
 
 
@@ -81,7 +85,7 @@ def test_cycle_by_cycle(name, setting):
     problem, parameters = PROBLEMS[name], SETTINGS[setting]
     seen = []
     solution = assoc.assign(problem, "aco", seed=setting, mode="paper", iterations=12, watch=seen.append, **parameters)
-    packing = prepare(problem).packing
+    packing = prepare(problem, every_tuple="nodes" in parameters).packing
     expected = list(reference(packing, parameters, setting, 12))
     assert solution.iterations == len(expected) == len(seen)
     alone = packing.num_rows if packing.slack.all() else 0
@@ -98,6 +102,19 @@ def test_cycle_by_cycle(name, setting):
     costs_of = [packing.weights[chosen].sum() for chosen in tuples if is_complete(packing, chosen)]
     if costs_of:
         assert solution.cost - prepare(problem).offset == pytest.approx(min(costs_of), abs=1e-9)
+
+
+def test_all_tuples_of_the_problem_can_be_nodes():
+    problem = assoc.build_problem(simulate("three-radar", 0, scans=1), 0, all_tuples=True)
+    best = assoc.assign(problem)
+    for nodes, count in (("useful", 17), ("all", problem.num_tuples)):
+        history = assoc.solvers.pheromone(problem, mode="paper", nodes=nodes)
+        assert len(history.tuples) == count, nodes
+        assert history.solution.cost == pytest.approx(best.cost)
+        assert history.solution.lower_bound <= best.cost
+    assert {*map(tuple, history.tuples.tolist())} == {*map(tuple, problem.tuples.tolist())}
+    # the other solvers still see the useful ones alone
+    assert prepare(problem).packing.num_columns == 9
 
 
 def test_it_ends_when_all_ants_walk_the_same_tour():

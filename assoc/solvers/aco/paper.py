@@ -1,14 +1,15 @@
 """The ant colony of the paper, equations 7 to 11 on costs made positive.
 
 Nodes are the tuples, false alarms among them. In the first cycle each ant starts on a different random node
-and moves to the allowed node of largest visibility eta = 1 / c (eq. 7). In later cycles an ant starts on a
-node of its own previous tour and draws the next node by eq. 8. A tour ends when no node is allowed. Then
-pheromone evaporates, and ant k lays 1 / L_k on each node of its tour (eqs. 9-11). Pheromone starts equal to the
-visibility. The search ends when all ants have walked the same tour.
+and moves to the allowed node of largest visibility eta = 1 / c (eq. 7), of equal ones to the first. In later cycles an
+ant starts on a node of its own previous tour (or of any ant's: ``start_on``) and draws the next node by eq. 8. A tour
+ends when no node is allowed. Then pheromone evaporates, and ant k lays 1 / L_k on each node of its tour (eqs. 9-11).
+Pheromone starts equal to the visibility. The search ends when all ants have walked the same tour, as a set of nodes, in
+whatever order, or after ``iterations`` cycles; the answer is the cheapest tour of all cycles.
 
 Eq. 7 needs positive costs, but eq. 5 also gives negative ones: c is replaced by a positive transform that keeps the
 order, selected by the parameter ``visibility``; L_k is the sum of the transformed costs of a tour.
-Costs are relative to the false alarms: tuples that cost no less than their singletons are not nodes.
+Costs are relative to the false alarms: tuples that cost no less than their singletons are nodes if ``nodes`` is "all".
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
             if not lengths.all():
                 # the time limit came before every ant had walked
                 break
-            starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
+            ants = np.arange(parameters.ants)
+            whose = run.rng.integers(0, ants.size, ants.size) if parameters.start_on == "any" else ants
+            starts = tours[whose, run.rng.integers(0, lengths[whose])].astype(np.int64)
         probability = pheromone**parameters.alpha * visibility**parameters.beta  # numerator of eq. 8
         value = visibility if cycle == 0 else probability
         owners = _cycle(nodes, value, cycle == 0, starts, tours, lengths, run.rng, run.deadline())

@@ -35,6 +35,11 @@ class AcoParameters(SearchParameters):
         "shifted": c - c_min + scale; "reciprocal": c itself, only for positive costs.
     scale : float
         The transform's scale, in units of cost.
+    start_on : str
+        Mode paper: on a point of whose last tour an ant starts: its "own", or that of "any" ant, drawn at random.
+    nodes : str
+        Mode paper: the tuples that ants may visit beside false alarms: "useful", which cost less than their
+        measurements as false alarms, or "all" of the problem.
     """
 
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
@@ -47,6 +52,10 @@ class AcoParameters(SearchParameters):
         default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
     )
     scale: float = field(default=10.0, metadata={"help": "mode paper: scale of the visibility transform"})
+    start_on: str = field(default="own", metadata={"help": "mode paper: whose last tour an ant starts on: own or any"})
+    nodes: str = field(
+        default="useful", metadata={"help": "mode paper: useful tuples (cheaper than false alarms) or all as nodes"}
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -57,6 +66,13 @@ class AcoParameters(SearchParameters):
         self._require(is_number(self.rho) and 0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
         self._number("scale", above=0.0)
+        self._require(self.start_on in ("own", "any"), "start_on", "own or any")
+        self._require(self.nodes in ("useful", "all"), "nodes", "useful or all")
+
+    @property
+    def every_tuple(self) -> bool:
+        """Whether ants are to see tuples, too, that cost no less than false alarms."""
+        return self.mode == "paper" and self.nodes == "all"
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """Mode paper: the ants' tours, and the owners of rows from which they are made."""

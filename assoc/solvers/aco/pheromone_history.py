@@ -21,6 +21,7 @@ from assoc.solution import Solution
 from assoc.solvers.aco.colony import Cycle, tuples_of
 from assoc.solvers.aco.paper import false_alarms, nodes_of
 from assoc.solvers.assign import assign
+from assoc.solvers.registry import make_parameters
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,7 +120,7 @@ def pheromone(
             watch(cycle)
 
     solution = assign(problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters)
-    packing = prepare(problem).packing
+    packing = prepare(problem, every_tuple=make_parameters("aco", parameters).every_tuple).packing
     # leave out nodes that are in no cycle
     alone = false_alarms(packing) if parameters.get("mode") == "paper" else np.flatnonzero(packing.slack)
     _, costs = nodes_of(packing, alone)
