@@ -24,8 +24,9 @@ def garbled_altitudes(
 ) -> Array:
     """Find garbled altitudes.
 
-    Garbled are the known codes, and a level that is more than 30 flight levels away from the median of up to three
-    plots before and three after it of the same identity (which need three good ones among them).
+    Garbled is a level that is more than 30 flight levels away from the median of up to three plots before and three
+    after it of the same identity (which need three good ones among them). A known code is garbled, too, unless there
+    are three such plots and it agrees with them: an aircraft on the ground is at level 0.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def garbled_altitudes(
     identities : array_like of int (n,)
         0 where it was not decoded: such plots are judged by the codes only.
     codes : array_like of int
-        Flight levels that are taken for garbled.
+        Flight levels that are taken for garbled where the neighbours do not agree with them.
     times : array_like (n,), optional
         Seconds: only plots within `NEARBY` of one another are then compared.
 
@@ -42,23 +43,35 @@ def garbled_altitudes(
     -------
     ndarray of bool (n,)
     """
-    level, identity = np.asarray(levels, dtype=np.float64), np.asarray(identities)
-    garbled: Array = np.isin(level, np.asarray(codes, dtype=np.float64))
-    rows = np.flatnonzero((identity != 0) & ~np.isnan(level) & ~garbled)
-    rows = rows[np.argsort(identity[rows], kind="stable")]
-    if len(rows):
-        # each good plot beside its neighbours of the same identity
-        steps = np.array([*range(-NEIGHBOURS, 0), *range(1, NEIGHBOURS + 1)])
-        beside = np.arange(len(rows))[:, None] + steps
-        there = (beside >= 0) & (beside < len(rows))
-        others = rows[np.clip(beside, 0, len(rows) - 1)]
-        there &= identity[others] == identity[rows][:, None]
-        if times is not None:
-            when = np.asarray(times, dtype=np.float64)
-            there &= np.abs(when[others] - when[rows][:, None]) <= NEARBY
-        count = there.sum(axis=1)
-        around = np.sort(np.where(there, level[others], np.inf), axis=1)
-        each = np.arange(len(rows))
-        median = 0.5 * (around[each, np.maximum(count - 1, 0) // 2] + around[each, count // 2])
-        garbled[rows[(count >= NEIGHBOURS) & (np.abs(level[rows] - median) > LARGEST_STEP)]] = True
-    return garbled
+    identity, found = np.asarray(identities), np.isin(levels, np.asarray(codes, dtype=np.float64))
+    order = np.argsort(identity, kind="stable")
+    # from here on identity by identity
+    level, identity, garbled = np.asarray(levels, dtype=np.float64)[order], identity[order], found[order]
+    when = np.zeros(len(order)) if times is None else np.asarray(times, dtype=np.float64)[order]
+    known = (identity != 0) & ~np.isnan(level)
+    good, coded = known & ~garbled, known & garbled
+    garbled[good] = _steps(level, identity, when, good, good) > LARGEST_STEP
+    # codes may have codes beside them; good plots that disagree count for more
+    beside = [_steps(level, identity, when, coded, among) for among in (known, good)]
+    garbled[coded] = ~(np.fmax(*beside) <= LARGEST_STEP)
+    found[order] = garbled
+    return found
+
+
+def _steps(level: Array, identity: Array, when: Array, of: Array, among: Array) -> Array:
+    """How far the levels of some plots are from the median of their neighbours among others; NaN with too few."""
+    rows, others = np.flatnonzero(of), np.flatnonzero(among)
+    if not len(rows) or not len(others):
+        return np.full(len(rows), np.nan)
+    # one that is not among the others stands between two of them
+    steps = np.array([*range(-NEIGHBOURS, 0), *range(1, NEIGHBOURS + 1)])
+    at = (np.cumsum(among) - among)[rows][:, None] + steps - ((steps > 0) & ~among[rows][:, None])
+    there = (at >= 0) & (at < len(others))
+    beside = others[np.clip(at, 0, len(others) - 1)]
+    there &= identity[beside] == identity[rows][:, None]
+    there &= np.abs(when[beside] - when[rows][:, None]) <= NEARBY
+    count = there.sum(axis=1)
+    around = np.sort(np.where(there, level[beside], np.inf), axis=1)
+    each = np.arange(len(rows))
+    median = 0.5 * (around[each, np.maximum(count - 1, 0) // 2] + around[each, count // 2])
+    return np.where(count >= NEIGHBOURS, np.abs(level[rows] - median), np.nan)

@@ -182,6 +182,35 @@ def test_garbled_altitudes():
     assert not garbled_altitudes(np.arange(50.0, 350.0, 10.0), np.ones(30, dtype=int)).any()
 
 
+def test_codes_are_garbled_only_where_neighbours_disagree():
+    """Which is worked out here one plot at a time."""
+    rng = np.random.default_rng(4)
+    levels = np.concatenate([rng.integers(0, 4, 40), 250 + np.arange(40) // 3, rng.integers(100, 120, 40)]).astype(
+        float
+    )
+    levels[rng.integers(40, 120, 20)] = rng.choice([0, 257, 513], 20)
+    identities, times = rng.integers(0, 4, 120), np.sort(rng.uniform(0, 2000, 120))
+    codes = {*range(4), 256, 257, 258, 513}
+
+    def step(k, among):
+        same = [i for i in range(120) if i != k and identities[i] == identities[k] and among(i)]
+        beside = [i for i in same if i < k][-3:] + [i for i in same if i > k][:3]
+        near = [levels[i] for i in beside if abs(times[i] - times[k]) <= 300]
+        return abs(levels[k] - np.median(near)) if len(near) >= 3 else None
+
+    found = garbled_altitudes(levels, identities, [*codes], times)
+    for k in range(120):
+        coded = levels[k] in codes
+        steps = [step(k, lambda i: levels[i] not in codes), step(k, lambda i: True) if coded else None]
+        steps = [one for one in steps if one is not None] if identities[k] else []
+        assert found[k] == (any(one > 30 for one in steps) or (coded and not steps)), k
+    # on the ground, and climbing through 256 to 258: not garbled
+    assert not garbled_altitudes([0, 1, 0, 2, 0], [7] * 5).any()
+    assert not garbled_altitudes([253, 254, 256, 257, 258, 260], [7] * 6).any()
+    assert garbled_altitudes([350, 351, 0, 352, 353], [7] * 5).tolist() == [False, False, True, False, False]
+    assert garbled_altitudes([0, 0, 0, 0], [0] * 4).all()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
