@@ -18,6 +18,11 @@ def verdict(*claims: Claim) -> str:
     return _counted([claim.holds for claim in claims if claim.holds is not None])
 
 
+def undecided(claim: Claim) -> str:
+    """Whether the claim holds, or that its interval shows neither."""
+    return f"{ABSENT}, not shown either way" if claim.holds is None else verdict(claim)
+
+
 def below_one(claims: list[Claim]) -> str:
     """In how many of the claims the whole interval is below 1."""
     return _counted([claim.interval is not None and claim.interval[1] < 1.0 for claim in claims])

@@ -1,5 +1,8 @@
 """The experiment on the clustering time window: its yardsticks are sound, and what it must show it shows, in small."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ from experiments.papers.clustering_time_window import (
     pairs,
     published,
     spanning_tree,
+    tables,
     traffic,
 )
 from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
@@ -120,3 +124,27 @@ def test_the_thesiss_own_tracker(tmp_path):
     )
     assert ours[one] > 5 * ours[other]
     assert ours["head-on: pairs without a switch, Reid's MHT, time stamps"] == 100
+
+
+def test_windows_in_which_an_aircraft_is_missed():
+    # the first aircraft is missed twice running, the second once between two plots; before and after these counts not
+    recording = replace(straight(6), sources=np.array([0, 1, -1, 0, 1, 0]))
+    windows = [SimpleNamespace(rows=rows) for rows in ([0, 1], [2], [], [3], [4], [5])]
+    assert own_tracker.longest_gap(recording, windows) == 3
+    assert own_tracker.longest_gap(recording, windows[3:]) == 1
+
+
+def test_the_tables_must_be_there(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        tables.program([str(tmp_path / "nowhere")])
+    assert stop.value.code == 2 and "expected a folder" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="expected a file t4_9_"):
+        tables.read(tmp_path, 9)
+    with pytest.raises(SystemExit, match=r"expected a file t2_1_.*table 2\.1; see --help"):
+        tables.judge(tmp_path)
+    (tmp_path / "t4_09_x.csv").write_text("x_px,y_px,heading_deg\n1,2,3\n")
+    with pytest.raises(SystemExit, match=r"t4_09_x.csv, line 2: expected numbers in the columns .*altitude_fl"):
+        tables.read(tmp_path, 9)
+    with pytest.raises(SystemExit):
+        tables.program(["--help"])
+    assert "t4_9_902.csv" in capsys.readouterr().out

@@ -70,7 +70,7 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
     nearest = readings[off.index(min(off))]
     row = next(line for line in TABLES["papers-ant-colony"]().splitlines() if line.startswith("| table 1, mean cycles"))
     words = nearest.quantity.split(": ")[0].removeprefix("reading, ")
-    assert f" {nearest.ours:.2f} ({verdicts.interval(nearest)}) against 4.03, {words} |" in row
+    assert f" {nearest.ours:.2f} ({verdicts.interval(nearest)}) against 4.03, {words};" in row
 
 
 def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, capsys):

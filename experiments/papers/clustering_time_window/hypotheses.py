@@ -6,6 +6,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
+from assoc.filters.base import Filter
 from assoc.recordings import Window
 from assoc.sensors import Radar2D
 from assoc.tracking import Decision, HypothesisOrientedMHT, Initiation, LifeCycle, TrackOrientedMHT
@@ -18,6 +19,7 @@ class HypothesisTracker:
     clock: Seconds from window to window; without it each plot has its own time stamp.
     kind: `TrackOrientedMHT` or `HypothesisOrientedMHT`.
     process_noise: m/s^1.5.
+    filter: In place of an extended Kalman filter of constant velocity with this noise.
     taking_up: Whether a new track takes up a lost one that it continues, as our trackers do; the thesis's does not.
     options: Further settings of the tracker.
     """
@@ -29,6 +31,7 @@ class HypothesisTracker:
         kind: type[TrackOrientedMHT | HypothesisOrientedMHT] = TrackOrientedMHT,
         process_noise: float = 5.0,
         taking_up: bool = True,
+        filter: Filter[Any] | None = None,
         **options: Any,
     ) -> None:
         reach = float(radar.field_of_view[0, 1])
@@ -44,7 +47,7 @@ class HypothesisTracker:
             settings |= {"max_branches": 30, "branch_drop": 25.0}
         settings |= options
         motion = ConstantVelocity(process_noise, kind="continuous", dimensions=2)
-        self.tracker = kind([radar], ExtendedKalmanFilter(motion), **settings)
+        self.tracker = kind([radar], filter or ExtendedKalmanFilter(motion), **settings)
         self.forgotten: dict[str, Any] = {} if taking_up else {"lost": self.tracker.state.lost}
         self.clock = clock
         self.rows: list[Array] = []

@@ -1,11 +1,12 @@
 """The thesis's tables 2.1, 4.1 to 4.24 read again, and its five aircraft tracked by us.
 
-FOLDER holds the tables as CSV files, named as t4_09_groundtruth_mode3_902.csv. Checked are the groups of tables 4.1 to
+FOLDER holds the tables as CSV files (--help says which). Checked are the groups of tables 4.1 to
 4.8, the conversion and headings (equations 3.1 to 3.8), and which of an aircraft's plots (tables 4.9 to 4.17) its
 tracks hold without and with the window (tables 4.10 to 4.23). The recording is not public and the tables have no
 times: for our tracks of the same plots the times are chosen by us, a turn of 9.5 s for each plot, more where an
 aircraft has gone further than 220 m/s take it in that time. (Section 4.2.2.4: 183 groups without window and
-119 windows; if these are of 9.5 s, groups are of 6.2 s on average.)
+119 windows; if these are of 9.5 s, groups are of 6.2 s on average.) A line of table 4.21 is not legible in our copy:
+the track of 903 may hold one plot more.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from assoc._types import Array
+from assoc.errors import InvalidInputError
 from assoc.recordings import Recording, clustering_time_window, estimate_rotation, radar_of, read_plots
 from assoc.recordings.columns import NAUTICAL_MILE
 from assoc.simulation.scenarios.rotating_radar import BEARING_STEP
@@ -33,20 +35,52 @@ SPEED = 220.0
 """Metres per second at which aircraft are taken to cross what lies between two rows of a table; chosen by us."""
 MISSES = (3, 5, 8)
 """Of Reid's MHT at a constant step."""
+FILES = (
+    "FOLDER: each table is a CSV file, typed off, with a line of column names; of table N.M it is tN_M_ANYTHING.csv, as"
+    " t4_9_902.csv. Table 2.1: time (0:13:06), range_nmi, bearing_deg, mode3_dec, altitude_fl. Tables 4.1 to 4.8:"
+    " range_nmi, mode3_dec. 4.9 to 4.23: x_px, y_px (Lon(X), Lat(Y) in print), and for 4.9, 4.11, 4.13, 4.15 and 4.17"
+    " heading_deg, altitude_fl. 4.24: mode3_dec, x_px, y_px. Rows in the order of print, mode3_dec 0 where no code was"
+    " decoded, altitudes in flight levels; further columns are not read."
+)
 PIXEL = 5.0 / 7.0
 """Screen pixels for a nautical mile: what stands in the tables in place of equations 3.1 and 3.2."""
+
+
+def columns_of(number: int) -> tuple[str, ...]:
+    """Columns of table 4.number that are read."""
+    if number <= 8:
+        return "range_nmi", "mode3_dec"
+    place = "x_px", "y_px"
+    if number == 24:
+        return "mode3_dec", *place
+    return (*place, "heading_deg", "altitude_fl") if number in {one[0] for one in AIRCRAFT.values()} else place
+
+
+def table_file(folder: Path, name: str) -> Path:
+    """The file of a table.
+
+    Raises SystemExit: The folder has no such file.
+    """
+    chapter, number = name.split(".")
+    found = sorted([*folder.glob(f"t{chapter}_{number}_*.csv"), *folder.glob(f"t{chapter}_{int(number):02}_*.csv")])
+    if not found:
+        raise SystemExit(f"{folder}: expected a file t{chapter}_{number}_*.csv, the thesis's table {name}; see --help")
+    return found[0]
 
 
 def read(folder: Path, number: int) -> list[dict[str, float]]:
     """Rows of table 4.number.
 
-    Raises SystemExit: The folder has no such file.
+    Raises SystemExit: The folder has no such file, or it lacks a column or a number.
     """
-    found = sorted([*folder.glob(f"t4_{number}_*.csv"), *folder.glob(f"t4_{number:02}_*.csv")])
-    if not found:
-        raise SystemExit(f"{folder}: expected a file t4_{number:02}_*.csv, the thesis's table 4.{number}")
-    with open(found[0], encoding="utf-8", newline="") as file:
-        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    path, columns = table_file(folder, f"4.{number}"), columns_of(number)
+    with open(path, encoding="utf-8", newline="") as file:
+        lines = csv.DictReader(file)
+        try:
+            return [{name: float(row[name]) for name in columns} for row in lines]
+        except (KeyError, TypeError, ValueError):
+            wanted = ", ".join(columns)
+            raise SystemExit(f"{path}, line {lines.line_num}: expected numbers in the columns {wanted}") from None
 
 
 def plane(rows: list[dict[str, float]]) -> Array:
@@ -100,7 +134,11 @@ def as_recording(tables: dict[int, list[dict[str, float]]]) -> Recording:
 def groups(folder: Path) -> list[Claim]:
     """Tables 2.1 and 4.1 to 4.8."""
     source = "tables 2.1 and 4.1 to 4.3"
-    recording = read_plots(folder / "t2_1_radar_recording.csv")
+    path = table_file(folder, "2.1")
+    try:
+        recording = read_plots(path)
+    except InvalidInputError as error:
+        raise SystemExit(str(error)) from None
     windows = clustering_time_window(recording, ROTATION, by="time")
     claims = [
         Claim("table 2.1: plots", "", None, len(recording), source="table 2.1"),
@@ -223,7 +261,9 @@ def of_trackers(recording: Recording) -> list[Claim]:
 def program(arguments: list[str] | None = None) -> int:
     """Run the checks; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog=f"python -m experiments.{NAME}", description="Read the thesis's tables again and track its five aircraft."
+        prog=f"python -m experiments.{NAME}",
+        description="Read the thesis's tables again and track its five aircraft.",
+        epilog=FILES,
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the thesis's tables as CSV files")
     add_files(parser, NAME)

@@ -19,10 +19,18 @@ from experiments.papers.dubins_enkf import ensemble, flight_paths
 def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
     """Check the paths, then compare ensemble sizes, noises and what is measured; --quick has fewer runs."""
     about_paths, drawn = flight_paths.judge()
-    return about_paths + ensemble.judge(40 if quick else 400, rng), drawn
+    about_filters, flown = ensemble.judge(40 if quick else 400, rng)
+    return about_paths + about_filters, (drawn, flown)
 
 
-program = partial(main, "papers.dubins_enkf", experiment, __doc__, figure=(flight_paths.draw, (9, 4)))
+def draw(figure: Any, shown: Any) -> None:
+    """Figures 2 and 3 above both figures 4."""
+    above, below = figure.subfigures(2, 1)
+    flight_paths.draw(*above.subplots(1, 2), shown[0])
+    ensemble.draw(below.subplots(2, 3), shown[1])
+
+
+program = partial(main, "papers.dubins_enkf", experiment, __doc__, figure=(draw, (11, 9)))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ form / EKF 0.35 to 0.55, NEES at most 9, at most 6 % above a UKF; below beta = 0
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ CHOSEN = "chosen by us"
 BETAS = (0.02, 0.05, 0.09, 0.25, 0.5, 1.0, 2.3, 4.0)
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
     """Compare EKF, the two modified EKFs and UKF on B1, by beta and in the paper's own setting."""
     count = 60 if quick else 1000
     setting = Setting()
@@ -74,10 +75,11 @@ def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
             )  # fmt: skip
         else:
             claims.append(Claim(f"beta {beta:g}: EKF / full modified EKF (RMSE)", "", None, ratio, interval))
-    return claims + paper_setting.judge(count, rng)
+    about_setting, shown = paper_setting.judge(count, rng)
+    return claims + about_setting, shown
 
 
-program = partial(main, "papers.modified_ekf", experiment, __doc__)
+program = partial(main, "papers.modified_ekf", experiment, __doc__, figure=(paper_setting.draw, (14, 7)))
 
 
 if __name__ == "__main__":
