@@ -46,7 +46,10 @@ def open_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> IO[bytes]:
     return archive.open(member)
 
 
-_OPENERS: dict[str, Any] = {".xz": lzma.open, ".gz": gzip.open, ".bz2": bz2.open, ".zip": _open_zipped}
+_OPENERS: dict[bytes, Any] = {
+    b"\xfd7zXZ\0": lzma.open, b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"PK\3\4": _open_zipped,
+}  # fmt: skip
+"""What unpacks a file, by its first bytes."""
 _DAMAGED = (lzma.LZMAError, zlib.error, EOFError, gzip.BadGzipFile, zipfile.BadZipFile)
 
 
@@ -60,7 +63,7 @@ def readable(path: FilePath) -> Iterator[None]:
     except FileNotFoundError:
         raise InvalidInputError(f"{path}: no such file") from None
     except _DAMAGED:
-        raise InvalidInputError(f"{path}: is damaged, or not packed as its name says") from None
+        raise InvalidInputError(f"{path}: is damaged") from None
     except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # ValueError: not a valid file name
         raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
@@ -96,11 +99,11 @@ class _Counted(io.RawIOBase):
         self._path, self._most, self._count = path, most, 0
         refuse_pipe(path)
         with ExitStack() as stack, readable(path):
-            file = self._stream = stack.enter_context(open(path, "rb"))
-            ending = os.path.splitext(os.fspath(path))[1].lower()
-            self._packed = os.fstat(file.fileno()).st_size if ending in _OPENERS else None
-            if ending in _OPENERS:
-                self._stream = stack.enter_context(_OPENERS[ending](file))
+            file = stack.enter_context(open(path, "rb"))
+            start = file.peek(6)
+            opener = next((opener for first, opener in _OPENERS.items() if start.startswith(first)), None)
+            self._packed = None if opener is None else os.fstat(file.fileno()).st_size
+            self._stream: Any = file if opener is None else stack.enter_context(opener(file))
             self._close = stack.pop_all().close
 
     def readable(self) -> bool:
@@ -123,11 +126,29 @@ class _Counted(io.RawIOBase):
 
 
 def open_input(path: FilePath, most: int = MOST_BYTES) -> IO[bytes]:
-    """Open a file; names that end in .xz, .gz, .bz2 or .zip are decompressed.
+    """Open a file; what xz, gzip, bzip2 or zip packed is decompressed, whatever its name.
 
     InvalidInputError, now or while it is read, if it is larger than ``most`` or than compressed files may be.
     """
     return io.BufferedReader(_Counted(path, most), 1 << 16)
+
+
+def kind_of(path: FilePath) -> str:
+    """What a file of plots is by its first bytes: "parquet", "asterix" (if it is not text), or "csv".
+
+    By its name if it cannot be read, or only once.
+    """
+    start = b""
+    with suppress(OSError, ValueError, InvalidInputError):
+        if stat.S_ISREG(os.stat(path).st_mode):
+            with open_input(path) as file:
+                start = file.read(512)
+    name = os.fspath(path).lower()
+    if start[:4] == b"PAR1" or not start and name.endswith((".parquet", ".pq")):
+        return "parquet"
+    # of UTF-16, which readers of text refuse, the first bytes are a mark
+    signs = start[:2] not in (b"\xff\xfe", b"\xfe\xff") and any(sign < 9 or 13 < sign < 32 for sign in start)
+    return "asterix" if signs or not start and name.endswith((".ast", ".asterix", ".pcap")) else "csv"
 
 
 def read_bytes(path: FilePath, most: int = MOST_BYTES) -> bytes:

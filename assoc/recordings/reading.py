@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._files.reading import read_lines, readable, refuse_pipe
+from assoc._files.reading import kind_of, read_lines, readable, refuse_pipe
 from assoc._system.imports import check_extra
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.plain import one_line
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
-from assoc.recordings.altitude import GARBLED_CODES, NEARBY, garbled_altitudes
-from assoc.recordings.columns import COLUMNS, UNITS, choose
+from assoc.recordings.altitude import GARBLED_CODES
+from assoc.recordings.cleaning import (
+    ALTITUDE,
+    AZIMUTH,
+    BLANK,
+    IMPOSSIBLE,
+    MAX_DISORDER,
+    RANGE,
+    TIME,
+    WIDTH,
+    Cleaning,
+    seconds_in,
+)
+from assoc.recordings.columns import UNITS, choose, not_read, unit_of
 from assoc.recordings.recording import Recording, joined
-from assoc.recordings.running_times import RunningTimes
-from assoc.recordings.table_rows import AIRCRAFT, ALTITUDE, BEARING, MODE3, RANGE, TIME, TableRows
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-MAX_DISORDER = 30.0
-"""Plots up to this late (s) are sorted in; where several in a row are later, that is an error."""
+from assoc.recordings.table_rows import TableRows
 
 MOST_PLOTS = 20_000_000
 # metres: no radar of plots sees farther; and plots from which on bearings within 2 pi degrees are no chance
@@ -47,7 +54,8 @@ def read_plots(
 
     Needed are columns for time, range and bearing; Mode 3, altitude and (from a simulation) aircraft are read
     where they are there. Separators are commas, semicolons or tabs; with the last two a comma may stand for the decimal
-    point. Text that is not UTF-8 is taken for Windows-1252.
+    point. Lines that begin with # are comments, a line ``sep=;`` and a row of units below the header are understood.
+    Text that is not UTF-8 is taken for Windows-1252.
 
     Parameters
     ----------
@@ -56,9 +64,10 @@ def read_plots(
         Names of the columns for "time", "range", "bearing", "mode3", "altitude", "aircraft", where they are not
         the usual ones (`assoc.recordings.columns.COLUMNS`).
     units : mapping of str to str, optional
-        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m), and of the codes of "mode3": dec, the
-        12 bits as a number, or oct, their octal digits. By default the end of the column's name (range_km), else
-        nautical miles, degrees, flight levels and dec, for a column squawk oct.
+        Of "time" (s, ms), "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m), and of the codes of
+        "mode3": dec, the 12 bits as a number, or oct, their octal digits. By default the end of the column's name
+        (range_km) or a row of units, else seconds, nautical miles, degrees, flight levels and dec, for a column squawk
+        oct. Times in milliseconds are also known by their size, or by the antenna's turns.
     max_disorder : float, default 30
         Plots up to this many seconds late are sorted in. A plot whose time is further from those before and after it
         is left out; where times jump back for good, that is an error with its line.
@@ -68,8 +77,8 @@ def read_plots(
     Returns
     -------
     Recording
-        In the order of time. Its notes count late rows (sorted in), rows left out (repeated ones, those of zeros, which
-        are fillers, and those without a time, range or bearing), invalid codes, and midnights passed.
+        In the order of time. Its notes count what was corrected and left out (`assoc.recordings.cleaning`), invalid
+        codes, midnights passed, and name the columns that were not read.
 
     Raises
     ------
@@ -113,54 +122,95 @@ class PlotReader:
         return joined(parts, self.notes, self.file.name)
 
     def __iter__(self) -> Iterator[Recording]:
-        parquet = self.file.suffix.lower() == ".parquet"
-        found: tuple[list[str], str, Any] = _frames(self.file, self._at_once) if parquet else _lines(self.file)
-        header, separator, content = found
+        parquet = kind_of(self.file) == "parquet"
+        found = _frames(self.file, self._at_once) if parquet else _lines(self.file)
         try:
-            columns_of, units = choose(header, self._columns, self._units)
+            columns_of, said = choose(found.header, self._columns, self._units)
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.file}: {error}") from None
-        table = TableRows(self.file, columns_of, header, UNITS["mode3"][units["mode3"]], separator, self._at_once)
-        order = _Order(self.file, self._max_disorder)
-        plots = _Plots(self.file.name, units, "aircraft" in columns_of, self._codes, self._at_once)
-        times = None
-        for rows in table.of_frames(content) if parquet else table.of_lines(content):
-            if times is None:
-                times = RunningTimes(max(self._max_disorder, MAX_DISORDER), bool(table.clock))
-            yield from plots.of(order.take(times.take(rows)), last=False)
-        if times is not None:
-            yield from plots.of(order.take(times.rest(len(COLUMNS) + 1)), last=False)
-        if not order.count:
-            why = f": {table.blank} rows have no time, range or bearing" if table.blank else ""
-            raise InvalidInputError(f"{self.file}: holds no plots{why}")
-        yield from plots.of(order.rest(), last=True)
-        plots.doubt_units(self.file, table.names)
-        self.notes = {
-            "late plots sorted in": order.late,
-            "repeated rows left out": order.repeated,
-            "rows of zeros left out": table.fillers,
-            "rows without time, range or bearing left out": table.blank,
-            "invalid codes": table.unread,
-            "midnights passed": 0 if times is None else times.midnights,
-            "plots left out whose time no other supports": 0 if times is None else times.left_out,
+        of_row = {
+            meaning: unit_of(meaning, found.units[k]) for meaning, k in columns_of.items() if k < len(found.units)
         }
+        said = {**{meaning: unit for meaning, unit in of_row.items() if unit}, **said}
+        units = {meaning: said.get(meaning, next(iter(known))) for meaning, known in UNITS.items()}
+        scale = {meaning: UNITS[meaning][unit] for meaning, unit in units.items()}
+        table = TableRows(self.file, columns_of, found.header, scale, found.separator, self._at_once)
+        notes = Counter[str]()
+        if left := not_read(found.header, columns_of):
+            notes[f"columns not read ({left})"] = len(found.header) - len(columns_of)
+        clean, doubts, step = None, _Doubts(units), scale["time"]
+        for rows in table.of_frames(found.content) if parquet else table.of_lines(found.content, found.done):
+            doubts.see(rows)
+            rows[:, RANGE] *= scale["range"]
+            rows[:, AZIMUTH] = math.pi / 2 - rows[:, AZIMUTH] * scale["bearing"]
+            rows[:, ALTITUDE] *= scale["altitude"]
+            clock = bool(table.clock)
+            if clean is None:
+                garbled = () if units["altitude"] != "fl" else GARBLED_CODES if self._codes is None else self._codes
+                clean = Cleaning(
+                    self.file.name, notes, clock=clock, disorder=self._max_disorder, codes=garbled,
+                    sources="aircraft" in columns_of, at_once=self._at_once, strict=str(self.file),
+                )  # fmt: skip
+                if not clock and "time" not in said:
+                    step = seconds_in(rows[:, TIME], rows[:, AZIMUTH])
+            rows[:, TIME] *= 1.0 if clock else step
+            yield from clean.take(rows)
+        if clean is not None:
+            yield from clean.take(np.zeros((0, WIDTH)), last=True)
+        if clean is None or not clean.count:
+            why = "; ".join(f"{count} {what}" for what, count in notes.items() if what in (BLANK, IMPOSSIBLE))
+            raise InvalidInputError(f"{self.file}: holds no plots{': ' + why if why else ''}")
+        doubts.tell(self.file, table)
+        if table.unread:
+            notes["invalid codes"] = table.unread
+        if step != scale["time"]:
+            notes[f"times read in steps of {step:g} s"] = clean.count
+        self.notes = dict(notes)
 
 
-def _lines(file: Path) -> tuple[list[str], str, Iterator[str]]:
-    """Header, separator and further lines of a CSV file."""
-    lines = read_lines(file, fallback="cp1252")
-    head = next(lines, "")
-    if not head.strip():
+class _Found(NamedTuple):
+    """The beginning of a file, and what follows it: lines of text, or tables."""
+
+    header: list[str]
+    separator: str
+    content: Iterator[Any]
+    done: int
+    """Lines so far."""
+    units: list[str]
+    """Cells of a row of units below the header."""
+
+
+def _lines(file: Path) -> _Found:
+    """Header and further lines of a CSV file; comments before the header are skipped, unless one is the header."""
+    lines, done, comment, separator = read_lines(file, fallback="cp1252"), 0, "", ""
+    for head in lines:
+        done += 1
+        if head.lower().startswith("sep=") and len(head.strip()) == 5:
+            separator = head.strip()[-1]
+        elif head.startswith("#"):
+            comment = head.lstrip("# ")
+        elif head.strip():
+            break
+    else:
         raise InvalidInputError(f"{file}: has no header line, expected column names such as time,range,bearing")
-    separator = max(",;\t", key=head.count)
+    if comment and head.lstrip(' "')[:1].isdigit():
+        lines, head, done = itertools.chain([head], lines), comment, done - 1
+    separator = separator or max(",;\t", key=head.count)
     try:
-        return next(csv.reader([head], delimiter=separator)), separator, lines
-    except csv.Error as error:
-        raise InvalidInputError(f"{file}: line 1: {error}") from None
+        header = next(csv.reader([head], delimiter=separator))
+        below = next(lines, None)
+        cells = [] if below is None else next(csv.reader([below], delimiter=separator), [])
+    except (csv.Error, TypeError) as error:
+        raise InvalidInputError(f"{file}: line {done}: {error}") from None
+    # a row of units has no digits
+    named = any(unit_of(meaning, cell) for cell in cells for meaning in UNITS)
+    if named and not any(sign.isdigit() for sign in below or ""):
+        return _Found(header, separator, lines, done + 1, cells)
+    return _Found(header, separator, lines if below is None else itertools.chain([below], lines), done, [])
 
 
-def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataFrame]]:
-    """Column names of a Parquet file, the separator of its rows as CSV, and its rows in parts."""
+def _frames(file: Path, at_once: int) -> _Found:
+    """Column names of a Parquet file, and its rows in parts."""
     check_extra("pyarrow", "parquet")
     from pyarrow import parquet
 
@@ -181,98 +231,27 @@ def _frames(file: Path, at_once: int) -> tuple[list[str], str, Iterator[pd.DataF
             raise InvalidInputError(f"{file}: is not a readable Parquet file ({one_line(error)[:100]})") from None
 
     content = frames()
-    return [str(name) for name in next(content)], ",", content
+    return _Found([str(name) for name in next(content)], ",", content, 1, [])
 
 
-class _Order:
-    """Sorts rows by time that may be late, and leaves repeated ones out."""
+class _Doubts:
+    """Warns of ranges, bearings and codes that are hardly in their units."""
 
-    def __init__(self, file: Path, max_disorder: float) -> None:
-        self._file, self._max_disorder = file, max_disorder
-        self._waiting = np.zeros((0, len(COLUMNS) + 1))
-        self._latest = -math.inf
-        self.count = self.late = self.repeated = 0
+    def __init__(self, units: Mapping[str, str]) -> None:
+        self._units = units
+        self._count, self._farthest, self._least, self._most = 0, 0.0, math.inf, -math.inf
 
-    def take(self, rows: Array) -> Array:
-        """Take rows in, and return those before which none can come any more."""
-        if not len(rows):
-            return rows
-        times = rows[:, TIME]
-        late = np.maximum(np.maximum.accumulate(times), self._latest) - times
-        if (late > self._max_disorder).any():
-            row = int(np.argmax(late > self._max_disorder))
-            raise InvalidInputError(
-                f"{self._file}: line {rows[row, -1]:.0f}: the time jumps back by {late[row]:.6g} s, expected at "
-                f"most {self._max_disorder:g} s; split the file there (from Python: or allow more with max_disorder)"
-            )
-        self.count += len(rows)
-        self.late += int((late > 0).sum())
-        self._latest = max(self._latest, float(times.max()))
-        self._waiting = np.concatenate([self._waiting, rows])
-        return self._out(self._latest - self._max_disorder)
-
-    def rest(self) -> Array:
-        """The last rows."""
-        return self._out(math.inf)
-
-    def _out(self, end: float) -> Array:
-        rows = self._waiting[np.argsort(self._waiting[:, TIME], kind="stable")]
-        cut = int(np.searchsorted(rows[:, TIME], end))
-        self._waiting, rows = rows[cut:], rows[:cut]
-        same = np.flatnonzero(np.diff(rows[:, TIME]) == 0)
-        if len(same):
-            # missing values are equal to one another only
-            twins = np.union1d(same, same + 1)
-            _, first = np.unique(np.nan_to_num(rows[twins, :-1], nan=-math.inf), axis=0, return_index=True)
-            again = np.delete(twins, first)
-            self.repeated += len(again)
-            rows = np.delete(rows, again, axis=0)
-        return rows
-
-
-class _Plots:
-    """Makes sorted rows into recordings, and flags garbled altitudes by the plots before and after."""
-
-    def __init__(self, name: str, units: Mapping[str, str], sources: bool, codes: Array | None, at_once: int) -> None:
-        self._name, self._units, self._sources, self._at_once = name, units, sources, at_once
-        self._codes = () if units["altitude"] != "fl" else GARBLED_CODES if codes is None else codes
-        self._rows = np.zeros((0, len(COLUMNS) + 1))
-        self._done = self._count = 0
-        self._farthest, self._least, self._most = 0.0, math.inf, -math.inf
-
-    def of(self, rows: Array, *, last: bool) -> Iterator[Recording]:
-        """Take rows in, and yield the plots that can be judged."""
-        self._rows = np.concatenate([self._rows, rows])
-        times, begin = self._rows[:, TIME], self._done
-        end = len(times) if last or not len(times) else int(np.searchsorted(times, times[-1] - NEARBY))
-        if end == begin or (end - begin < self._at_once and not last):
-            return
-        scale = {meaning: UNITS[meaning][unit] for meaning, unit in self._units.items()}
-        levels, identities = self._rows[:, ALTITUDE], self._rows[:, MODE3].astype(np.int64)
-        in_levels = levels * scale["altitude"] / UNITS["altitude"]["fl"]
-        garbled = garbled_altitudes(in_levels, identities, self._codes, times)[begin:end]
-        rows = self._rows[begin:end]
+    def see(self, rows: Array) -> None:
+        """Take in rows, in the units of the file."""
+        bearings = np.abs(rows[:, AZIMUTH])
         self._count += len(rows)
-        self._farthest = max(self._farthest, float(rows[:, RANGE].max()))
-        self._least = min(self._least, float(np.abs(rows[:, BEARING]).min()))
-        self._most = max(self._most, float(np.abs(rows[:, BEARING]).max()))
-        yield Recording(
-            times=rows[:, TIME],
-            ranges=rows[:, RANGE] * scale["range"],
-            azimuths=math.pi / 2 - rows[:, BEARING] * scale["bearing"],
-            identities=identities[begin:end],
-            altitudes=rows[:, ALTITUDE] * scale["altitude"],
-            garbled=garbled,
-            lines=rows[:, -1].astype(np.int64),
-            sources=rows[:, AIRCRAFT].astype(np.int64) if self._sources else None,
-            name=self._name,
-        )
-        kept = int(np.searchsorted(times, times[end - 1] - NEARBY))
-        self._rows, self._done = self._rows[kept:], end - kept
+        self._farthest = max(self._farthest, float(np.nanmax(rows[:, RANGE], initial=0.0)))
+        self._least = min(self._least, float(np.nanmin(bearings, initial=math.inf)))
+        self._most = max(self._most, float(np.nanmax(bearings, initial=-math.inf)))
 
-    def doubt_units(self, file: Path, names: Mapping[str, str]) -> None:
-        """Warn of ranges and bearings that are hardly in their units."""
-        unit = self._units["range"]
+    def tell(self, file: Path, table: TableRows) -> None:
+        """Warn, once all rows are seen."""
+        unit, names = self._units["range"], table.names
         metres = self._farthest * UNITS["range"][unit]
         if unit != "m" and metres > _REACH:
             warn(
@@ -284,4 +263,9 @@ class _Plots:
             warn(
                 f"{file}: column {names['bearing']!r}: all within {self._most:.3g} deg: radians? "
                 "(name the column bearing_rad, or set the unit of bearing to rad)"
+            )
+        if table.not_octal:
+            warn(
+                f"{file}: column {names['mode3']!r}: {table.not_octal} codes have an 8 or 9, which octal digits "
+                "cannot have: the 12 bits as a number? (name the column mode3_dec, or set the unit of mode3 to dec)"
             )

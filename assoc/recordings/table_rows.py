@@ -15,36 +15,42 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.recordings.columns import COLUMNS, REQUIRED, code, number, seconds, whole
+from assoc.recordings.cleaning import ADDRESS, AIRCRAFT, DOUBTFUL, LINE, MODE3, WIDTH
+from assoc.recordings.columns import BLANKS, COLUMNS, FLIGHT_LEVEL, code, number, seconds, whole
 from assoc.recordings.recording import UNDECODED
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TIME, RANGE, BEARING, MODE3, ALTITUDE, AIRCRAFT = range(len(COLUMNS))
-"""Columns of the arrays; the last one, after these, is the line in the file."""
-_FARTHEST = 1e7
-# what pandas takes for a number and `number` does not
-_NO_NUMBER = re.compile(r"(^|[,;\t])[ +-]*(nan|inf)", re.IGNORECASE | re.MULTILINE)
+_BLANKS = frozenset(BLANKS)
+_FL = re.compile(r"FL *(\d+)", re.IGNORECASE)
 
 
 class TableRows:
-    """Makes rows of a file into arrays with a column for each meaning, NaN where it is empty, and the line (n, 7)."""
+    """Makes rows of a file into arrays (n, `WIDTH`) of its numbers in their units, NaN where a cell is blank.
+
+    ``scale`` are the units' factors by meaning, for codes the base of their digits.
+    """
 
     def __init__(
-        self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float, separator: str, at_once: int
+        self,
+        file: Path,
+        columns_of: Mapping[str, int],
+        header: list[str],
+        scale: Mapping[str, float],
+        separator: str,
+        at_once: int,
     ) -> None:
         self.file, self._at_once = file, at_once
         self.columns_of = columns_of
-        self.base, self.separator = base, separator
+        self.scale, self.base, self.separator = scale, scale["mode3"], separator
         self.decimal = "." if separator == "," else ","
         self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
-        self.fillers = self.blank = self.unread = 0
+        self.unread = self.not_octal = 0
         self.clock: bool | None = None
 
-    def of_lines(self, lines: Iterator[str]) -> Iterator[Array]:
-        """The rows of the lines that follow the header."""
-        done = 1
+    def of_lines(self, lines: Iterator[str], done: int) -> Iterator[Array]:
+        """The rows of the lines that follow the first ones, of which there are ``done``."""
         while block := list(islice(lines, self._at_once)):
             text = "".join(block)
             if '"' in text:
@@ -74,7 +80,7 @@ class TableRows:
         import pandas as pd
 
         text = text.replace("\r\n", "\n")
-        if self.clock or "\r" in text or _NO_NUMBER.search(text):
+        if self.clock or "\r" in text or "#" in text:
             return None
         # later versions read numbers exactly, and warn of the argument
         exact: Any = (
@@ -83,27 +89,24 @@ class TableRows:
         try:
             frame = pd.read_csv(
                 io.StringIO(text), header=None, sep=self.separator, decimal=self.decimal, dtype=np.float64,
-                usecols=list(self.columns_of.values()), na_values=[""], keep_default_na=False, quoting=csv.QUOTE_NONE,
-                **exact,
+                usecols=list(self.columns_of.values()), na_values=list(BLANKS), keep_default_na=False,
+                quoting=csv.QUOTE_NONE, **exact,
             )  # fmt: skip
         except (ValueError, OverflowError):
             return None
         return self._checked(frame[list(self.columns_of.values())].to_numpy(), done) if len(frame) == count else None
 
     def _checked(self, given: Array, done: int) -> Array | None:
-        """Rows (n, 7) of given columns (n, c), if nothing in them is unusual."""
-        rows = np.full((len(given), len(COLUMNS) + 1), np.nan)
-        rows[:, MODE3], rows[:, AIRCRAFT] = UNDECODED, -1.0
+        """Rows (n, `WIDTH`) of given columns (n, c), if they need no look at single cells."""
+        rows = np.full((len(given), WIDTH), np.nan)
+        rows[:, [MODE3, AIRCRAFT, ADDRESS, DOUBTFUL]] = UNDECODED, -1.0, 0.0, 0.0
         meanings = list(COLUMNS)
         for column, meaning in zip(given.T, self.columns_of, strict=True):
             empty = {"mode3": float(UNDECODED), "aircraft": -1.0}.get(meaning, np.nan)
             rows[:, meanings.index(meaning)] = np.where(np.isnan(column), empty, column)
-        rows[:, -1] = done + 1 + np.arange(len(rows))
-        time, distance, bearing, mode3, altitude, aircraft = rows[:, :-1].T
-        usual = np.isfinite(rows[:, :MODE3]).all(axis=1) & (np.abs(time) <= 1e12)
-        usual &= (distance >= 0) & (distance <= _FARTHEST) & (np.abs(bearing) <= 1000)
-        usual &= np.isnan(altitude) | (np.abs(altitude) <= _FARTHEST)
-        usual &= (distance != 0) | (bearing != 0)  # which may be a filler
+        rows[:, LINE] = done + 1 + np.arange(len(rows))
+        mode3, aircraft = rows[:, MODE3], rows[:, AIRCRAFT]
+        usual = ~np.isinf(given).any(axis=1)
         usual &= (mode3 >= 0) & (mode3 < 2.0**53) & (mode3 == np.floor(mode3))
         usual &= (aircraft >= -1) & (aircraft < 2.0**53) & (aircraft == np.floor(aircraft))
         if not usual.all() or self.clock:
@@ -125,7 +128,7 @@ class TableRows:
                 line = cells_of.line_num + done
                 row = self._row(cells, line)
                 if row is not None:
-                    rows.append((*row, line))
+                    rows.append((*row, 0.0, 0.0, line))
                 if len(rows) >= self._at_once:
                     yield np.array(rows)
                     rows = []
@@ -135,48 +138,40 @@ class TableRows:
             yield np.array(rows)
 
     def _row(self, cells: list[str], line: int) -> tuple[float, ...] | None:
-        """The values of a row; None of one without a plot."""
-        if not any(cell.strip() for cell in cells):
+        """The values of a row; None of an empty one or a comment."""
+        if not any(cell.strip() for cell in cells) or cells[0].lstrip().startswith("#"):
             return None
         row = {}
         for meaning, index in self.columns_of.items():
-            text = cells[index].strip().replace(self.decimal, ".") if index < len(cells) else ""
-            if not text and meaning in REQUIRED:
-                self.blank += 1
-                return None
+            text = cells[index].strip() if index < len(cells) else ""
+            text = "" if text in _BLANKS else text.replace(self.decimal, ".")
             try:
                 row[meaning] = self._value(meaning, text)
             except (ValueError, OverflowError):
                 raise self._error(line, meaning, self._expected(meaning), text) from None
-        if row["range"] < 0 or row["range"] > _FARTHEST:
-            raise self._error(line, "range", f"0 to {_FARTHEST:g}", f"{row['range']:g}")
-        if abs(row["bearing"]) > 1000 or abs(row.get("altitude", 0.0)) > _FARTHEST or abs(row["time"]) > 1e12:
-            wrong = "bearing" if abs(row["bearing"]) > 1000 else "time" if abs(row["time"]) > 1e12 else "altitude"
-            raise self._error(line, wrong, "a number of usual size", f"{row[wrong]:g}")
-        # a row of zeros separates groups, as in tables 4.5 to 4.8 of the paper
-        if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
-            self.fillers += 1
-            return None
-        defaults = {"altitude": math.nan, "aircraft": -1.0, "mode3": float(UNDECODED)}
+        defaults = {"aircraft": -1.0, "mode3": float(UNDECODED)}
         return tuple(row.get(meaning, defaults.get(meaning, math.nan)) for meaning in COLUMNS)
 
     def _value(self, meaning: str, text: str) -> float:
+        if meaning == "mode3":
+            try:
+                return float(code(text, self.base))
+            except (ValueError, OverflowError):
+                self.unread += 1
+                self.not_octal += self.base == 8 and ("8" in text or "9" in text)
+                return float(UNDECODED)
+        if meaning == "aircraft":
+            return float(whole(text)) if text else -1.0
+        if not text:
+            return math.nan
         if meaning == "time":
             value, clock = seconds(text)
             if self.clock not in (None, clock):
                 raise ValueError(text)
             self.clock = clock
             return value
-        if meaning == "mode3":
-            try:
-                return float(code(text, self.base))
-            except (ValueError, OverflowError):
-                self.unread += 1
-                return float(UNDECODED)
-        if meaning == "aircraft":
-            return float(whole(text)) if text else -1.0
-        if meaning == "altitude" and not text:
-            return math.nan
+        if meaning == "altitude" and (level := _FL.fullmatch(text)):
+            return float(level[1]) * FLIGHT_LEVEL / self.scale["altitude"]
         return number(text)
 
     def _expected(self, meaning: str) -> str:

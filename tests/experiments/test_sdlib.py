@@ -58,7 +58,6 @@ def test_packed_problems_are_read_and_refused(tmp_path):
     again = AssignmentProblem.load(tmp_path / "p.txt.xz")
     assert np.array_equal(again.tuples, problem.tuples) and np.array_equal(again.costs, problem.costs)
     whole = (tmp_path / "p.txt.xz").read_bytes()
-    for name, content in (("cut.txt.xz", whole[:-9]), ("plain.txt.xz", b"assoc-problem 1\n")):
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(Exception, match=rf"{name}: is damaged, or not packed as its name says"):
-            AssignmentProblem.load(tmp_path / name)
+    (tmp_path / "cut.txt.xz").write_bytes(whole[:-9])
+    with pytest.raises(Exception, match=r"cut.txt.xz: is damaged$"):
+        AssignmentProblem.load(tmp_path / "cut.txt.xz")
