@@ -14,16 +14,19 @@ from assoc._cli.messages import messages
 from assoc._cli.options import Option, Parser, verbosity
 from assoc._cli.program import Program, command
 from assoc._cli.signals import EarlyEnd
-from assoc._cli.values import Output
+from assoc._cli.values import Output, editions_of
 from assoc._files.output import STDOUT, write_text
 from assoc._text.plain import printable
 from assoc.errors import warn
 
 _OPTIONS = (
-    Option("file", "FILE", "ASTERIX data blocks, or a pcap (.ast, .asterix, .pcap)", positional=True),
+    Option("file", "FILE", "ASTERIX data blocks: plain, in frames of FINAL or ORADIS, or captured (pcap, pcapng)",
+           positional=True),
+    Option("edition", "CAT=EDITION", "editions of categories, as 021=0.26,048=1.27 (default: those that fit)",
+           editions_of),
     Option("output", "FILE.csv", "file for the table (default: stdout)", Output(".csv"), short="-o"),
     *verbosity("how many records of each category and source"),
-)
+)  # fmt: skip
 
 
 def _convert(words: list[str]) -> None:
@@ -34,7 +37,7 @@ def _convert(words: list[str]) -> None:
         from assoc.integrations.asterix.table import COLUMNS, read_records
 
         notes: dict[str, int] = {}
-        rows = read_records(given["file"], notes)
+        rows = read_records(given["file"], notes, editions=given["edition"])
         text = io.StringIO()
         writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
         writer.writeheader()
@@ -45,7 +48,7 @@ def _convert(words: list[str]) -> None:
         for (category, sac, sic), count in counts.items():
             print_lines(f"category {category:03d} of {sac}/{sic}: {count}")
         for what, count in notes.items():
-            warn(f"{given['file']}: not read: {count} {what}")
+            warn(f"{given['file']}: {what}: {count}")
 
 
 def parser() -> Parser:

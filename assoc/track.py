@@ -33,9 +33,10 @@ from assoc._cli.track.options import (
     track_parser,
     with_further,
 )
-from assoc._cli.track.plots import Windows, as_options, is_asterix, stored_plots
+from assoc._cli.track.plots import Windows, as_options, stored_plots
 from assoc._cli.track.results import Judged, Tracked, write_and_print
 from assoc._files.output import is_stream
+from assoc._files.reading import kind_of
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError, LimitExceededError
@@ -117,7 +118,7 @@ def _is_npz(file: str) -> bool:
             start = stream.read(4)
     except OSError:
         return not file.lower().endswith(".csv")
-    return start == b"PK\x03\x04" or file.lower().endswith(".npz")
+    return (start == b"PK\x03\x04" and not file.lower().endswith(".zip")) or file.lower().endswith(".npz")
 
 
 def _has_plots(file: str) -> bool:
@@ -208,7 +209,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     from assoc.tracking.offline.plots import PlotTracks, track_plots
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
-    kind, identity = "ASTERIX files" if is_asterix(file) else "tables", given["identity"] or "score-only"
+    kind, identity = "ASTERIX files" if kind_of(file) == "asterix" else "tables", given["identity"] or "score-only"
     given.check_use((*OF_SCENES, *OF_PLOTS), input="plots", format=kind, window=given["window"], identity=identity)
     name = given["tracker"] or "mht"
     if name in ("multi-sensor", "static"):

@@ -62,7 +62,8 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
         print(f"{name}: {one_line(error)}", file=sys.stderr)
         return NOTHING_FEASIBLE
     except AssocError as error:
-        print(f"{name}: error: {one_line(error)}", file=sys.stderr)
+        for line in (error, *getattr(error, "__notes__", ())):
+            print(f"{name}: error: {one_line(line)}", file=sys.stderr)
         return BAD_INPUT
     except ModuleNotFoundError as error:
         if error.name not in _MAY_BE_MISSING:
@@ -89,6 +90,13 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
         # Python otherwise ends with its own exit code after an interrupt has passed through an exec
         exec("")
     return DONE
+
+
+def with_others(errors: Sequence[AssocError]) -> AssocError:
+    """The first of several errors, which brings the others along, each a line of its own."""
+    for other in [*dict.fromkeys(map(str, errors))][1:]:
+        errors[0].add_note(other)
+    return errors[0]
 
 
 def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:

@@ -97,6 +97,15 @@ def position_on_earth(value: str, label: str) -> tuple[float, float, float]:
     return math.radians(lat), math.radians(lon), height
 
 
+def editions_of(value: object, label: str) -> dict[int, str]:
+    """Editions of ASTERIX by category, of text such as ``021=0.26,062=1.16`` or of a table."""
+    if isinstance(value, str):
+        value = dict(part.partition("=")[::2] for part in value.split(","))
+    if not isinstance(value, dict) or not all(key.strip().isdigit() and name for key, name in value.items()):
+        raise InvalidInputError(f"{label}: expected categories and editions, as 021=0.26,062=1.16, got {value!r}")
+    return {int(key): str(name).strip() for key, name in value.items()}
+
+
 def area(value: str, label: str) -> tuple[tuple[float, float], ...]:
     """Read the corners of an area, X,Y X,Y ... in metres; two are opposite corners of a box."""
     corners = [listed(number)(part, label) for part in value.split()]

@@ -13,7 +13,8 @@ pytest.importorskip("asterix", reason="libasterix is not installed: pip install 
 from assoc import asterix2csv
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_records, read_tracks, write_plots, write_tracks
-from assoc.integrations.asterix.blocks import edition, library, value
+from assoc.integrations.asterix.blocks import edition, library
+from assoc.integrations.asterix.items import value
 from assoc.integrations.asterix.parts import AsterixPlots
 from assoc.integrations.asterix.tracks import COLUMNS
 from assoc.recordings import Recording, read_plots
@@ -104,7 +105,7 @@ def test_a_table_of_records(plots, file, tmp_path, capfd):
     (tmp_path / "adsb.ast").write_bytes(blocks.unparse().to_bytes() + b"\x01\x00\x04x")
     assert asterix2csv.main([str(tmp_path / "adsb.ast")]) == 0
     out, err = capfd.readouterr()
-    assert "adsb.ast: not read: 1 data blocks of category 001" in err
+    assert "adsb.ast: data blocks of category 001 that cannot be decoded: 1" in err
     shown = pd.read_csv(io.StringIO(out), dtype={"mode3_oct": str}).iloc[0].dropna().to_dict()
     assert shown.pop("latitude_deg") == pytest.approx(50) and shown.pop("longitude_deg") == pytest.approx(5)
     assert shown == {

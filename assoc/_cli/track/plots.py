@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.options import Given, flag_of
+from assoc._cli.program import with_others
 from assoc._cli.track.options import RADAR
-from assoc._cli.track.radars_file import ASTERIX
+from assoc._files.reading import kind_of
 from assoc.errors import InvalidInputError, warn
 
 if TYPE_CHECKING:
@@ -23,10 +24,6 @@ _USUAL = {
     "azimuth_noise": "0.05 to 0.2 degrees are usual",
     "rotation": "4 to 12 seconds are usual",
 }
-
-
-def is_asterix(file: str) -> bool:
-    return file.lower().endswith(ASTERIX)
 
 
 @contextmanager
@@ -61,7 +58,7 @@ def stored_plots(given: Given) -> tuple[StoredPlots, Mapping[str, int], list[str
         except InvalidInputError as error:
             left.append(str(error))
     if len(left) == len(files):
-        raise InvalidInputError(left[0])
+        raise with_others([InvalidInputError(line) for line in left])
 
     def parts() -> Iterator[Recording]:
         end, behind, latest = -math.inf, "", np.zeros((0, 2))
@@ -98,10 +95,10 @@ def _parts(file: str, given: Given, notes: Counter[str]) -> Iterator[Recording]:
     """The plots of a file part by part; what reading had to correct is counted in the notes."""
     from assoc.recordings.reading import PlotReader
 
-    if is_asterix(file):
+    if kind_of(file) == "asterix":
         from assoc.integrations.asterix.parts import AsterixPlots
 
-        reader: Any = AsterixPlots(file, given["radar"], "--radar")
+        reader: Any = AsterixPlots(file, given["radar"], "--radar", editions=given["edition"])
     else:
         reader = PlotReader(file)
     yield from reader

@@ -9,10 +9,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.inputs import read_toml
+from assoc._cli.program import with_others
+from assoc._cli.values import editions_of
+from assoc._files.reading import kind_of
 from assoc._text.near import did_you_mean
 from assoc._text.plain import printable
 from assoc._text.times import UNIX
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocError, InvalidInputError
 
 if TYPE_CHECKING:
     from assoc._types import Array
@@ -24,13 +27,12 @@ if TYPE_CHECKING:
     from assoc.scene.scene import Scene
     from assoc.sensors import PositionSensor, Radar2D
 
-ASTERIX = (".ast", ".asterix", ".pcap")
 KEYS = (
-    "name", "file", "radar", "columns", "units", "place", "noise", "detection_probability", "false_alarms", "reach_km",
-    "resolution", "turn", "bias",
+    "name", "file", "radar", "editions", "columns", "units", "place", "noise", "detection_probability", "false_alarms",
+    "reach_km", "resolution", "turn", "bias",
 )  # fmt: skip
 """Keys of a table [[radar]]."""
-REPORT_KEYS = ("name", "file", "source", "columns", "units", "noise")
+REPORT_KEYS = ("name", "file", "source", "editions", "columns", "units", "noise")
 """Keys of a table [[reports]]."""
 _TOP = ("name", "origin", "interval", "closed", "heights", "radar", "reports")
 DAY = 86_400.0
@@ -111,8 +113,11 @@ def read_radars(path: str) -> Radars:
     tables, of_reports = (_tables(top, key) for key in ("radar", "reports"))
     if not tables and not of_reports:
         raise InvalidInputError(f"{path}: expected a table [[radar]] for each radar, or [[reports]]")
-    read = [_read_radar(path, number, table) for number, table in enumerate(tables, 1)]
-    told = [_read_reports(path, number, table) for number, table in enumerate(of_reports, 1)]
+    wrong = list[AssocError]()
+    read = _each(_read_radar, path, tables, wrong)
+    told = _each(_read_reports, path, of_reports, wrong)
+    if wrong:
+        raise with_others(wrong)
     if "origin" in top:
         origin = _place(top["origin"], f"{path}: origin")
     else:
@@ -169,6 +174,19 @@ def _heights(top: dict[str, Any], path: str) -> tuple[float, float] | None:
     return float(value[0]), float(value[1])
 
 
+def _each(
+    read: Callable[[str, int, dict[str, Any]], Any], path: str, tables: list[dict[str, Any]], wrong: list[AssocError]
+) -> list[Any]:
+    """What is read of each table; what is wrong with them, all in one round."""
+    found = []
+    for number, table in enumerate(tables, 1):
+        try:
+            found.append(read(path, number, table))
+        except InvalidInputError as error:
+            wrong.append(error)
+    return found
+
+
 def _tables(top: dict[str, Any], key: str) -> list[dict[str, Any]]:
     found = top.get(key, [])
     if not isinstance(found, list) or not all(isinstance(table, dict) for table in found):
@@ -186,12 +204,12 @@ def _read_reports(path: str, number: int, table: dict[str, Any]) -> Positions:
     if not isinstance(file, str):
         raise InvalidInputError(f"{where}: file: expected the name of a file with its reports")
     file = os.path.join(os.path.dirname(path), file)
-    if not file.lower().endswith(ASTERIX):
+    if kind_of(file) != "asterix":
         return read_positions(file, **_texts(table, where))
     from assoc.integrations.asterix import read_asterix
     from assoc.integrations.asterix.parts import chosen_radar
 
-    content = read_asterix(file)
+    content = read_asterix(file, editions=editions_of(table.get("editions", {}), f"{where}: editions"))
     sources = {**content.multilateration, **content.adsb}
     if not sources or content.origin is None:
         raise InvalidInputError(f"{file}: has no reports of positions (categories 021, 020, 010)")
@@ -376,7 +394,7 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
     if not isinstance(file, str):
         raise InvalidInputError(f"{where}: file: expected the name of a file with its plots")
     file = os.path.join(os.path.dirname(path), file)
-    if not file.lower().endswith(ASTERIX):
+    if kind_of(file) != "asterix":
         options: dict[str, Any] = _texts(table, where)
         try:
             return read_plots(file, **options), None, None
@@ -386,7 +404,7 @@ def _plots(path: str, table: dict[str, Any], where: str) -> tuple[Recording, flo
     from assoc.integrations.asterix import read_asterix
     from assoc.integrations.asterix.parts import chosen_radar
 
-    content = read_asterix(file)
+    content = read_asterix(file, editions=editions_of(table.get("editions", {}), f"{where}: editions"))
     source = chosen_radar(file, content.plots, table.get("radar"), f"{where}: radar")
     note = content.radars.get(source)
     return content.plots[source], None if note is None else note.rotation, None if note is None else note.place

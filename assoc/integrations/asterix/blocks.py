@@ -1,106 +1,27 @@
-"""ASTERIX data blocks in a file: in sequence, or in the UDP packets of a pcap."""
+"""Records of ASTERIX data blocks, by the edition of each category that explains them."""
 
 from __future__ import annotations
 
 import os
-import struct
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 from assoc._files import reading
 from assoc._system.imports import check_extra, load_extra
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix.frames import Block, data_blocks
+from assoc.integrations.asterix.items import plausible
 
-EDITIONS = {
-    1: "Cat_001_1_4", 2: "Cat_002_1_2", 10: "Cat_010_1_1", 20: "Cat_020_1_11", 21: "Cat_021_2_7", 34: "Cat_034_1_29",
-    48: "Cat_048_1_32", 62: "Cat_062_1_21",
-}  # fmt: skip
-"""Editions by category; earlier ones of the same numbering decode alike."""
-
-_PCAP = {b"\xd4\xc3\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\x3c\x4d": ">"}
-_ETHERNET, _COOKED, _RAW_IP = 1, 113, (12, 101)
-_UDP = 17
-
-
-class Block(NamedTuple):
-    """A data block: its category, its undecoded records, and its offset in the file."""
-
-    category: int
-    content: bytes
-    offset: int
-
-
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Read a file, up to the largest size allowed."""
-    check_extra("asterix", "asterix")
-    return reading.read_bytes(path)
-
-
-def data_blocks(content: bytes, notes: dict[str, int]) -> Iterator[Block]:
-    """Split a file's content into data blocks; other content is skipped and counted in `notes`.
-
-    After an impossible length, the rest of a plain file is skipped, since the beginning of the next block is unknown;
-    in a pcap only the rest of that packet.
-    """
-    order = _PCAP.get(content[:4])
-    if order is None:
-        yield from _split(content, 0, notes)
-        return
-    for offset, payload in _packets(content, order, notes):
-        yield from _split(payload, offset, notes)
-
-
-def _split(content: bytes, start: int, notes: dict[str, int]) -> Iterator[Block]:
-    at = 0
-    while at < len(content):
-        length = int.from_bytes(content[at + 1 : at + 3], "big") if at + 3 <= len(content) else 0
-        if length < 3 or at + length > len(content):
-            _count(notes, "bytes that are no whole data block", len(content) - at)
-            return
-        yield Block(content[at], content[at + 3 : at + length], start + at)
-        at += length
-
-
-def _packets(content: bytes, order: str, notes: dict[str, int]) -> Iterator[tuple[int, bytes]]:
-    """Payloads of the UDP packets of a pcap, with their offsets."""
-    if len(content) < 24:
-        _count(notes, "bytes that are no whole data block", len(content))
-        return
-    (link,) = struct.unpack_from(f"{order}I", content, 20)
-    at = 24
-    while at + 16 <= len(content):
-        (length,) = struct.unpack_from(f"{order}I", content, at + 8)
-        at += 16
-        if at + length > len(content):
-            _count(notes, "bytes that are no whole data block", len(content) - at)
-            return
-        found = _udp_payload(content[at : at + length], link & 0xFFFF)
-        if found is None:
-            _count(notes, "packets that are not UDP", 1)
-        else:
-            yield at + found[0], found[1]
-        at += length
-
-
-def _udp_payload(packet: bytes, link: int) -> tuple[int, bytes] | None:
-    """Payload of a packet and its offset; None unless it is an unfragmented IPv4 UDP packet."""
-    at = {_ETHERNET: 14, _COOKED: 16}.get(link, 0)
-    if link == _ETHERNET:
-        while packet[at - 2 : at] == b"\x81\x00":
-            at += 4
-    if at + 20 > len(packet) or packet[at] >> 4 != 4 or packet[at + 9] != _UDP:
-        return None
-    fragment = int.from_bytes(packet[at + 6 : at + 8], "big") & 0x3FFF
-    at += 4 * (packet[at] & 15)
-    if fragment or at + 8 > len(packet):
-        return None
-    end = at + int.from_bytes(packet[at + 4 : at + 6], "big")
-    return at + 8, packet[at + 8 : min(end, len(packet))]
-
-
-def _count(notes: dict[str, int], what: str, many: int) -> None:
-    notes[what] = notes.get(what, 0) + many
+CATEGORIES = (1, 2, 10, 20, 21, 34, 48, 62)
+"""Categories that are read."""
+# of each source so many blocks tell its edition
+_SAMPLE = 10
+# so many bytes of a file are decoded to find editions, in all; and so many records of a block are judged
+_TRIED, _JUDGED = 500_000, 50
 
 
 @lru_cache(maxsize=1)
@@ -109,56 +30,144 @@ def library() -> tuple[ModuleType, ModuleType]:
     return load_extra("asterix.base", "asterix"), load_extra("asterix.generated", "asterix")
 
 
+@lru_cache(maxsize=64)
+def editions(category: int) -> dict[str, Any]:
+    """Classes of the package for a category by its editions, the newest first."""
+    module, start = library()[1], f"Cat_{category:03d}_"
+    found = {name.removeprefix(start).replace("_", "."): getattr(module, name) for name in dir(module)
+             if re.fullmatch(rf"{start}\d+_\d+", name)}  # fmt: skip
+    return dict(sorted(found.items(), key=lambda entry: [-int(part) for part in entry[0].split(".")]))
+
+
 def edition(category: int) -> Any:
-    """Class of the package for a category."""
-    return getattr(library()[1], EDITIONS[category])
+    """Class of the package for the newest edition of a category, in which is written."""
+    return next(iter(editions(category).values()))
 
 
-def records(block: Block, notes: dict[str, int]) -> list[Any]:
-    """Decoded records of a data block; if they cannot be decoded, none, and a count in `notes`."""
-    kind, base = edition(block.category).cv_uap, library()[0]
+def check_editions(given: Mapping[int, str]) -> dict[int, str]:
+    """Check editions that a user gave by category."""
+    for category, name in given.items():
+        if category not in CATEGORIES:
+            known = ", ".join(f"{one:03d}" for one in CATEGORIES)
+            raise InvalidInputError(f"editions: expected a category of {known}, got {category!r}")
+        if name not in editions(category):
+            known = ", ".join(editions(category))
+            raise InvalidInputError(f"editions: category {category:03d}: expected one of {known}, got {name!r}")
+    return dict(given)
+
+
+class Records:
+    """The records of a file, each with its category and its edition; what cannot be read is counted in `notes`.
+
+    Of each source the edition is chosen, newest first, in which most of its first blocks decode to plausible values;
+    a block that it does not explain is tried in the others. ``given`` are editions by category that are not chosen.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        notes: Counter[str],
+        given: Mapping[int, str] | None = None,
+        *,
+        categories: Sequence[int] = CATEGORIES,
+    ) -> None:
+        check_extra("asterix", "asterix")
+        self._notes, self._categories, self._left = notes, categories, _TRIED
+        self._given = check_editions(given or {})
+        self._content = reading.read_bytes(path)
+
+    def __iter__(self) -> Iterator[list[tuple[int, str, Any]]]:
+        """Yield the records of each block."""
+        sample: dict[tuple[int, bytes], list[Block]] = {}
+        for block in data_blocks(self._content, Counter()):
+            if block.category in self._categories:
+                first = sample.setdefault((block.category, _source(block.content)), [])
+                if len(first) < _SAMPLE:
+                    first.append(block)
+        # a source's own, chosen when it comes
+        chosen: dict[tuple[int, bytes], str] = {}
+        for block in data_blocks(self._content, self._notes):
+            category = block.category
+            if category not in self._categories:
+                self._notes[f"data blocks of category {category:03d}"] += 1
+                continue
+            key = category, _source(block.content)
+            if key not in chosen:
+                chosen[key] = self._given.get(category) or self._explaining(sample.pop(key))
+            found, name = self._decoded(block, chosen[key])
+            if found is None:
+                self._notes[f"data blocks of category {category:03d} that cannot be decoded"] += 1
+                continue
+            if name != next(iter(editions(category))):
+                self._notes[f"data blocks of category {category:03d} read as of edition {name}"] += 1
+            yield [(category, name, record) for record in found]
+
+    def _decoded(self, block: Block, name: str) -> tuple[list[Any] | None, str]:
+        """Records of a block and their edition, the chosen one if it explains them; None if no edition does."""
+        found = decoded(block, name) if name else None
+        if found is None and name and block.category not in self._given:
+            for other in editions(block.category):
+                if other != name and self._share([block], other) == 1.0:
+                    return decoded(block, other), other
+        return found, name
+
+    def _explaining(self, blocks: list[Block]) -> str:
+        """The edition that explains most of the blocks, at least half; empty if none does."""
+        best, most = "", 0.5
+        for name in editions(blocks[0].category):
+            share = self._share(blocks, name)
+            if share == 1.0:
+                return name
+            if share > most or (share == most and not best):
+                best, most = name, share
+        return best
+
+    def _share(self, blocks: list[Block], name: str) -> float:
+        """Which share of blocks decodes to plausible values; of a file of garbage not all is tried."""
+        good = 0.0
+        for block in blocks:
+            newest = name == next(iter(editions(block.category)))
+            if not newest:
+                self._left -= len(block.content)
+            found = (decoded(block, name) or [])[:_JUDGED] if newest or self._left > 0 else []
+            good += sum(plausible(record, block.category, name) for record in found) / max(len(found), 1)
+        return good / len(blocks)
+
+
+def _source(content: bytes) -> bytes:
+    """The two bytes of item 010, the first in all categories; empty if there is none."""
+    at = next((k for k, byte in enumerate(content[:16]) if not byte & 1), 16) + 1
+    return content[at : at + 2] if content[:1] >= b"\x80" else b""
+
+
+def decoded(block: Block, name: str) -> list[Any] | None:
+    """Records of a data block in an edition; None if they cannot be decoded."""
+    kind, base = editions(block.category)[name].cv_uap, library()[0]
     content = base.Bits.from_bytes(block.content)
     found: Any
     try:
-        found = _mixed(kind, content) if issubclass(kind, base.UapMultiple) else kind.parse(content)
-    except (TypeError, ValueError, AttributeError, LookupError, AssertionError) as error:
+        found = _mixed(kind, block.content) if issubclass(kind, base.UapMultiple) else kind.parse(content)
+    except (TypeError, ValueError, AttributeError, LookupError, AssertionError):
         # the package fails so on bits of items that its editions do not define
-        found = ValueError(str(error))
-    if isinstance(found, ValueError):
-        _count(notes, f"data blocks of category {block.category:03d} that cannot be decoded", 1)
-        return []
-    return list(found)
-
-
-def _mixed(kind: Any, content: Any) -> list[Any] | ValueError:
-    """Records of category 001: item 020, in the same place in both, says which are plots and which tracks."""
-    (item, element), names = kind.cv_selector
-    found = []
-    while len(content):
-        for number, name in names.items():
-            parsed = kind.cv_uaps[name].parse(library()[0].ParsingMode.StrictParsing, content)
-            if not isinstance(parsed, ValueError) and value(parsed[0], item, element) == number:
-                break
-        else:
-            return ValueError("neither plot nor track")
-        found.append(parsed[0])
-        content = parsed[1]
-    return found
-
-
-def value(record: Any, item: str, *path: str) -> int | None:
-    """Raw number of an item or of an element in it; None if absent."""
-    found = record.get_item(item)
-    try:
-        for name in path:
-            if found is None:
-                return None
-            found = found.variation.get_item(name)
-    except ValueError:  # the item has no such element in this category
         return None
-    return None if found is None else int(found.as_uint())
+    return None if isinstance(found, ValueError) else list(found)
 
 
-def signed(raw: int, bits: int) -> int:
-    """Signed value of a raw number in two's complement."""
-    return raw - (1 << bits) if raw >> (bits - 1) else raw
+def _mixed(kind: Any, content: bytes) -> list[Any] | ValueError:
+    """Records of category 001: item 020, in the same place in both, says which are plots and which tracks."""
+    base, names = library()[0], kind.cv_selector[1]
+    found = []
+    while content:
+        at = next((k for k, byte in enumerate(content) if not byte & 1), len(content)) + 1
+        # after the source comes item 020, whose first bit tells: no record is decoded twice
+        at += 2 * (content[0] >> 7)
+        if not content[0] & 0x40 or at >= len(content):
+            return ValueError("neither plot nor track")
+        parsed = kind.cv_uaps[names[content[at] >> 7]].parse(
+            base.ParsingMode.StrictParsing, base.Bits.from_bytes(content)
+        )
+        if isinstance(parsed, ValueError):
+            return parsed
+        found.append(parsed[0])
+        content = content[len(content) - len(parsed[1]) // 8 :]
+    return found

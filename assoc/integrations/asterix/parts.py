@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
-import numpy as np
-
-from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.integrations.asterix.reading import Decoded, Source, recording_of
-from assoc.recordings.altitude import NEARBY
+from assoc.integrations.asterix.reading import Decoded, Source
+from assoc.recordings.cleaning import Cleaning
 from assoc.recordings.recording import Recording
 
 
@@ -25,6 +21,8 @@ class AsterixPlots:
         SAC/SIC of the radar; needed if the file has plots of several.
     label : str
         What gives the radar, for errors.
+    editions : dict of int to str, optional
+        As for `read_asterix`.
     at_once : int
         About how many plots a part has.
 
@@ -35,24 +33,31 @@ class AsterixPlots:
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], radar: str | None = None, label: str = "radar", *, at_once: int = 50_000
+        self,
+        path: str | os.PathLike[str],
+        radar: str | None = None,
+        label: str = "radar",
+        *,
+        editions: Mapping[int, str] | None = None,
+        at_once: int = 50_000,
     ) -> None:
         self._path, self._radar, self._label, self._at_once = path, radar, label, at_once
-        self.notes: dict[str, int] = {}
+        self._editions = editions
+        self.notes: Mapping[str, int] = {}
 
     def __iter__(self) -> Iterator[Recording]:
-        read, name = Decoded(), os.path.basename(os.fspath(self._path))
+        read, name = Decoded(self._path, self._editions), os.path.basename(os.fspath(self._path))
         self.notes = read.notes
-        waiting = _Waiting(name, read.notes)
-        for _ in read.blocks(self._path):
-            for source, rows in read.plots.items():
+        clean = Cleaning(name, read.notes, clock=True)
+        for _ in read.blocks():
+            for source, clock in read.plots.items():
                 if self._radar not in (None, _name(source)) or len(read.plots) > 1 and self._radar is None:
-                    rows.rows = []
-                elif len(rows.rows) >= self._at_once:
-                    yield from waiting.of(rows.taken(read.notes, last=False), last=False)
-        read.check(self._path)
+                    clock.rows = []
+                elif len(clock.rows) >= self._at_once:
+                    yield from clean.take(clock.taken())
+        read.check()
         chosen = chosen_radar(self._path, read.plots, self._radar, self._label)
-        yield from waiting.of(read.plots[chosen].taken(read.notes, last=True), last=True)
+        yield from clean.take(read.plots[chosen].taken(), last=True)
 
 
 def chosen_radar(path: str | os.PathLike[str], plots: Iterable[Source], radar: str | None, label: str) -> Source:
@@ -67,36 +72,3 @@ def chosen_radar(path: str | os.PathLike[str], plots: Iterable[Source], radar: s
 
 def _name(source: Source) -> str:
     return f"{source[0]}/{source[1]}"
-
-
-_LATEST = 101
-"""Plots whose median time is that of a part's end."""
-
-
-class _Waiting:
-    """Plots that wait for those before them, and for those after them by which garbled altitudes are found."""
-
-    def __init__(self, name: str, notes: dict[str, int]) -> None:
-        self._name, self._notes = name, notes
-        self._rows = np.zeros((0, 7))
-        self._done = 0
-        """Rows that are given, and kept for those after them."""
-
-    def of(self, new: Array, *, last: bool) -> Iterator[Recording]:
-        """Take rows in, and yield the plots that are complete."""
-        rows = new.reshape(-1, 7)
-        given = float(self._rows[self._done - 1, 0]) if self._done else -math.inf
-        # the usual time of the latest: single wrong ones must not make all others late
-        now = float(np.median(rows[-_LATEST:, 0])) if len(rows) else given
-        late = rows[:, 0] < given
-        if late.any():
-            what = f"plots left out that came more than {NEARBY:g} s late"
-            self._notes[what] = self._notes.get(what, 0) + int(late.sum())
-        rows = np.concatenate([self._rows, rows[~late]])
-        rows = rows[np.argsort(rows[:, 0], kind="stable")]
-        times, begin = rows[:, 0], self._done
-        end = len(rows) if last or not len(rows) else int(np.searchsorted(times, now - NEARBY))
-        if end > begin:
-            yield recording_of(rows, self._name, self._notes).take(np.arange(begin, end))
-        kept = int(np.searchsorted(times, times[end - 1] - NEARBY)) if end else 0
-        self._rows, self._done = rows[kept:], max(end, begin) - kept

@@ -4,70 +4,43 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
-from assoc.recordings.altitude import NEARBY, garbled_altitudes
-from assoc.recordings.columns import DAY, FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.integrations.asterix.blocks import CATEGORIES, Records
+from assoc.integrations.asterix.items import (
+    ANGLE_STEP,
+    COARSE,
+    LEVEL_STEP,
+    PLOTS,
+    SECOND,
+    PlotItems,
+    ReportItems,
+    on_earth,
+    place,
+    report_items,
+    signed,
+    value,
+)
+from assoc.recordings.cleaning import WIDTH, Cleaning
+from assoc.recordings.columns import DAY
 from assoc.recordings.recording import UNDECODED, Recording
-from assoc.recordings.running_times import RunningTimes
 from assoc.scene.geodesy import checked_origin, east_north_up
 
-SECOND = 1.0 / 128.0
-"""Step of times of day."""
-RANGE_STEP, ANGLE_STEP = NAUTICAL_MILE / 256.0, 2.0 * math.pi / 65536.0
-"""Steps of measured positions in category 048."""
-LEVEL_STEP = 0.25 * FLIGHT_LEVEL
-_FINE, _COARSE = math.pi / 2**30, math.pi / 2**23
 _SERVICE = (2, 34)
+_TRACKS = 62
 # truncated times of day begin anew every 512 s
 _CYCLE = 65536
 
 Source = tuple[int, int]
 """System area code and system identification code of a radar or ground station."""
-
-
-class _Plot(NamedTuple):
-    """Where a category has what a plot needs."""
-
-    time: str
-    polar: tuple[str, str, str]
-    step: float
-    code: str
-    level: tuple[str, str]
-    cartesian: tuple[float, int] = (0.0, 0)
-    """Step and bits of item 042, if that is an alternative."""
-
-
-class _Report(NamedTuple):
-    """Where a category has what a report of a position in WGS 84 needs: items with bits and steps, best first."""
-
-    times: tuple[str, ...]
-    places: tuple[tuple[str, int, float], ...]
-    code: str
-    level: tuple[str, ...]
-    level_bits: int
-    address: str
-
-
-_PLOTS = {
-    1: _Plot("141", ("040", "RHO", "THETA"), NAUTICAL_MILE / 128.0, "070", ("090", "HGT")),
-    10: _Plot("140", ("040", "RHO", "TH"), 1.0, "060", ("090", "FL"), (1.0, 16)),
-    20: _Plot("140", ("040", "RHO", "THETA"), 1.0, "070", ("090", "FL"), (0.5, 24)),
-    48: _Plot("140", ("040", "RHO", "THETA"), RANGE_STEP, "070", ("090", "FL")),
-}
-_REPORTS = {
-    10: _Report(("140",), (("041", 32, math.pi / 2**31),), "060", ("090", "FL"), 14, "220"),
-    20: _Report(("140",), (("041", 32, math.pi / 2**25),), "070", ("090", "FL"), 14, "220"),
-    21: _Report(("071", "073", "077"), (("131", 32, _FINE), ("130", 24, _COARSE)), "070", ("145",), 16, "080"),
-}
 
 
 @dataclass(frozen=True)
@@ -116,18 +89,15 @@ class AsterixContent:
     multilateration: Mapping[Source, Recording] = field(default_factory=dict)
 
 
-WRONG_TIMES = "plots left out whose time no other supports"
-
-
-class SourceRows:
-    """Rows of one source, the time of day first; times continue beyond 24 h after midnight."""
+class Clock:
+    """The time of day of a source, running on over midnight."""
 
     def __init__(self) -> None:
-        self.rows: list[tuple[float, ...]] = []
         self.day = self.latest = 0.0
         self.begun = False
         """Whether it has had any time."""
-        self._times = RunningTimes(NEARBY, clock=True)
+        self.rows: list[tuple[float, ...]] = []
+        """What came at these times."""
 
     def time(self, raw: int) -> float:
         """Seconds of the recording, by the raw time of day."""
@@ -142,34 +112,29 @@ class SourceRows:
         self.begun = True
         return running
 
-    def taken(self, notes: dict[str, int], *, last: bool) -> Array:
-        """The rows so far whose times are sure, which run on; all that are right if these are the last."""
-        columns = len(self.rows[0]) if self.rows else 0
-        before = self._times.left_out
-        found = self._times.take(np.array(self.rows, dtype=np.float64).reshape(len(self.rows), columns))
-        self.rows = []
-        if last:
-            rest = self._times.rest(found.shape[1])
-            found = np.concatenate([found, rest]) if len(rest) else found
-        if self._times.left_out > before:
-            notes[WRONG_TIMES] = notes.get(WRONG_TIMES, 0) + self._times.left_out - before
-        return found
-
-    def table(self, notes: dict[str, int]) -> Array:
-        """All rows, sorted by the first column, the time."""
-        table = self.taken(notes, last=True)
-        return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
+    def taken(self) -> Array:
+        """The rows so far."""
+        rows, self.rows = self.rows, []
+        return np.array(rows, dtype=np.float64).reshape(len(rows), -1 if rows else WIDTH)
 
 
 @explains_wrong_types
-def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None) -> AsterixContent:
-    """Read a file of ASTERIX data blocks, plain or in the UDP packets of a pcap.
+def read_asterix(
+    path: str | os.PathLike[str],
+    *,
+    origin: tuple[float, float, float] | None = None,
+    editions: Mapping[int, str] | None = None,
+) -> AsterixContent:
+    """Read a file of ASTERIX data blocks: plain, in frames of FINAL or ORADIS, or in the UDP packets of a capture.
 
     Parameters
     ----------
     path : path-like
     origin : tuple of latitude, longitude, height, optional
         Point from which reports are given, radians and metres; default: on the ground below the first report.
+    editions : dict of int to str, optional
+        Editions by category, such as ``{21: "0.26"}``. Else that is taken, for each source, in which its blocks decode
+        to plausible values.
 
     Returns
     -------
@@ -187,87 +152,91 @@ def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, fl
         libasterix is not installed.
     """
     seen_from = None if origin is None else checked_origin(origin)
-    read = Decoded()
-    for _ in read.blocks(path):
+    read = Decoded(path, editions)
+    for _ in read.blocks():
         pass
-    read.check(path)
-    notes, plots, reports, located = read.notes, read.plots, read.reports, read.located
-    name = os.path.basename(os.fspath(path))
+    read.check()
+    notes, name = read.notes, os.path.basename(os.fspath(path))
     if seen_from is None:
-        first = next((rows.rows[0] for rows in (*reports.values(), *located.values()) if rows.rows), None)
+        first = next((one.rows[0] for one in (*read.reports.values(), *read.located.values())), None)
         seen_from = None if first is None else (first[1], first[2], 0.0)
-    return AsterixContent(
-        {source: recording_of(rows.table(notes), name, notes) for source, rows in plots.items() if rows.rows},
-        {source: _seen(rows, seen_from, name, notes) for source, rows in reports.items() if rows.rows and seen_from},
-        {source: RadarNote(np.sort(radar.pop("norths")), **radar) for source, radar in read.radars.items()},
-        seen_from,
-        notes,
-        {source: _seen(rows, seen_from, name, notes) for source, rows in located.items() if rows.rows and seen_from},
-    )
+
+    def recordings(found: dict[Source, Clock]) -> dict[Source, Recording]:
+        rows = {source: clock.taken() for source, clock in found.items()}
+        rows = {source: one if one.shape[1] == WIDTH else _seen(one, seen_from) for source, one in rows.items()}
+        return {source: Cleaning(name, notes, clock=True).together(one) for source, one in rows.items()}
+
+    plots, reports, located = map(recordings, (read.plots, read.reports, read.located))
+    radars = {source: RadarNote(np.unique(radar.pop("norths")), **radar) for source, radar in read.radars.items()}
+    return AsterixContent(plots, reports, radars, seen_from, dict(notes), located)
 
 
 class Decoded:
     """What has been decoded of a file so far."""
 
-    def __init__(self) -> None:
-        self.notes: dict[str, int] = {}
-        self.plots: dict[Source, SourceRows] = {}
-        self.reports: dict[Source, SourceRows] = {}
-        self.located: dict[Source, SourceRows] = {}
+    def __init__(
+        self, path: str | os.PathLike[str], editions: Mapping[int, str] | None = None, *, tracks: bool = False
+    ) -> None:
+        self.notes = Counter[str]()
+        self.plots: dict[Source, Clock] = {}
+        self.reports: dict[Source, Clock] = {}
+        self.located: dict[Source, Clock] = {}
         self.radars: dict[Source, dict[str, Any]] = {}
-        self._clocks: dict[Source, SourceRows] = {}
+        self._clocks: dict[Source, Clock] = {}
+        self._path = os.fspath(path)
+        categories = [category for category in CATEGORIES if category != _TRACKS or tracks]
+        self._records = Records(path, self.notes, editions, categories=categories)
 
-    def blocks(self, path: str | os.PathLike[str]) -> Iterator[None]:
-        """Decode block after block."""
-        for block in data_blocks(read_bytes(path), self.notes):
-            if block.category not in _PLOTS and block.category not in _REPORTS and block.category not in _SERVICE:
-                self._count(f"data blocks of category {block.category:03d}")
-                continue
-            for record in records(block, self.notes):
-                self._take(record, block.category)
-            yield
+    def blocks(self) -> Iterator[list[tuple[int, str, Any]]]:
+        """Decode block after block; yields its records, with their category and edition."""
+        for found in self._records:
+            for category, edition, record in found:
+                if category != _TRACKS:
+                    self._take(record, category, edition)
+            yield found
 
-    def check(self, path: str | os.PathLike[str]) -> None:
+    def check(self) -> None:
         """Refuse a file in which there is nothing, once it is read."""
         if not (self.plots or self.reports or self.located):
             skipped = "; ".join(f"{count} {what}" for what, count in self.notes.items())
             raise InvalidInputError(
-                f"{os.fspath(path)}: holds no ASTERIX plots (001, 010, 020, 048) or reports (010, 020, 021)"
+                f"{self._path}: holds no ASTERIX plots (001, 010, 020, 048) or reports (010, 020, 021)"
                 f"{': ' + skipped if skipped else ''}"
             )
 
-    def _count(self, what: str) -> None:
-        self.notes[what] = self.notes.get(what, 0) + 1
-
-    def _take(self, record: Any, category: int) -> None:
+    def _take(self, record: Any, category: int, edition: str) -> None:
         sac, sic = value(record, "010", "SAC"), value(record, "010", "SIC")
         if sac is None or sic is None:
-            self._count("records without a source")
+            self.notes["records without a source"] += 1
         elif category in _SERVICE:
             radar = self.radars.setdefault((sac, sic), {"norths": []})
-            _take_service(record, radar, self._clocks.setdefault((sac, sic), SourceRows()))
-        elif not self._taken(record, category, (sac, sic)):
-            self._count(f"records of category {category:03d} without time or position")
+            _take_service(record, radar, self._clocks.setdefault((sac, sic), Clock()))
+        else:
+            self._taken(record, category, report_items(category, edition), (sac, sic))
 
-    def _taken(self, record: Any, category: int, source: Source) -> bool:
-        """Whether a record is a report or a plot; it is added to those of its source."""
-        report = _report(record, _REPORTS[category]) if category in _REPORTS else None
-        plot = _plot(record, _PLOTS[category]) if report is None and category in _PLOTS else None
+    def _taken(self, record: Any, category: int, items: ReportItems | None, source: Source) -> None:
+        """Add a report or a plot to those of its source."""
+        report = _report(record, items) if items else None
+        plot = _plot(record, PLOTS[category]) if report is None and category in PLOTS else None
         found = plot or report
         if found is None:
-            return False
+            self.notes[f"records of category {category:03d} without time or position"] += 1
+            return
+        if report and not on_earth((report[1], report[2])):
+            self.notes[f"records of category {category:03d} left out, at a latitude or longitude that cannot be"] += 1
+            return
         kept = self.plots if plot is not None else self.reports if category == 21 else self.located
-        rows = kept.setdefault(source, SourceRows())
+        clock = kept.setdefault(source, Clock())
         raw, *rest = found
         if category == 1:
-            raw = full_time(int(raw), rows, self._clocks.get(source))
-        rows.time(int(raw))
+            raw = full_time(int(raw), clock, self._clocks.get(source))
+        if raw * SECOND < DAY:
+            clock.time(int(raw))
         # not as it runs on here, where each message counts at once: a wrong one is seen by those after it
-        rows.rows.append((int(raw) * SECOND, *rest))
-        return True
+        clock.rows.append((int(raw) * SECOND, *rest))
 
 
-def full_time(raw: int, *clocks: SourceRows | None) -> int:
+def full_time(raw: int, *clocks: Clock | None) -> int:
     """The raw time of day of a truncated one: that nearest to the latest time on the source's clocks."""
     known = [clock.latest for clock in clocks if clock is not None and clock.begun]
     if not known:
@@ -276,8 +245,8 @@ def full_time(raw: int, *clocks: SourceRows | None) -> int:
     return (steps + (raw - steps + _CYCLE // 2) % _CYCLE - _CYCLE // 2) % round(DAY / SECOND)
 
 
-def _plot(record: Any, items: _Plot) -> tuple[float, ...] | None:
-    """Raw time, range, azimuth, identity, altitude, whether that is garbled, address."""
+def _plot(record: Any, items: PlotItems) -> tuple[float, ...] | None:
+    """A row of `assoc.recordings.cleaning`, with the raw time."""
     item, first, second = items.polar
     time, rho, theta = value(record, items.time), value(record, item, first), value(record, item, second)
     if time is None:
@@ -294,7 +263,8 @@ def _plot(record: Any, items: _Plot) -> tuple[float, ...] | None:
     level = value(record, *items.level)
     doubtful = bool(value(record, items.level[0], "V") or value(record, items.level[0], "G"))
     altitude = math.nan if level is None else signed(level, 14) * LEVEL_STEP
-    return (time, *where, _identity(record, items.code), altitude, float(doubtful), float(value(record, "220") or 0))
+    address = float(value(record, "220") or 0)
+    return (time, *where, _identity(record, items.code), altitude, -1.0, address, float(doubtful), 0.0)
 
 
 def _identity(record: Any, item: str) -> float:
@@ -306,20 +276,18 @@ def _identity(record: Any, item: str) -> float:
     return float(code & 0o7777)
 
 
-def _report(record: Any, items: _Report) -> tuple[float, ...] | None:
+def _report(record: Any, items: ReportItems) -> tuple[float, ...] | None:
     """Raw time, latitude, longitude, identity, altitude, address of a report."""
     time = next((t for t in (value(record, item) for item in items.times) if t is not None), None)
-    for item, bits, step in items.places:
-        lat, lon = value(record, item, "LAT"), value(record, item, "LON")
-        if time is not None and lat is not None and lon is not None:
-            level = value(record, *items.level)
-            altitude = math.nan if level is None else signed(level, items.level_bits) * LEVEL_STEP
-            place = (signed(lat, bits) * step, signed(lon, bits) * step)
-            return (time, *place, _identity(record, items.code), altitude, float(value(record, items.address) or 0))
-    return None
+    where = place(record, items)
+    if time is None or where is None:
+        return None
+    level = value(record, *items.level)
+    altitude = math.nan if level is None else signed(level, items.level_bits) * LEVEL_STEP
+    return (time, *where, _identity(record, items.code), altitude, float(value(record, items.address) or 0))
 
 
-def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None:
+def _take_service(record: Any, radar: dict[str, Any], clock: Clock) -> None:
     kind, time, turn = value(record, "000"), value(record, "030"), value(record, "041")
     if time is not None:
         now = clock.time(time)
@@ -329,25 +297,16 @@ def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None
         radar["rotation"] = turn * SECOND
     height, lat, lon = (value(record, "120", name) for name in ("HGT", "LAT", "LON"))
     if height is not None and lat is not None and lon is not None:
-        radar["place"] = (signed(lat, 24) * _COARSE, signed(lon, 24) * _COARSE, float(signed(height, 16)))
+        radar["place"] = (signed(lat, 24) * COARSE, signed(lon, 24) * COARSE, float(signed(height, 16)))
 
 
-def recording_of(rows: Array, name: str, notes: Mapping[str, int]) -> Recording:
-    """Plots of rows in the order of time."""
-    times, ranges, azimuths, identities, altitudes, doubtful, addresses = rows.T
-    known = identities.astype(np.int64)
-    return Recording(
-        times=times, ranges=ranges, azimuths=azimuths, identities=known, altitudes=altitudes,
-        garbled=(doubtful > 0) | garbled_altitudes(altitudes / FLIGHT_LEVEL, known, (), times),
-        addresses=addresses.astype(np.int64), notes=dict(notes), name=name,
-    )  # fmt: skip
-
-
-def _seen(rows: SourceRows, origin: tuple[float, float, float], name: str, notes: dict[str, int]) -> Recording:
-    times, lat, lon, identities, altitudes, addresses = rows.table(notes).T
-    place = east_north_up(lat, lon, np.nan_to_num(altitudes), origin)
-    return Recording(
-        times=times, ranges=np.linalg.norm(place, axis=1), azimuths=np.arctan2(place[:, 1], place[:, 0]),
-        identities=identities.astype(np.int64), altitudes=altitudes, addresses=addresses.astype(np.int64),
-        notes=dict(notes), name=name,
+def _seen(rows: Array, origin: tuple[float, float, float] | None) -> Array:
+    """Rows of reports as rows of plots, as seen from a place."""
+    assert origin is not None
+    times, lat, lon, identities, altitudes, addresses = rows.T
+    east, north, up = east_north_up(lat, lon, np.nan_to_num(altitudes), origin).T
+    none = np.zeros(len(rows))
+    return np.column_stack(
+        [times, np.hypot(np.hypot(east, north), up), np.arctan2(north, east), identities, altitudes,
+         none - 1.0, addresses, none, none]
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from assoc._system.imports import check_extra
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
-from assoc.integrations.asterix.reading import LEVEL_STEP, Source, SourceRows
+from assoc.integrations.asterix.blocks import Records
+from assoc.integrations.asterix.items import LEVEL_STEP, signed, value
+from assoc.integrations.asterix.reading import Clock, Source
 from assoc.integrations.asterix.writing import check_source, time_of_day, write_blocks
 from assoc.scene.geodesy import FLATTENING, SEMI_MAJOR_AXIS
 from assoc.sensors.arrays import finite_array
@@ -217,18 +219,15 @@ def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    notes: dict[str, int] = {}
-    clock, found = SourceRows(), []
-    for block in data_blocks(read_bytes(path), notes):
-        if block.category != 62:
-            continue
-        for record in records(block, notes):
+    notes = Counter[str]()
+    clock, found = Clock(), []
+    for block in Records(path, notes, categories=(62,)):
+        for _, _, record in block:
             time, number = value(record, "070"), value(record, "040")
             raw = {name: value(record, *where) for name, (where, *_) in _NUMBERS.items()}
             if time is None or number is None or raw["x"] is None or raw["y"] is None:
                 continue
             now = clock.time(time)
-            clock.rows.append((now,))
             values: dict[str, Any] = {
                 name: np.nan if raw[name] is None else signed(int(raw[name] or 0), bits) * step
                 for name, (_, step, bits) in _NUMBERS.items()

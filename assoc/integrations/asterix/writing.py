@@ -13,7 +13,8 @@ from assoc._system.imports import check_extra
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import edition
-from assoc.integrations.asterix.reading import ANGLE_STEP, LEVEL_STEP, RANGE_STEP, SECOND, Source
+from assoc.integrations.asterix.items import ANGLE_STEP, LEVEL_STEP, RANGE_STEP, SECOND
+from assoc.integrations.asterix.reading import Source
 from assoc.recordings.columns import DAY
 from assoc.recordings.recording import UNDECODED, Recording
 
