@@ -18,6 +18,8 @@ from assoc._text.times import UNIX
 from assoc.errors import AssocError, InvalidInputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from assoc._types import Array
     from assoc.recordings import Recording
     from assoc.recordings.flights.positions import Positions
