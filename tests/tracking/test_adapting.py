@@ -296,3 +296,40 @@ def test_a_sensor_that_is_off_misses_nothing():
             tracker.step(4.0 * k, [z[:0] if k in off else z for z in scene.measurements[k]], sectors=sectors)
         shown.append(sum(track.reported for track in tracker.tracks))
     assert shown == [TARGETS, 0]
+
+
+def wider_alarms(sensors, rate):
+    """The radars with this many false alarms."""
+    return [replace(sensor, false_alarm_rate=rate) for sensor in sensors]
+
+
+KINDS = {
+    "as declared": (radars(), None),
+    "noise": (radars(160.0), None),
+    "P_d": (radars(detection_probability=0.6), None),
+    "false alarms": (wider_alarms(radars(), 40.0), None),
+    "beside a wind farm": (radars(detection_probability=0.75), 10),
+    "one radar": (radars(detection_probability=0.75, count=1), None),
+}
+
+
+@pytest.mark.slow
+def test_estimates_are_within_a_tenth_and_their_intervals_hold():
+    """Of 42 scenes of six kinds, whatever is wrongly declared of the sensors."""
+    inside_all, off = [], {}
+    for kind, (true, returns) in KINDS.items():
+        for seed in range(7):
+            scene = scene_of(true, 100 + seed, scans=60)
+            scene = scene if returns is None else with_returns(scene, returns, seed)
+            told = tracked(scene, radars(count=len(true))).health.sensors
+            for sensor, truth, declared in zip(told, true, radars(count=len(true)), strict=True):
+                values = (
+                    (sensor.noise, (truth.noise / declared.noise)[0]),
+                    (sensor.detection_probability, truth.detection_probability),
+                    (sensor.false_alarm_rate, truth.false_alarm_rate),
+                )
+                inside_all += [inside(*value) for value in values]
+                off.setdefault(kind, []).append([one.seen / right for one, right in values])
+    found = {kind: np.round(np.mean(ratios, axis=0), 3).tolist() for kind, ratios in off.items()}
+    assert np.abs(np.array(list(found.values())) - 1.0).max() < 0.1, found
+    assert np.mean(inside_all) >= 0.95 - 2.0 * np.sqrt(0.05 * 0.95 / len(inside_all)), found
