@@ -16,6 +16,7 @@ from __future__ import annotations
 _ONE_PROCESS = "a recording is tracked by one process, which takes about 0.3 hours for a day of 26 million plots"
 _NOT_TOLD = "identities are evidence (identity=IdentityParameters()); those that do not fit are not told by name"
 _LOSS = "associate twice, with gate_probability 0.999 and 1, and compare costs"
+_HULLS = "tracks are one ship if they keep their distance along its course, whatever its length"
 
 _STANDARD = "Marginals.error is the standard error, 0 where Marginals.exact"
 
@@ -26,6 +27,9 @@ REMOVED: dict[str, str] = {
     "Tracker.odd_identities": _NOT_TOLD,
     "LatePlots.odd_identities": _NOT_TOLD,
     "Health.identities": _NOT_TOLD,
+    "read_autoferry(extent)": "all detections are read; MovingTargets puts the tracks of a ship's parts together",
+    "MovingTargets(length)": _HULLS,
+    "MovingTargets(together)": _HULLS,
     "--tiles": "scans are solved in one piece, 10 million tuples in seconds",
     "--gate-loss": "solve twice, with --gate-probability 0.999 and 1, and compare costs",
     "associate(gate_loss)": _LOSS,

@@ -46,13 +46,12 @@ def read_autoferry(
     truth: str | os.PathLike[str] | None = None,
     *,
     sensors: Mapping[str, Mapping[str, Any]] | tuple[str, ...] = tuple(SENSORS),
-    extent: float = 25.0,
     interval: float = 1.0,
 ) -> Scene:
     """Read a scenario as a scene: x east, y north, seconds from the first frame, sensors on the moving ferry.
 
-    A scan is a frame, in which only its sensor measures. Detections of lidar and radar in a frame that are near one
-    another are one target's, and are replaced by their mean.
+    A scan is a frame, in which only its sensor measures. Of a ship the lidar has several detections: the tracks of its
+    parts are put together by `assoc.tracking.MovingTargets`.
 
     Parameters
     ----------
@@ -61,8 +60,6 @@ def read_autoferry(
     sensors : sequence of str, or mapping of str to mapping
         Which of `SENSORS`; with values, what to change of their parameters. False alarms are as dense at another
         reach, unless told.
-    extent : float
-        Detections at most so far apart, directly or through others, are one, metres: bow and stern of a ship.
     interval : float
         Seconds from one frame of a sensor to its next that is taken: errors and misses of frames in quick succession
         are the same ones over and over, and a tracker takes them for new evidence.
@@ -76,7 +73,6 @@ def read_autoferry(
     for name in given:
         if name not in SENSORS:
             raise InvalidInputError(f"sensors: unknown name {name!r}; known: {', '.join(SENSORS)}")
-    positive(extent, "extent")
     positive(interval, "interval", zero=True)
     frames = [_frame(detections, k, frame) for k, frame in enumerate(_listed(detections))]
     boats = None if truth is None else _listed(truth)
@@ -97,7 +93,7 @@ def read_autoferry(
         if s is None or time - last[s] < interval:
             continue
         last[s] = time
-        found = z if placed[s].dim == 1 else merged(z[placed[s].in_view(z)], extent)
+        found = z if placed[s].dim == 1 else z[placed[s].in_view(z)]
         times.append(time - start)
         scans.append([found if r == s else np.zeros((0, sensor.dim)) for r, sensor in enumerate(placed)])
         sectors.append([[-math.pi, math.pi if r == s else -math.pi] for r in range(len(placed))])
@@ -165,14 +161,3 @@ def _sensor(name: str, changes: Mapping[str, Any], platform: Platform) -> Sensor
         parameters["false_alarm_rate"] *= (reach / usual["reach"]) ** 2
     view = np.array([[-reach, reach], [-reach, reach]])
     return PositionSensor(name=name, position=np.zeros(3), field_of_view=view, platform=platform, **parameters)
-
-
-def merged(points: Array, extent: float) -> Array:
-    """Means (m, d) of the groups of points (n, d) that hang together by steps of at most `extent`."""
-    if len(points) < 2:
-        return points
-    from scipy.sparse.csgraph import connected_components
-
-    near = np.linalg.norm(points[:, None] - points, axis=2) <= extent
-    count, group = connected_components(near, directed=False)
-    return np.stack([points[group == g].mean(axis=0) for g in range(count)])

@@ -11,7 +11,7 @@ from experiments.common.results import RESULTS, Results, number, plain_table, ta
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS
 from experiments.real.air_traffic import UNITS, WHAT
-from experiments.real.autoferry import SETS
+from experiments.real.autoferry import LEFT_OUT, SETS
 from experiments.sdlib import store
 from experiments.sdlib.comparison import comparison_tables
 from experiments.trackers.real_scenes import ADAPTING
@@ -278,7 +278,8 @@ def as_they_are() -> str:
 
 def autoferry() -> str:
     """The boats of the Autoferry recordings: GOSPA of every tracker."""
-    r, known = Results("real.autoferry"), SHOWN | {ADAPTING: _HEADS[ADAPTING]}
+    r = Results("real.autoferry")
+    known = SHOWN | {ADAPTING: _HEADS[ADAPTING], LEFT_OUT: "`multi-sensor`, left out"}
     shown = []
     for which in SETS:
         names = [name for name in known if f"{which}, {name}, mean: GOSPA" in r]
