@@ -3,6 +3,7 @@
 import http.client
 import io
 import itertools
+import json
 import re
 import threading
 from dataclasses import replace
@@ -13,6 +14,8 @@ import pytest
 from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
+from assoc.scene import Scene
+from assoc.sensors import PositionSensor, Radar2D
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from assoc.tracking.live.pictures import Agreement, SensorState
@@ -131,7 +134,7 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
             if key == "n":
                 text = browser.execute_script("return detail.textContent")
                 assert "from radar 19from radar 24from radar 30" in text and text.endswith("NIS3.25: inconsistent")
-        for name in ("labels", "plots"):
+        for name in ("labels", "plots", "rings"):
             browser.execute_script(f"document.getElementById('{name}').click()")
             assert browser.execute_script(f"return show.{name}") is False
         assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
@@ -144,6 +147,38 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
     finally:
         page.close()
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def event_of(reader, name):
+    """The data of the first event of a name that waits."""
+    waiting = [reader.get_nowait() for _ in range(reader.qsize())]
+    return json.loads(next(one for one in waiting if one.startswith(f"event: {name}\n")).split("data: ")[1])
+
+
+def test_a_page_that_opens_later_has_trails(scene, film):
+    page = LivePage(scene)
+    for one in film:
+        page.show(one._replace(names={film[-1].tracks[0].track_id: "4521"}))
+    reader = page.join_reader()
+    waiting = [reader.get_nowait() for _ in range(reader.qsize())]
+    assert [one.split("\n")[0] for one in waiting] == ["event: scene", "event: trails", "event: picture"]
+    _, trails, picture = (json.loads(one.split("data: ")[1]) for one in waiting)
+    for track in film[-1].tracks:
+        past = [one.position[:2] for shot in film for one in shot.tracks if one.track_id == track.track_id]
+        np.testing.assert_allclose(trails[str(track.track_id)], np.round(past[-40:], 2), atol=0.01)
+    assert len(trails) == len(film[-1].tracks) and max(map(len, trails.values())) > 10
+    assert picture["names"] == {str(film[-1].tracks[0].track_id): "4521"}
+    page.close()
+
+
+def test_ais_stands_nowhere():
+    """A sensor of positions has no mark and no rings, a radar has both."""
+    box = np.array([[-1e4, 1e4]] * 2)
+    ais = PositionSensor(position=np.zeros(3), noise=[9.0, 9.0], field_of_view=box, name="AIS")
+    radar = Radar2D(position=[5, 6, 0], noise=[9, 1e-3], field_of_view=[[0, 2e4], [-3.14, 3.14]], name="shore")
+    page = LivePage(Scene([radar, ais], [0.0], [[np.zeros((0, 2))] * 2]))
+    assert event_of(page.join_reader(), "scene")["sensors"] == [["shore", 5.0, 6.0, 2e4], ["AIS", None, None, None]]
+    page.close()
 
 
 def test_a_browser_that_reads_no_more_does_not_hold_up_the_end(scene, film):

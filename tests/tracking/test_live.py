@@ -14,6 +14,7 @@ from assoc.scene import Scene
 from assoc.sensors import Platform, Radar3D
 from assoc.simulation import observe, simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
+from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.offline.plots import track_plots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
@@ -332,3 +333,12 @@ def test_own_positions_of_a_ship(tmp_path):
         late.finish()
         silent = ["ship has had no own position since 3 s: it goes on as then"] if until > 0 else []
         assert told == silent and late.counts["steps failed"] == 0
+
+
+def test_tracks_are_called_by_their_codes():
+    """By the majority of their last plots: the code where there is one, else the address or a ship's number."""
+    kept = KeptIdentities()
+    known = np.array([[4521, 0x3C6444], [4521, 0x3C6444], [1000, 0x3C6444], [0, 0x3C6444], [0, 235_000_100], [0, 0]])
+    tracks = np.array([1, 1, 1, 2, 3, 4])
+    kept.take(tracks, np.ones(6, dtype=bool), np.arange(6.0), known)
+    assert [kept.name_of(track) for track in (1, 2, 3, 4, 5)] == ["4521", "3c6444", "235000100", "", ""]

@@ -2,14 +2,23 @@
 // Draws what the server pushes: sensors, plots that fade, tracks with their trails, speeds and ids.
 const byId = (id) => document.getElementById(id);
 const canvas = byId("map"), state = byId("state"), detail = byId("detail");
-const show = { labels: true, plots: true };
+const show = { labels: true, plots: true, rings: true };
 const TRAIL = 40, FADE = 4, LEADER = 30, NEAR = 18, STEP = 1.5;
-let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], counts = {}, names = [], view = null, ended = false, pending = false, chosen = null;
+let scene = null, time = 0, tracks = [], trails = new Map(), plots = [], counts = {}, names = [], called = {}, view = null, held = false, ended = false, pending = false, chosen = null;
 
 function style(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
+// The traffic, with the radars near it; the whole region while there is none.
 function fit() {
-  const [[x0, x1], [y0, y1]] = scene.region;
+  let [[x0, x1], [y0, y1]] = scene.region;
+  const seen = [...tracks.map(([, x, y]) => [x, y]), ...(tracks.length ? [] : plots.flat())];
+  if (seen.length) {
+    const spot = (k, all) => [Math.min(...all.map((one) => one[k])), Math.max(...all.map((one) => one[k]))];
+    const wide = Math.max(...[0, 1].map((k) => { const [low, high] = spot(k, seen); return high - low; }), 2000);
+    const middle = [0, 1].map((k) => { const [low, high] = spot(k, seen); return (low + high) / 2; });
+    const near = scene.sensors.filter(([, x, y]) => x !== null && Math.hypot(x - middle[0], y - middle[1]) < wide).map(([, x, y]) => [x, y]);
+    [[x0, x1], [y0, y1]] = [0, 1].map((k) => { const [low, high] = spot(k, [...seen, ...near]); return [low - 0.1 * wide, high + 0.1 * wide]; });
+  }
   const scale = 0.92 * Math.min(canvas.clientWidth / (x1 - x0), canvas.clientHeight / (y1 - y0));
   view = { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: scale };
 }
@@ -21,6 +30,7 @@ function place(x, y) {
 // Zoom by a factor; what is at the point (a, b) of the canvas stays there.
 function zoom(factor, a = canvas.clientWidth / 2, b = canvas.clientHeight / 2) {
   if (!view) return;
+  held = true;
   const away = [a - canvas.clientWidth / 2, canvas.clientHeight / 2 - b];
   const now = view.scale * factor;
   view = { x: view.x + away[0] / view.scale - away[0] / now, y: view.y + away[1] / view.scale - away[1] / now, scale: now };
@@ -29,6 +39,7 @@ function zoom(factor, a = canvas.clientWidth / 2, b = canvas.clientHeight / 2) {
 
 function move(right, down) {
   if (!view) return;
+  held = true;
   view.x += right / view.scale; view.y -= down / view.scale;
   redraw();
 }
@@ -49,8 +60,10 @@ function draw() {
   g.font = "12px system-ui, sans-serif";
   ruler(g, h);
   const taken = [];
+  if (show.rings) rings(g);
   g.fillStyle = style("--sensor");
   for (const [name, x, y] of scene.sensors) {
+    if (x === null) continue;
     const [a, b] = place(x, y);
     g.beginPath(); g.moveTo(a, b - 6); g.lineTo(a + 6, b + 5); g.lineTo(a - 6, b + 5); g.fill();
     label(g, taken, name, a, b);
@@ -76,11 +89,31 @@ function draw() {
     g.beginPath(); g.moveTo(a, b); g.lineTo(c, d); g.stroke();
     g.beginPath(); g.arc(a, b, 4, 0, 2 * Math.PI); if (status === "confirmed") g.fill(); else g.stroke();
     g.setLineDash([]);
-    if (show.labels || id === chosen) { g.fillStyle = ink; label(g, taken, id + (alarming(quality) ? "!" : "") + (height === null ? "" : "  " + Math.round(height) + " m"), a, b); }
+    if (show.labels || id === chosen) { g.fillStyle = ink; label(g, taken, words(id, height, vx, vy, quality), a, b); }
   }
 }
 
 function alarming(quality) { return quality !== null && !quality[1]; }
+
+// Code (or number), level and speed, as on a radar's screen.
+function words(id, height, vx, vy, quality) {
+  // a height that nothing has measured may be anything
+  const level = height === null || height < -1000 || height > 30000 ? "" : height < 1500 ? "  " + Math.round(height) + " m" : "  FL" + String(Math.round(height / 30.48)).padStart(3, "0");
+  return (called[id] || id) + (alarming(quality) ? "!" : "") + level + "  " + Math.round(Math.hypot(vx, vy) * 3600 / 1852) + " kt";
+}
+
+// Rings of range around each radar, out to its reach: as far apart as the ruler is long.
+function rings(g) {
+  const length = ruled(), w = canvas.clientWidth, h = canvas.clientHeight;
+  g.strokeStyle = style("--line"); g.fillStyle = style("--soft"); g.lineWidth = 1;
+  for (const [, x, y, reach] of scene.sensors) {
+    if (x === null || reach === null) continue;
+    const [a, b] = place(x, y), far = Math.min(reach * view.scale, Math.hypot(w, h) + Math.hypot(a - w / 2, b - h / 2));
+    for (let r = length; r * view.scale <= far; r += length) {
+      g.beginPath(); g.arc(a, b, r * view.scale, 0, 2 * Math.PI); g.stroke();
+    }
+  }
+}
 
 // Write a text beside a point where none is yet, or not at all.
 function label(g, taken, text, a, b) {
@@ -97,9 +130,13 @@ function label(g, taken, text, a, b) {
   }
 }
 
+function ruled() {
+  const length = 10 ** Math.floor(Math.log10(160 / view.scale));
+  return length * ([5, 2].find((step) => length * step * view.scale < 160) || 1);
+}
+
 function ruler(g, h) {
-  let length = 10 ** Math.floor(Math.log10(160 / view.scale));
-  for (const step of [5, 2]) if (length * step * view.scale < 160) { length *= step; break; }
+  const length = ruled();
   const text = length >= 1000 ? length / 1000 + " km" : length + " m";
   g.strokeStyle = style("--soft"); g.fillStyle = style("--soft"); g.lineWidth = 1;
   g.beginPath(); g.moveTo(14, h - 20); g.lineTo(14, h - 14); g.lineTo(14 + length * view.scale, h - 14);
@@ -108,7 +145,9 @@ function ruler(g, h) {
 }
 
 function take(picture) {
-  time = picture.time; tracks = picture.tracks; counts = picture.counts;
+  // the first view is on the traffic
+  if (view && !held && !tracks.length && (picture.tracks.length || !plots.flat().length)) view = null;
+  time = picture.time; tracks = picture.tracks; counts = picture.counts; called = picture.names;
   plots = [picture.plots, ...plots].slice(0, FADE);
   const alive = new Map();
   for (const [id, x, y] of tracks) alive.set(id, [...(trails.get(id) || []), [x, y]].slice(-TRAIL));
@@ -150,7 +189,7 @@ function describe() {
   if (!track) { detail.textContent = "Track " + chosen + " has ended"; return; }
   const [id, x, y, height, vx, vy, hits, started, status, quality, latitude, longitude] = track;
   const heading = (Math.atan2(vx, vy) * 180 / Math.PI + 360) % 360;
-  const rows = [["Track", id], ["Status", status], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
+  const rows = [["Track", id], ...(called[id] ? [["Code", called[id]]] : []), ["Status", status], ["x, y", (x / 1000).toFixed(2) + ", " + (y / 1000).toFixed(2) + " km"]];
   if (latitude !== undefined) rows.push(["Place", latitude.toFixed(5) + "\u00b0, " + longitude.toFixed(5) + "\u00b0"]);
   rows.push(["Height", height === null ? "unknown" : Math.round(height) + " m"], ["Speed", Math.hypot(vx, vy).toFixed(1) + " m/s"]);
   rows.push(["Heading", heading.toFixed(0) + "\u00b0"], ["Since", moment(started)], ["Hits", hits]);
@@ -172,11 +211,12 @@ events.addEventListener("scene", (event) => {
   chips(scene.sensors.map(([name]) => [name, null, 0, 0, false]));
   redraw();
 });
+events.addEventListener("trails", (event) => { trails = new Map(Object.entries(JSON.parse(event.data)).map(([id, trail]) => [Number(id), trail])); });
 events.addEventListener("picture", (event) => take(JSON.parse(event.data)));
 events.addEventListener("end", () => { ended = true; events.close(); say("ended"); });
 events.onerror = () => { if (!ended) say("connection lost"); };
 
-for (const name of ["labels", "plots"]) {
+for (const name of ["labels", "plots", "rings"]) {
   const button = byId(name);
   button.addEventListener("click", () => {
     show[name] = !show[name]; button.setAttribute("aria-pressed", String(show[name])); redraw();

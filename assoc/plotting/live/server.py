@@ -11,6 +11,7 @@ import math
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -23,6 +24,7 @@ from assoc.errors import InvalidInputError
 from assoc.exports.maps import coordinates
 from assoc.recordings.several import NO_HEIGHT
 from assoc.scene.scene import Scene
+from assoc.sensors import PositionSensor, Sensor
 
 if TYPE_CHECKING:
     from assoc.tracking import Picture, Track
@@ -40,6 +42,8 @@ _WAITING = 50
 _BEAT = 10.0
 # pause (s) if the system has no more connections
 _PAUSE = 0.2
+# places of a track that a page gets which is opened later
+_TRAIL = 40
 # decimals: centimetres
 _DIGITS = 2
 
@@ -82,13 +86,14 @@ class LivePage:
             "title": title,
             "region": scene.region.tolist(),
             "sensors": [
-                [sensor.name or str(s), *sensor.position[:2].tolist()]
+                [sensor.name or str(s), *_site(sensor)]
                 for s, sensor in enumerate(scene.sensors, 1)
                 if not sensor.name.endswith(NO_HEIGHT)
             ],
         }
         self._first = _event("scene", first)
         self._last: str | None = None
+        self._trails: dict[int, deque[list[float]]] = {}
         self._readers: set[queue.Queue[str | None]] = set()
         self._lock = threading.Lock()
         self._closed = False
@@ -124,6 +129,12 @@ class LivePage:
         counts : mapping of str to int, optional
             Plots that were late, refused or lost, by reason.
         """
+        with self._lock:
+            self._trails = {
+                track.track_id: self._trails.get(track.track_id, deque(maxlen=_TRAIL)) for track in picture.tracks
+            }
+            for track in picture.tracks:
+                self._trails[track.track_id].append(np.round(track.position[:2], _DIGITS).tolist())
         tracks = [self._row(track, picture.agreements.get(track.track_id), heard) for track in picture.tracks]
         plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
         content = {
@@ -131,6 +142,7 @@ class LivePage:
             "tracks": tracks,
             "plots": plots,
             "sensors": picture.sensors.tolist(),
+            "names": {str(number): name for number, name in picture.names.items()},
             "heard": [[row.name, row.last if math.isfinite(row.last) else None, *row[2:5]] for row in heard],
             "counts": dict(counts or {}),
         }
@@ -181,6 +193,7 @@ class LivePage:
         reader.put(self._first)
         with self._lock:
             if self._last is not None:
+                reader.put(_event("trails", {str(number): list(trail) for number, trail in self._trails.items()}))
                 reader.put(self._last)
             self._readers.add(reader)
         return reader
@@ -189,6 +202,14 @@ class LivePage:
         """Forget a browser that has disconnected."""
         with self._lock:
             self._readers.discard(reader)
+
+
+def _site(sensor: Sensor) -> list[float | None]:
+    """Where a sensor stands, x and y, and how far it reaches; None where it is nowhere, as AIS, or sees no ranges."""
+    if isinstance(sensor, PositionSensor) and sensor.platform is None:
+        return [None, None, None]
+    ranged = "range" in sensor.components
+    return [*sensor.position[:2].tolist(), float(sensor.field_of_view[0, 1]) if ranged else None]
 
 
 def _put(reader: queue.Queue[str | None], event: str | None) -> None:

@@ -6,7 +6,7 @@ from collections import deque
 
 from assoc._types import Array
 from assoc.metrics.plot_identity import MEMORY, majority
-from assoc.tracking.records.identity_evidence import UNKNOWN
+from assoc.tracking.records.identity_evidence import UNKNOWN, address_text
 
 # code or address of a plot that has none
 _NOBODY = -1
@@ -59,6 +59,16 @@ class KeptIdentities:
                 most = majority(plots)
                 if sure and most != _NOBODY:
                     had.add(most)
+
+    def name_of(self, track: int) -> str:
+        """The four digits of a track's code, else its address, by the majority of its last plots; "" if not known."""
+        known = self._tracks.get(track)
+        if known is None:
+            return ""
+        code, address = (majority(plots) if plots else _NOBODY for plots in known.plots)
+        if code != _NOBODY:
+            return f"{code:04d}"
+        return "" if address == _NOBODY else address_text(address)
 
     def settle(self, living: set[int], before: float) -> None:
         """Count and forget the tracks that no longer live and had no plot since `before` (seconds)."""

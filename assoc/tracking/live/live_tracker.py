@@ -401,7 +401,8 @@ class LiveTracker:
         begin = clock.perf_counter()
         agreements = self._agreements(step, tracks)
         self.seconds[-1] += clock.perf_counter() - begin
-        return Picture(end, tracks, ended, np.concatenate(found), owner, agreements)
+        names = {number: name for number in ids if (name := self._kept.name_of(number))}
+        return Picture(end, tracks, ended, np.concatenate(found), owner, agreements, names)
 
     def _agreements(self, step: Step | None, tracks: Sequence[Track]) -> dict[int, Agreement]:
         """How well the tracks agree with their measurements after a step, None if it failed."""

@@ -61,6 +61,8 @@ class Picture(NamedTuple):
     """Sensor of each plot, (n,)."""
     agreements: Mapping[int, Agreement] = MappingProxyType({})
     """By track id, if the tracker was made with `quality`."""
+    names: Mapping[int, str] = MappingProxyType({})
+    """Codes or addresses by track id, of those that have one."""
 
 
 class SensorState(NamedTuple):
