@@ -55,6 +55,11 @@ def ant_colony() -> str:
         mean = r[f"reading, {words}: mean cycles"].ours
         return f"{mean:.0f} ({cut.ours:.0f} of {of_runs(cut)} runs cut off at 1,000)"
 
+    states = Results("papers.ant_colony.states")
+
+    def state(what: str) -> str:
+        return number(states[what].ours)
+
     sweep = Results("metaheuristics.sweep")
     many = {n: sweep.starting(f"ghosts {n}, paper: table 1's advice")[0] for n in (20, 40)}
     return filled("ant-colony", locals(), _of=_of, _excess=_excess)
