@@ -128,7 +128,9 @@ def clustering_time_window() -> str:
             f"others {number(others.ours, 2)} %. What is lost is lost to misses"
         )
     strays = {name: r.starting(f"{name}: changes of track from plot to plot")[0] for name in pairs}
-    near_targets = Results("trackers.close_targets")
+    near_targets, cited = Results("trackers.close_targets"), Results("papers.clustering_time_window.cited")
+    imm, less = ([cited[f"{rate}, MHT, CTW, time stamps, {name}"] for rate in ("CT", "MT", "IT")]
+                 for name in ("IMM", "IMM less EKF"))  # fmt: skip
 
     def close(kind: str) -> str:
         errors, switched = (
