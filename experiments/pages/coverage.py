@@ -182,7 +182,8 @@ def modified_ekf() -> str:
     r, b = Results("papers.modified_ekf"), Results("papers.modified_ekf.beyond")
 
     ratio = {reading: r[f"simulation 1, reading {reading}: modified / EKF, RMSE of the position"]
-             for reading in ("sigmas", "R_k", "mixed", "moving")}  # fmt: skip
+             for reading in ("sigmas", "R_k", "mixed", "moving", "printed", "printed, mixed")}  # fmt: skip
+    steep = [c for c in r.claims if "largest |phi~ tan phi|" in c.quantity]
     positions = [[r[f"simulation 1, reading mixed: RMSE of {axis}, {name}"] for name in ("EKF", "modified")]
                  for axis in "xyz"]  # fmt: skip
     ours = [number(short.ours / plain.ours, 2) for plain, short in positions]
