@@ -19,14 +19,15 @@ from assoc._cli.options import Given, read_first
 from assoc._cli.program import Program
 from assoc._cli.progress import ProgressBar
 from assoc._cli.signals import Interruption
-from assoc._cli.sweep.options import OUTPUTS, SHOWN, make_study, read_comparison, read_options, tune_parameters
-from assoc._cli.sweep.options import parser as parser
+from assoc._cli.sweep_options import OUTPUTS, SHOWN, make_study, read_comparison, read_options, tune_parameters
+from assoc._cli.sweep_options import parser as parser
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from assoc._cli.sweep_tables import Rows
     from assoc.sweeps.study import Counts, Study
 
 # seconds between two lines of -v
@@ -64,16 +65,16 @@ def _run(given: Given, tables: dict[str, Any]) -> None:
 
 def _report(folder: str, given: Given, study: Study | None) -> None:
     """Print the table of a folder, only of the study's settings if one is given; write the requested outputs."""
-    from assoc._cli.sweep.tables import print_study
+    from assoc._cli.sweep_tables import print_study, summary_rows
     from assoc.sweeps.frame import load
-    from assoc.sweeps.summary import summarize, summary_rows
+    from assoc.sweeps.summary import summarize
 
     frame = load(folder)
     if study is not None:
         frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
     table = summarize(frame)
     print_study(table, len(table) if given["all"] else SHOWN)
-    _write_table(given["csv"], table, lambda: summary_rows(table))
+    _write_table(given["csv"], table, summary_rows)
     if given["heatmap"] or given["convergence"]:
         from assoc.plotting.study_figures import draw_convergence, draw_heat_maps
 
@@ -87,23 +88,24 @@ def _report(folder: str, given: Given, study: Study | None) -> None:
         write_sweep_report(given["report"], folder, frame, words=given.words)
 
 
-def _write_table(file: str | None, table: pd.DataFrame, rows: Callable[[], tuple[list[str], list[list[str]]]]) -> None:
+def _write_table(file: str | None, table: pd.DataFrame, rows: Callable[[pd.DataFrame], Rows]) -> None:
     """Write a table as CSV, or its rows for LaTeX."""
+    from assoc._cli.sweep_tables import latex
     from assoc._files.output import write_text
-    from assoc.sweeps.summary import latex
 
     if file:
-        write_text(file, latex(*rows()) if file.endswith(".tex") else table.to_csv(index=False, lineterminator="\n"))
+        write_text(
+            file, latex(*rows(table)) if file.endswith(".tex") else table.to_csv(index=False, lineterminator="\n")
+        )
 
 
 def _compare(given: Given) -> None:
-    from assoc._cli.sweep.tables import print_comparison
-    from assoc.sweeps.comparison import compare
-    from assoc.sweeps.summary import comparison_rows
+    from assoc._cli.sweep_tables import comparison_rows, print_comparison
+    from assoc.sweeps.summary import compare
 
     table = compare(given["folder"], given["first"], given["second"])
     print_comparison(table, given["first"], given["second"])
-    _write_table(given["csv"], table, lambda: comparison_rows(table))
+    _write_table(given["csv"], table, comparison_rows)
 
 
 def _import(words: list[str]) -> None:
@@ -117,7 +119,7 @@ def _import(words: list[str]) -> None:
 
 
 def _tune(given: Given) -> None:
-    from assoc._cli.sweep.tables import print_tuning
+    from assoc._cli.sweep_tables import print_tuning
 
     with _watched(given) as progress:
         report = tune_parameters(given, progress)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import builtins
 import functools
 import inspect
-import os
+import reprlib
 import sys
 import types
 import typing
@@ -64,20 +64,20 @@ def _explaining(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords: Mapping[str, Any]) -> str | None:
     """Describe the first argument that does not fit its annotation; None if all do."""
+    signature = inspect.signature(function)
     try:
-        bound = inspect.signature(function).bind(*args, **keywords).arguments
+        bound = signature.bind(*args, **keywords).arguments
     except TypeError:
         lines = (removed(f"{function.__qualname__.removesuffix('.__init__')}({name})") for name in keywords)
         return next(filter(None, lines), None)  # too many or too few arguments: Python's message is good
     kinds = annotations_of(function)
     for name, value in bound.items():
-        parameter = inspect.signature(function).parameters[name]
-        kind = kinds.get(name, Any)
+        parameter = signature.parameters[name]
         if parameter.kind is parameter.VAR_KEYWORD:
             continue
         for argument in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
-            if not fits(argument, kind):
-                return f"{name}: expected {described(kind)}, got {_found(argument, kind)}"
+            if not fits(argument, kinds.get(name, Any)):
+                return f"{name}: expected {parameter.annotation}, got {' '.join(reprlib.repr(argument).split())}"
     return None
 
 
@@ -156,48 +156,3 @@ def _makes_array(value: Any) -> bool:
         return array.ndim > 0 and (array.dtype.kind in "biufmM" or not array.size)
     except (TypeError, ValueError):
         return False
-
-
-def described(kind: Any, several: bool = False) -> str:
-    """Return an annotation's meaning in words."""
-    if kind == ArrayLike:
-        kind = np.ndarray
-    origin, inner = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(described(part, several) for part in inner))
-    if kind is None or kind is type(None):
-        return "None"
-    if origin is Literal:
-        return " or ".join(map(repr, inner))
-    if origin is np.ndarray or kind is np.ndarray:
-        return "arrays of numbers" if several else "an array of numbers"
-    if origin is Callable or kind is Callable:
-        return "functions" if several else "a function"
-    if origin in _LISTS or kind in _LISTS:
-        element = f" of {described(inner[0], several=True)}" if inner and inner[0] is not Any else ""
-        return f"{'lists' if several else 'a list'}{element}"
-    kind = origin or kind
-    plain = {
-        int: ("a whole number", "whole numbers"), float: ("a number", "numbers"), str: ("text", "texts"),
-        bool: ("True or False", "True or False"), Mapping: ("a mapping", "mappings"), dict: ("a mapping", "mappings"),
-        os.PathLike: ("a path", "paths"),
-    }  # fmt: skip
-    if kind in plain:
-        return plain[kind][several]
-    name = str(getattr(kind, "__name__", kind))
-    return name if several else f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
-
-
-def _found(value: Any, kind: Any) -> str:
-    """Describe a value: short ones literally, lists by the first element that does not fit."""
-    if isinstance(value, (list, tuple)):
-        kinds = [part for part in (typing.get_args(kind) or [kind]) if typing.get_origin(part) in _LISTS] or [kind]
-        inner = typing.get_args(kinds[0])
-        if inner and typing.get_origin(kinds[0]) in _LISTS:
-            for number, element in enumerate(value[:_SOME]):
-                if not fits(element, inner[0]):
-                    return f"{_found(element, inner[0])} as element {number}"
-        return f"a {type(value).__name__}"
-    if value is None or isinstance(value, (bool, Real, str)):
-        return repr(value) if len(repr(value)) <= 80 else f"{repr(value)[:77]}..."
-    return f"a {type(value).__name__}"

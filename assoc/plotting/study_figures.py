@@ -15,8 +15,7 @@ from assoc._system.imports import load_extra
 from assoc.errors import InvalidInputError
 from assoc.plotting.colours import DASHES, colour
 from assoc.plotting.heat_map import LABELS, cells, colour_limits, draw_cells, is_constant, short_text
-from assoc.sweeps.excess import mean_excess, with_excess
-from assoc.sweeps.frame import load, load_traces
+from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
 from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 
 if TYPE_CHECKING:

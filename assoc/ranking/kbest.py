@@ -25,11 +25,11 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.prepare import Prepared, prepare, with_capped_costs
 from assoc.packing.run import Outcome, Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
-from assoc.ranking.columns import AllColumns, price_all_columns
+from assoc.ranking.columns import AllColumns, distinct_columns, price_all_columns, priced, slack_of
 from assoc.ranking.component_ranking import FIRST_BUDGET
 from assoc.ranking.head_start import HeadStart
-from assoc.ranking.iterative_deepening import Deepening
-from assoc.ranking.two_sensors import rank_two_sensors
+from assoc.ranking.iterative_deepening import Deepening, Found
+from assoc.ranking.murty.murty import Murty
 from assoc.solution import Solution
 from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.fallback import prepare_fallback
@@ -235,3 +235,35 @@ def _unproved(
         trace=(),
         parameters={"k": k, "rank": 1},
     )
+
+
+def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllColumns, Found]:
+    """Return the columns of a problem with two sensors and its k lightest solutions; InfeasibleError without any."""
+    rows, weights, origin = distinct_columns(problem)
+    slack = slack_of(problem)
+    n, m = (int(size) for size in problem.sizes)
+    # the rows are the sensor with fewer measurements: each node then has fewer children
+    first, second = rows[:, 0], rows[:, 1] - np.int32(n)
+    first_alone, second_alone = slack[:n], slack[n:]
+    turned = n > m
+    if turned:
+        first, second, first_alone, second_alone = second, first, second_alone, first_alone
+    murty = Murty(
+        np.ascontiguousarray(first),
+        np.ascontiguousarray(second),
+        weights,
+        np.ascontiguousarray(first_alone),
+        np.ascontiguousarray(second_alone),
+        k,
+    )
+    prepared = prepare(problem)
+    if not murty.feasible:
+        raise infeasible(prepared.packing)
+    # shortest paths between two checks of the clock: some ten milliseconds
+    turn = min(2000, max(1, 5_000_000 // max(weights.size, 1)))
+    while not murty.done and not run.should_stop():
+        murty.run(turn)
+    u, v = murty.duals
+    duals = np.concatenate([v, u] if turned else [u, v])
+    columns = priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
+    return columns, Found([murty.edges(rank) for rank in range(murty.num_found)], murty.rest, murty.evaluations)

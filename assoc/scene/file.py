@@ -13,7 +13,6 @@ from assoc._files.npz import FLOOR, Field, load_npz, save_npz
 from assoc._files.reading import check_unpacked
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_parts
 from assoc.sensors import KINDS, Platform, Sensor
 
 FORMAT = "assoc.scene"
@@ -25,6 +24,15 @@ _UNSAID, _NEVER = -1.0, -2.0
 # fields of later versions, latest first; a scene without them is written as version 1
 _LATER = {"sensor_resolution": 5, "sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3, "measurement_times": 2,
           "sectors": 2}  # fmt: skip
+
+_METADATA = {
+    "origin": Field("float", 1, required=False),
+    "note_texts": Field("str", 1, required=False),
+    "note_counts": Field("int", 1, required=False),
+    "truth_named_ids": Field("int", 1, required=False),
+    "truth_names": Field("str", 1, required=False),
+}
+"""Readers that do not know them leave them out."""
 
 _FIELDS = {
     "name": Field("str", 0, required=False),
@@ -55,7 +63,7 @@ _FIELDS = {
     "truth_offsets": Field("int", 1, required=False),
     "truth_ids": Field("int", 1, required=False),
     "truth_positions": Field("float", 2, required=False),
-    **METADATA_FIELDS,
+    **_METADATA,
 }
 
 
@@ -299,3 +307,40 @@ def _read_truth(arrays: dict[str, Array], scans: int, rows: Array) -> dict[str, 
         "positions": [arrays["truth_positions"][bounds[k] : bounds[k + 1]] for k in range(scans)],
         "sources": sources,
     }
+
+
+def metadata_arrays(parts: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the fields of a scene's attributes; only those that are not empty."""
+    arrays: dict[str, Array] = {}
+    if parts["origin"] is not None:
+        arrays["origin"] = np.array(parts["origin"])
+    if parts["notes"]:
+        arrays["note_texts"] = np.array(list(parts["notes"]))
+        arrays["note_counts"] = np.array(list(parts["notes"].values()), dtype=np.int64)
+    names = parts["truth"]["names"] if parts["truth"] is not None else {}
+    if names:
+        arrays["truth_named_ids"] = np.array(list(names), dtype=np.int64)
+        arrays["truth_names"] = np.array(list(names.values()))
+    return arrays
+
+
+def metadata_parts(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """Return "origin" and "notes" of a scene, and "names" of its truth."""
+    origin = tuple(arrays["origin"].tolist()) if "origin" in arrays else None
+    return {
+        "origin": origin,
+        "notes": _pairs(arrays, "note_texts", "note_counts"),
+        "names": _pairs(arrays, "truth_named_ids", "truth_names"),
+    }
+
+
+def _pairs(arrays: Mapping[str, Array], keys: str, values: str) -> dict[Any, Any]:
+    if (keys in arrays) != (values in arrays):
+        raise InvalidInputError(f"the field {values if keys in arrays else keys!r} is missing")
+    if keys not in arrays:
+        return {}
+    if len(arrays[keys]) != len(arrays[values]):
+        raise InvalidInputError(
+            f"the field {values!r} has {len(arrays[values])} values, expected {len(arrays[keys])} as {keys!r} has"
+        )
+    return dict(zip(arrays[keys].tolist(), arrays[values].tolist(), strict=True))

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
-    from assoc.sweeps.comparison import compare
     from assoc.sweeps.design import grid, random_settings, settings_from
     from assoc.sweeps.frame import load, load_traces
     from assoc.sweeps.setting import Setting
     from assoc.sweeps.study import Study
-    from assoc.sweeps.summary import summarize
+    from assoc.sweeps.summary import compare, summarize
     from assoc.sweeps.tuning import tune
 
 __all__ = [
@@ -37,7 +36,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "Setting": "setting",
         "Study": "study",
-        "compare": "comparison",
+        "compare": "summary",
         "grid": "design",
         "load": "frame",
         "load_traces": "frame",

@@ -38,9 +38,9 @@ def import_study(old: str | os.PathLike[str], new: str | os.PathLike[str]) -> tu
             try:
                 entry = _entry(line)
                 if "setting_key" in entry:
-                    store.insert([(entry["setting_key"], entry["solver"], json.dumps(entry["parameters"]))], [])
+                    store.append([(entry["setting_key"], entry["solver"], entry["parameters"])], [])
                 else:
-                    store.insert([], _rows(entry))
+                    store.append([], _rows(entry))
             except InvalidInputError:  # the new file cannot be written
                 raise
             except (sqlite3.Error, ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError):

@@ -57,17 +57,6 @@ class Setting:
         text = json.dumps([self.solver, dict(self.parameters)], sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
-    @cached_property
-    def words(self) -> tuple[int, int]:
-        """The key as two integers for seeds."""
-        return int(self.key[:8], 16), int(self.key[8:], 16)
-
-    @cached_property
-    def family(self) -> tuple[Any, ...]:
-        """Solver and its parameters that are not numbers: settings of a family run the same code."""
-        chosen = ((k, v) for k, v in self.parameters.items() if isinstance(v, (str, bool)))
-        return (self.solver, *chosen)
-
     def __hash__(self) -> int:
         return hash(self.key)
 

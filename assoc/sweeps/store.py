@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,7 +19,6 @@ from assoc._files.output import write_text
 from assoc._files.reading import check_regular
 from assoc._parameters import checked_time_limit, is_whole
 from assoc.errors import InvalidInputError
-from assoc.sweeps.setting import Setting
 
 FORMAT = "assoc.study"
 VERSION = 2
@@ -36,7 +35,7 @@ _APPLICATION = 0x6173736F
 # seconds to wait for another process that writes
 _PATIENCE = 60.0
 # bytes of a text or blob in the file
-_LONGEST = 32_000_000
+_LONGEST = 8_000_000
 
 _KINDS = {
     **dict.fromkeys(("setting", "source"), ("text",)),
@@ -78,7 +77,7 @@ class Manifest:
     assoc: str
     """Version of assoc."""
     seed: int
-    sources: Mapping[str, str]
+    sources: dict[str, str]
     """Fingerprint to name."""
     time_limit: float | None
     cpu_limit: float | None
@@ -95,52 +94,50 @@ class Manifest:
     def from_text(text: str | bytes, path: Path) -> Manifest:
         """Read a manifest, of this version or of version 1."""
         content = parsed(text, path)
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}")
-        if content.get("version") not in (1, VERSION):
-            raise InvalidInputError(
-                f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}"
-            )
+        if content.get("format") != FORMAT or content.get("version") not in (1, VERSION):
+            raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}, version {VERSION}")
         try:
             sources = content["sources"]
             if isinstance(sources, list):  # version 1
                 sources = {source["fingerprint"]: source["name"] for source in sources}
             time, cpu = (checked_time_limit(content.get(name), name) for name in ("time_limit", "cpu_limit"))
-            code = content.get("code", "")
-            texts = [content["assoc"], code, *sources, *sources.values()]
-            if not all(isinstance(one, str) for one in texts) or not is_whole(content["seed"], 0):
+            made = Manifest(
+                content["assoc"], content["seed"], sources, time, cpu, dict(content["gating"]), content.get("code", "")
+            )
+            if not is_whole(made.seed, 0) or {*map(type, [made.assoc, made.code, *sources, *sources.values()])} != {
+                str
+            }:
                 raise TypeError("a text or number of another kind")
-            return Manifest(content["assoc"], content["seed"], dict(sources), time, cpu, dict(content["gating"]), code)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
+        return made
 
     def check_same(self, new: Manifest, folder: Path) -> None:
         """Refuse to continue with another study."""
-        elsewhere = "take another folder"
-        if self.assoc != new.assoc:
-            raise InvalidInputError(
-                f"{folder}: this study was made by version {self.assoc} of assoc, this is {new.assoc}; {elsewhere}"
-            )
         if self.code and new.code and self.code != new.code:
             raise InvalidInputError(
-                f"{folder}: solvers or costs of assoc were changed since this study was begun; {elsewhere}"
+                f"{folder}: solvers or costs of assoc were changed since this study was begun; take another folder"
             )
         if {*self.sources} != {*new.sources}:
-            strange = [name for key, name in new.sources.items() if key not in self.sources]
-            missing = [name for key, name in self.sources.items() if key not in new.sources]
-            what = f"{strange[0]} is not among its sources" if strange else f"{missing[0]} of it is not given"
-            raise InvalidInputError(f"{folder}: holds a study of other scenes or problems: {what}; {elsewhere}")
-        for name in ("seed", "time_limit", "cpu_limit", "gating"):
+            one = {**self.sources, **new.sources}[min({*self.sources} ^ {*new.sources})]
+            raise InvalidInputError(
+                f"{folder}: holds a study of other scenes or problems (not both have {one}); take another folder"
+            )
+        for name in ("assoc", "seed", "time_limit", "cpu_limit", "gating"):
             old, now = getattr(self, name), getattr(new, name)
             if old != now:
-                raise InvalidInputError(f"{folder}: this study was begun with {name} {old}, not {now}; {elsewhere}")
+                raise InvalidInputError(
+                    f"{folder}: this study was begun with {name} {old}, not {now}; take another folder"
+                )
 
 
-def parsed(text: str | bytes, path: Path) -> Any:
-    """Return JSON that holds no infinite number and no half of a character, or refuse it in a line."""
+def parsed(text: str | bytes, path: Path) -> dict[str, Any]:
+    """Return a table of JSON that holds no infinite number and no half of a character, or refuse it in a line."""
     try:
         content = json.loads(text)
         json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
+        if not isinstance(content, dict):
+            raise ValueError("no table")
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{path}: is damaged ({str(error)[:100]})") from None
     return content
@@ -157,7 +154,11 @@ class Store:
         self.folder = Path(folder)
         self.path = self.folder / DATABASE
         if manifest is not None:
-            self._make_folder()
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+            except (OSError, ValueError) as error:
+                reason = getattr(error, "strerror", None) or error
+                raise InvalidInputError(f"{folder}: cannot be made ({reason})") from None
         elif not self.folder.is_dir():
             raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")
         for name in (DATABASE, *(DATABASE + ending for ending in ("-journal", "-wal", "-shm")), PARAMETERS):
@@ -181,13 +182,6 @@ class Store:
         except BaseException:
             self._db.close()
             raise
-
-    def _make_folder(self) -> None:
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InvalidInputError(f"{self.folder}: cannot be made ({reason})") from None
 
     def _begin(self, manifest: Manifest | None) -> None:
         """Make the tables where there are none, and look whether all is as it was written."""
@@ -246,28 +240,20 @@ class Store:
 
     def settings(self) -> dict[str, tuple[str, dict[str, Any]]]:
         """By its key, the solver and the parameters of each setting."""
-        found = {}
-        for key, solver, text in self.select("key, solver, parameters FROM settings ORDER BY solver, key"):
-            parameters = parsed(text, self.path)
-            if not isinstance(parameters, dict):
-                raise InvalidInputError(f"{self.path}: is damaged (parameters that are no table)")
-            found[key] = solver, parameters
-        return found
+        rows = self.select("key, solver, parameters FROM settings ORDER BY solver, key")
+        return {key: (solver, parsed(text, self.path)) for key, solver, text in rows}
 
-    def append(self, settings: Sequence[Setting], rows: Sequence[Sequence[Any]]) -> int:
+    def append(self, settings: Iterable[tuple[str, str, Mapping[str, Any]]], rows: Sequence[Sequence[Any]]) -> int:
         """Write runs (`COLUMNS`) with their settings, wait until they are on the disk; return the number of new ones.
 
-        Runs that are there are left as they are. If the file cannot be written (the disk is full), what was saved
-        stays.
+        Settings are key, solver and parameters. Runs that are there are left as they are. If the file cannot be
+        written (the disk is full), what was saved stays.
         """
-        return self.insert([(one.key, one.solver, json.dumps(dict(one.parameters))) for one in settings], rows)
-
-    def insert(self, settings: Sequence[Sequence[Any]], rows: Sequence[Sequence[Any]]) -> int:
-        """Do the same with settings as rows."""
         places = ", ".join("?" * len(COLUMNS))
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            self._db.executemany("INSERT INTO settings VALUES (?, ?, ?) ON CONFLICT DO NOTHING", settings)
+            texts = [(key, solver, json.dumps(dict(parameters))) for key, solver, parameters in settings]
+            self._db.executemany("INSERT INTO settings VALUES (?, ?, ?) ON CONFLICT DO NOTHING", texts)
             before = self._db.total_changes
             self._db.executemany(f"INSERT INTO runs VALUES ({places}) ON CONFLICT DO NOTHING", rows)
             new = self._db.total_changes - before

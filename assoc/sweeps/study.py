@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -16,14 +16,15 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.sweeps.batches import Batches, RunNumbers
-from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import study_sources
-from assoc.sweeps.store import KEPT, Manifest, RunKey, Store
-from assoc.sweeps.worker import Job, run_batch
+from assoc.sweeps.store import COLUMNS, KEPT, Manifest, RunKey, Store
+from assoc.sweeps.worker import Job, RunNumbers, code_digest, run_batch
 
 Progress = Callable[["Counts"], object]
+
+# runs of a batch
+_MOST_RUNS = 2000
 
 
 @dataclass
@@ -126,19 +127,13 @@ class Study(Shown):
         # loops, because itertools.product would first list all repeats, however many
         for repeat in self.repeats:
             for source, scans in enumerate(self.scans):
-                for setting in range(len(self.settings)):
+                for setting in self.settings:
                     for scan in scans:
                         yield setting, source, repeat, scan
 
-    def missing(self, done: Set[RunKey]) -> Iterator[RunNumbers]:
-        """Runs that are not done."""
-        return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
-
-    def keys(self) -> Iterator[RunKey]:
-        """Keys of all runs in order."""
-        settings = [setting.key for setting in self.settings]
-        sources = [source.fingerprint for source in self.sources]
-        return ((settings[run[0]], sources[run[1]], run[2], run[3]) for run in self.all_runs())
+    def key(self, run: RunNumbers) -> RunKey:
+        """Key of a run."""
+        return run[0].key, self.sources[run[1]].fingerprint, run[2], run[3]
 
     def run(
         self,
@@ -189,24 +184,25 @@ class Study(Shown):
     ) -> Counts:
         """Do the same as `run` with an open store."""
         done = store.done()
-        missing = sum(1 for _ in self.missing(done))
+        missing = sum(self.key(run) not in done for run in self.all_runs())
         counts = Counts(self.size, self.size - missing)
         if progress is not None:
             progress(counts)
         if missing == 0:
             return counts
-        job = Job(tuple(self.sources), self.manifest)
-        batches = Batches(self.settings, self.missing(done), batch_seconds or (0.2 if scheduler is None else 0.5))
-        work = partial(run_batch, job)
+        left = (run for run in self.all_runs() if self.key(run) not in done)
+        batches = Batches(left, batch_seconds or (0.2 if scheduler is None else 0.5))
+        work = partial(run_batch, Job(tuple(self.sources), self.manifest))
         results = parallel_map(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
         try:
-            for result in results:
-                new = store.append(result.batch.settings, result.rows)
+            for batch, rows, seconds in results:
+                settings = {one.key: (one.key, one.solver, one.parameters) for one, *_ in batch}
+                new = store.append(settings.values(), rows)
                 counts.new += new
                 # the others were done by another process meanwhile
-                counts.before += len(result.rows) - new
-                counts.solving += sum(result.times())
-                batches.learn(result)
+                counts.before += len(rows) - new
+                counts.solving += sum(row[COLUMNS.index("time")] or 0.0 for row in rows)
+                batches.learn(batch, seconds)
                 if progress is not None:
                     progress(counts)
         except (LimitExceededError, LostError) as error:
@@ -216,14 +212,40 @@ class Study(Shown):
         return counts
 
 
+class Batches:
+    """Runs in batches of about so many seconds; results tell how long runs take."""
+
+    def __init__(self, runs: Iterator[RunNumbers], seconds: float) -> None:
+        self._runs = runs
+        self._seconds = seconds
+        # seconds of a run by the key of its setting, and by its solver
+        self._taken: dict[str, float] = {}
+
+    def __iter__(self) -> Iterator[list[RunNumbers]]:
+        return self
+
+    def __next__(self) -> list[RunNumbers]:
+        batch: list[RunNumbers] = []
+        expected = 0.0
+        while len(batch) < _MOST_RUNS and expected < self._seconds and (run := next(self._runs, None)):
+            batch.append(run)
+            of_solver = self._taken.get(run[0].solver, self._seconds / 8)
+            expected += self._taken.get(run[0].key, of_solver)
+        if not batch:
+            raise StopIteration
+        return batch
+
+    def learn(self, batch: list[RunNumbers], seconds: float) -> None:
+        """Learn from the time that a batch took."""
+        for setting, *_ in batch:
+            self._taken[setting.key] = self._taken[setting.solver] = seconds / len(batch)
+
+
 def _settings(given: Any) -> tuple[Setting, ...]:
     """All settings without duplicates."""
-    if isinstance(given, Setting):
-        return (given,)
-    for setting in given:
-        if not isinstance(setting, Setting):
-            raise InvalidInputError(f"settings: expected settings as from grid, got a {type(setting).__name__}")
-    found = tuple(dict.fromkeys(given))
+    found = tuple(dict.fromkeys([given] if isinstance(given, Setting) else given))
+    if not all(isinstance(setting, Setting) for setting in found):
+        raise InvalidInputError("settings: expected settings as from grid")
     if not found:
         raise InvalidInputError("the design is empty: no settings to run")
     return found

@@ -1,4 +1,4 @@
-"""A study as a table with one row per setting: means with intervals."""
+"""Settings of a study: their means with intervals, and the difference of two, run by run."""
 
 from __future__ import annotations
 
@@ -17,26 +17,11 @@ from assoc.sweeps.frame import RESULTS, load
 if TYPE_CHECKING:
     import pandas as pd
 
-
-INTERVAL = "95 %"
-"""Header of the interval of the measure in the column before."""
-
 MEASURES = ("excess", "gap", "cost", "optimal", "iterations", "time", "correct")
 """Measures that are averaged; "excess" is the cost above the best known, "correct" the share of the true tuples found.
 
 Gaps are not comparable between solvers, whose bounds differ; excesses are.
 """
-
-TITLES = {
-    "excess": "mean excess",
-    "gap": "mean gap",
-    "cost": "mean cost",
-    "optimal": "optimal %",
-    "time": "ms",
-    "correct": "correct %",
-    "score": "PAR10, s",
-}
-"""Headers of the measures, in the units of `FACTORS`."""
 
 FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 """Factors of measures in printed tables: per cent, milliseconds."""
@@ -122,78 +107,73 @@ def numbers(column: pd.Series[Any]) -> Floats:
     return column.to_numpy(dtype=float, na_value=np.nan)
 
 
-def summary_rows(summary: pd.DataFrame, *, brief: bool = False) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells of a summary for display; the columns before "runs" identify the setting.
+@explains_wrong_types
+def compare(study: pd.DataFrame | str | os.PathLike[str], first: str, second: str) -> pd.DataFrame:
+    """Compare two settings of a study by the differences of their runs on the same problems with the same repeats.
 
-    ``brief`` leaves out the intervals of measures that are equal in all runs.
+    Parameters
+    ----------
+    study : DataFrame or path-like
+        Result of `load`, or the folder of the study.
+    first, second : str
+        Solver, or parameters, or both, as far as they name one setting: ``"greedy"``, ``"aco,alpha=1,rho=0.3"``; or
+        the setting's key.
+
+    Returns
+    -------
+    DataFrame
+        One row for each of ``excess``, ``gap``, ``cost``, ``optimal``, ``iterations``, ``time``, ``correct``:
+        ``measure``, the means ``first`` and ``second``, ``difference`` (first less second), its 95 % interval ``low``
+        and ``high`` by the bootstrap over problems and repeats, and ``pairs``. Only runs are counted for which both
+        settings have a value; measures without pairs are left out.
+
+    Raises
+    ------
+    InvalidInputError
+        Words name no setting, or several.
     """
-    parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
-    measures = [name for name in MEASURES if summary[name].notna().any()]
-    infeasible = ["infeasible"] if summary["infeasible"].any() else []
-    headers = ["solver", *map(str, parameters), "runs", *infeasible]
+    frame = load(study) if isinstance(study, (str, os.PathLike)) else study
+    return paired(frame, _key(frame, first), _key(frame, second), MEASURES)
+
+
+def paired(frame: pd.DataFrame, first: str, second: str, measures: Sequence[str]) -> pd.DataFrame:
+    """Do the same for two keys, and for measures or other columns of numbers of the frame."""
+    import pandas as pd
+
+    runs = frame[frame["setting"].isin([first, second])]
+    rows = []
     for name in measures:
-        headers += [TITLES.get(name, name), INTERVAL]
-    cells = []
-    for row in summary.to_dict("records"):
-        line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
-        line += [str(row[name]) for name in infeasible]
-        for name in measures:
-            factor = FACTORS.get(name, 1.0)
-            line.append(number(factor * row[name], name))
-            line.append(interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
-        cells.append(line)
-    if brief:
-        kept = [i for i, header in enumerate(headers) if header != INTERVAL or any(_spread(row, i) for row in cells)]
-        headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
-    return headers, cells
+        pairs = runs.assign(value=measured(runs, name)).pivot_table(
+            index=["scene", "scan", "repeat"], columns="setting", values="value", dropna=False
+        )
+        pairs = pairs.reindex(columns=[first, second]).dropna().reset_index()
+        if len(pairs):
+            one, other = (pairs[key].to_numpy(dtype=float).reshape(len(pairs), -1)[:, 0] for key in (first, second))
+            low, high = mean_interval(by_problem(pairs, one - other))
+            rows.append((name, one.mean(), other.mean(), (one - other).mean(), low, high, len(pairs)))
+    return pd.DataFrame(rows, columns=["measure", "first", "second", "difference", "low", "high", "pairs"])
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, float):
-        return "" if np.isnan(value) else f"{value:.6g}"
-    return "" if value is None else str(value)
+def _key(frame: pd.DataFrame, words: str) -> str:
+    """The key of the one setting that words name."""
+    found = frame.drop_duplicates("setting")
+    for word in filter(None, (part.strip() for part in words.split(","))):
+        name, equals, text = word.partition("=")
+        if not equals:
+            found = found[(found["solver"] == word) | found["setting"].str.startswith(word)]
+        elif (name := name.replace("-", "_")) not in found.columns:
+            raise InvalidInputError(f"{words}: no setting of the study has a parameter {name!r}")
+        else:
+            found = found[[_same(value, text) for value in found[name]]]
+    if len(found) != 1:
+        names = ", ".join(varied(found)) if len(found) else ""
+        expected = f"; they differ in {names}" if names else ""
+        raise InvalidInputError(f"{words}: names {len(found)} settings of the study, expected one{expected}")
+    return str(found["setting"].iloc[0])
 
 
-def comparison_rows(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells of a comparison (`assoc.sweeps.compare`)."""
-    cells = []
-    for row in table.to_dict("records"):
-        name, factor = row["measure"], FACTORS.get(row["measure"], 1.0)
-        means = [number(factor * row[column], name) for column in ("first", "second", "difference")]
-        ends = interval([factor * row["low"], factor * row["high"]], name)
-        cells.append([TITLES.get(name, name), *means, ends, str(row["pairs"])])
-    return ["", "first", "second", "difference", INTERVAL, "pairs"], cells
-
-
-def latex(headers: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    """A table for LaTeX, without a package; text stands left, numbers right."""
-    escapes = {ord(sign): f"\\{sign}" for sign in "&%$#_{}"} | {
-        ord("\\"): r"\textbackslash{}", ord("~"): r"\textasciitilde{}", ord("^"): r"\textasciicircum{}"
-    }  # fmt: skip
-    kinds = "".join("r" if all(_is_numeric(row[i]) for row in cells) else "l" for i in range(len(headers)))
-    lines = [" & ".join(cell.translate(escapes).replace(" .. ", " -- ") for cell in row) for row in (headers, *cells)]
-    body = "".join(f"{line} \\\\\n" for line in lines[1:])
-    return f"\\begin{{tabular}}{{{kinds}}}\n\\hline\n{lines[0]} \\\\\n\\hline\n{body}\\hline\n\\end{{tabular}}\n"
-
-
-def _is_numeric(cell: str) -> bool:
-    return all(part in ("", "-") or part.lstrip("-")[:1].isdigit() for part in cell.split(" .. "))
-
-
-def number(value: float, name: str) -> str:
-    """Return a value of a measure as text."""
-    if np.isnan(value):
-        return "-"
-    if name == "cost":
-        return f"{value:.4f}"
-    return f"{value:.2f}" if name in ("optimal", "correct", "iterations") else f"{value:.3g}"
-
-
-def _spread(row: Sequence[str], column: int) -> bool:
-    """Whether an interval has a width, so that it adds to the value before it."""
-    return row[column] not in ("-", f"{row[column - 1]} .. {row[column - 1]}")
-
-
-def interval(ends: Sequence[float], name: str) -> str:
-    """Return an interval of a measure as text."""
-    return "-" if np.isnan(ends[0]) else f"{number(ends[0], name)} .. {number(ends[1], name)}"
+def _same(value: object, text: str) -> bool:
+    try:
+        return float(text) == float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return str(value).lower() == text.lower() and not (isinstance(value, float) and np.isnan(value))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,15 +20,13 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
-from assoc.solvers import registry
-from assoc.sweeps.comparison import paired
+from assoc.sweeps.design import Space, Values
 from assoc.sweeps.frame import load
-from assoc.sweeps.setting import Setting, parameter
-from assoc.sweeps.sources import StudySource, study_sources
-from assoc.sweeps.space import Range, Space, Values
+from assoc.sweeps.setting import Setting
+from assoc.sweeps.sources import study_sources
 from assoc.sweeps.store import REPORT, Store
 from assoc.sweeps.study import Counts, Study
-from assoc.sweeps.summary import MEASURES
+from assoc.sweeps.summary import MEASURES, paired
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,10 +36,8 @@ TARGETS = ("gap", "time")
 PENALTY = 10.0
 """Factor of the cutoff that a run without optimum counts in "time" (PAR10)."""
 
-_WIDTH = 4.0
 _SCORED = ("cost", "lower_bound", "time")
-# a larger value of these never worsens the gap: they are a budget, not something to tune
-_BUDGETS = ("iterations", "patience", "nodes", "workers")
+_COMPARED = ("score", *MEASURES)
 
 
 @dataclass(frozen=True)
@@ -63,9 +60,9 @@ class Report:
 @explains_wrong_types
 def tune(
     folder: str | os.PathLike[str],
-    sources: Sequence[StudySource],
+    sources: Any,
     solver: str,
-    space: Mapping[str, Space] | None = None,
+    space: Mapping[str, Space],
     trials: int = 100,
     *,
     target: str = "gap",
@@ -88,8 +85,8 @@ def tune(
     folder : path-like
     sources : Scene, AssignmentProblem, or sequence of them
     solver : str
-    space : mapping, optional
-        Values or range of each parameter; by default a quarter of each number's default to four times it.
+    space : mapping
+        Values or range of each parameter.
     trials : int, default 100
         Number of settings to try; the first is the default if the space contains it.
     target : str, default "gap"
@@ -113,63 +110,92 @@ def tune(
     """
     if target not in TARGETS:
         raise InvalidInputError(f"target: expected gap or time, got {target!r}")
-    _require_counts(trials=trials, repeats=repeats)
-    optuna, ranges = load_extra("optuna", "tune"), _ranges(solver, space)
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    for name, count in (("trials", trials), ("repeats", repeats)):
+        if not is_whole(count, 1):
+            raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
     sources = study_sources(sources)
     every = [range(source.num_scans) for source in sources] if scans is None else scans
-    training, test, words = _split([list(numbers) for numbers in every], repeats)
+    training, test, held_out = _split([list(numbers) for numbers in every], repeats)
 
-    def study(settings: Sequence[Setting], held_out: bool = False) -> Study:
-        seeds = range(repeats, 2 * repeats) if held_out else range(repeats)
-        return Study(
-            sources, settings, seeds, seed, time_limit, gating or {}, test if held_out else training, cpu_limit
-        )
+    def study(*settings: Setting, last: bool = False) -> Study:
+        seeds, chosen = (range(repeats, 2 * repeats), test) if last else (range(repeats), training)
+        return Study(sources, settings, seeds, seed, time_limit, gating or {}, chosen, cpu_limit)
 
-    default = _default(solver, ranges)
-    size = study([default]).size * trials + study([default], held_out=True).size * 2
-    with Store(folder, study([default]).manifest) as store:
-        runs = _Runs(store, size, progress, {"jobs": jobs, "scheduler": scheduler})
-        first = runs.of(study([default]))
-        limit = time_limit if time_limit is not None else cpu_limit
-        cutoff = limit if limit is not None else float(np.nanmax(first[2], initial=1e-6))
+    where = {"jobs": jobs, "scheduler": scheduler}
+    return _search(Path(folder), solver, space, trials, target, study, held_out, progress, where)
 
-        def setting(trial: Any) -> Setting:
-            return Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
 
-        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
-        search.enqueue_trial(_point(default, ranges))
-        search.optimize(lambda trial: _score(runs.of(study([setting(trial)])), target, cutoff), n_trials=trials)
-        tuned = setting(search.best_trial)
-        training_scores = _score(first, target, cutoff), float(search.best_value)
-        last = study([default, tuned], held_out=True)
-        runs.of(last)
-    held = _frame(folder, last)
+def _search(
+    folder: Path,
+    solver: str,
+    space: Mapping[str, Space],
+    trials: int,
+    target: str,
+    study: Callable[..., Study],
+    held_out: str,
+    progress: Callable[[Counts], object] | None,
+    where: Mapping[str, Any],
+) -> Report:
+    searched = {name: choice for name, choice in space.items() if not choice.single}
+    if not searched:
+        raise InvalidInputError(f"--tune: nothing to tune for {solver!r}; give ranges in --grid, as in NAME=LOW:HIGH")
+    optuna = load_extra("optuna", "tune")
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    fixed = {name: choice.values[0] for name, choice in space.items() if isinstance(choice, Values) and choice.single}
+    default = Setting(solver, fixed)
+    first = study(default)
+    total = Counts(first.size * trials + study(default, last=True).size * 2, 0)
+    with Store(folder, first.manifest) as store:
+        runs_of = partial(_runs_of, store, total, progress, where)
+        known = runs_of(first)
+        limit = first.time_limit or first.cpu_limit
+        cutoff = limit if limit is not None else float(np.nanmax(known[2], initial=1e-6))
+
+        def setting_of(trial: Any) -> Setting:
+            return Setting(solver, fixed | {name: _suggest(trial, name, choice) for name, choice in searched.items()})
+
+        def score(trial: Any) -> float:
+            return float(scores(*runs_of(study(setting_of(trial))), target, cutoff).mean())
+
+        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=first.seed))
+        usual = default.parameters
+        search.enqueue_trial({name: usual[name] for name, choice in searched.items() if usual[name] in choice})
+        search.optimize(score, n_trials=trials)
+        tuned = setting_of(search.best_trial)
+        last = study(default, tuned, last=True)
+        runs_of(last)
+    held = load(folder)
+    keys, seeds = zip(*((key[0], key[2]) for key in map(last.key, last.all_runs())), strict=True)
+    held = held[held["setting"].isin(keys) & held["repeat"].isin(seeds)]
     cost, bound, time = (held[name].to_numpy(dtype=float) for name in _SCORED)
-    held = held.assign(score=scores(cost, bound, time, target, cutoff))
-    table = paired(held, tuned.key, default.key, ("score", *MEASURES))
-    report = Report(solver, target, trials, tuned, default, training_scores, table, words)
-    _save(Path(folder) / REPORT, report)
+    table = paired(held.assign(score=scores(cost, bound, time, target, cutoff)), tuned.key, default.key, _COMPARED)
+    trained = float(scores(*known, target, cutoff).mean()), float(search.best_value)
+    report = Report(solver, target, trials, tuned, default, trained, table, held_out)
+    _save(folder / REPORT, report)
     return report
 
 
-def _require_counts(**given: object) -> None:
-    for name, count in given.items():
-        if not is_whole(count, 1):
-            raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
+def _runs_of(
+    store: Store,
+    total: Counts,
+    progress: Callable[[Counts], object] | None,
+    where: Mapping[str, Any],
+    study: Study,
+) -> tuple[Floats, Floats, Floats]:
+    """Costs, bounds and times of the runs of a study, done where the folder lacks them."""
+    before = total.before, total.new
 
+    def shown(counts: Counts) -> None:
+        total.before, total.new = before[0] + counts.before, before[1] + counts.new
+        total.total = max(total.total, sum(before) + counts.total)
+        if progress is not None:
+            progress(total)
 
-def _ranges(solver: str, space: Mapping[str, Space] | None) -> dict[str, Space]:
-    ranges = dict(space) if space else default_space(solver)
-    if not any(isinstance(choice, Range) or len(choice.values) > 1 for choice in ranges.values()):
-        raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
-    return ranges
-
-
-def _default(solver: str, ranges: Mapping[str, Space]) -> Setting:
-    """The default setting, but for parameters that have a single value here."""
-    single = {name: choice.values for name, choice in ranges.items() if isinstance(choice, Values)}
-    return Setting(solver, {name: values[0] for name, values in single.items() if len(values) == 1})
+    study.run_in(store, **where, progress=shown)
+    query = f"setting, source, repeat, scan, {', '.join(_SCORED)} FROM runs WHERE setting = ?"
+    known = {row[:4]: row[4:] for one in study.settings for row in store.select(query, (one.key,))}
+    cost, bound, time = np.array([known[study.key(run)] for run in study.all_runs()], dtype=float).T
+    return cost, bound, time
 
 
 def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[list[int]], str]:
@@ -183,108 +209,12 @@ def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[
     return (*parts, f"scans that training did not see, with seeds {repeats} to {2 * repeats - 1}")
 
 
-def default_space(solver: str) -> dict[str, Space]:
-    """Ranges around the defaults of a solver's numbers, within the solver's limits."""
-    found: dict[str, Space] = {}
-    kind: Any = registry.parameters(solver)
-    for item in fields(kind):
-        value: Any = item.default
-        if item.name in _BUDGETS or type(value) not in (int, float) or value <= 0:
-            continue
-        option = parameter(solver, item.name)
-        low = _furthest(solver, item.name, value, value / _WIDTH)
-        high = _furthest(solver, item.name, value, value * _WIDTH)
-        if option.kind is int:
-            low, high = max(1, round(low)), round(high)
-        if low < high:
-            found[item.name] = Range(low, high, logarithmic=True, whole=option.kind is int)
-    return found
-
-
-def _furthest(solver: str, name: str, good: float, wanted: float) -> float:
-    """The value nearest to ``wanted`` that the solver accepts."""
-    whole = isinstance(good, int)
-
-    def taken(value: float) -> bool:
-        try:
-            Setting(solver, {name: round(value) if whole else value})
-        except InvalidInputError:
-            return False
-        return True
-
-    if taken(wanted):
-        return wanted
-    bad = wanted
-    for _ in range(20):
-        middle = (good + bad) / 2
-        good, bad = (middle, bad) if taken(middle) else (good, middle)
-    # four digits, and not beyond the limit
-    rounded = float(f"{good:.4g}")
-    return rounded if taken(rounded) else good
-
-
 def _suggest(trial: Any, name: str, space: Space) -> Any:
     if isinstance(space, Values):
-        return space.values[0] if len(space.values) == 1 else trial.suggest_categorical(name, list(space.values))
+        return trial.suggest_categorical(name, list(space.values))
     if space.whole:
         return trial.suggest_int(name, int(space.low), int(space.high), log=space.logarithmic)
     return trial.suggest_float(name, space.low, space.high, log=space.logarithmic)
-
-
-def _point(default: Setting, space: Mapping[str, Space]) -> dict[str, Any]:
-    """The default values as the first trial, as far as the space contains them."""
-    point = {}
-    for name, choice in space.items():
-        value = default.parameters[name]
-        if isinstance(choice, Range):
-            if choice.low <= value <= choice.high:
-                point[name] = value
-        elif len(choice.values) > 1 and value in choice.values:
-            point[name] = value
-    return point
-
-
-class _Runs:
-    """The runs of studies, done where the folder lacks them: cost, bound and time of each.
-
-    All studies together have about `size` runs; `progress` gets their `Counts` so far, `where` says where runs are
-    done.
-    """
-
-    def __init__(
-        self, store: Store, size: int, progress: Callable[[Counts], object] | None, where: Mapping[str, Any]
-    ) -> None:
-        self._store, self._size, self._progress, self._where = store, size, progress, where
-        self._total = Counts(0, 0)
-
-    def of(self, study: Study) -> tuple[Floats, Floats, Floats]:
-        """Costs, bounds and times of the runs of a study, NaN where there are none."""
-        total, before = self._total, replace(self._total)
-
-        def shown(counts: Counts) -> None:
-            total.total = max(before.done + counts.total, self._size)
-            total.before, total.new = before.before + counts.before, before.new + counts.new
-            if self._progress is not None:
-                self._progress(total)
-
-        study.run_in(self._store, **self._where, progress=shown)
-        query = f"setting, source, repeat, scan, {', '.join(_SCORED)} FROM runs WHERE setting = ?"
-        known = {row[:4]: row[4:] for one in study.settings for row in self._store.select(query, (one.key,))}
-        cost, bound, time = np.array([known[key] for key in study.keys()], dtype=float).T
-        return cost, bound, time
-
-
-def _frame(folder: str | os.PathLike[str], study: Study) -> pd.DataFrame:
-    """The runs of a study as a table."""
-    frame = load(folder)
-    keys = [setting.key for setting in study.settings]
-    return frame[frame["setting"].isin(keys) & frame["repeat"].isin({key[2] for key in study.keys()})].reset_index(
-        drop=True
-    )
-
-
-def _score(runs: tuple[Floats, Floats, Floats], target: str, cutoff: float) -> float:
-    return float(scores(*runs, target, cutoff).mean())
 
 
 def scores(cost: Floats, bound: Floats, time: Floats, target: str, cutoff: float) -> Floats:

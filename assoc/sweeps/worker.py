@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import threading
+import hashlib
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,42 +15,40 @@ import numpy as np
 from assoc._system.compiled import loaded, with_foreign_kernels
 from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import StudySource
-from assoc.sweeps.store import COLUMNS, Manifest
+from assoc.sweeps.store import Manifest
 
 if TYPE_CHECKING:
     from assoc.problem import AssignmentProblem
     from assoc.solution import Solution
 
+RunNumbers = tuple[Setting, int, int, int]
+"""Setting, source by its index, repeat, scan."""
+
 TRACE_POINTS = 16
 _CACHED_TUPLES = 10_000_000
-_WARM_UP_SECONDS = 1.0
 _ATTEMPTS = 4
+# rooms whose code results depend on
+_ROOMS = ("costs", "sensors", "packing", "solvers", "ranking")
 
-Tuples = set[tuple[int, ...]]
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Some runs: setting and source as indices into the batch's settings and the job's sources, repeat, scan."""
-
-    settings: tuple[Setting, ...]
-    runs: list[tuple[int, int, int, int]]
+Known = tuple["AssignmentProblem", set[tuple[int, ...]] | None]
+"""A problem and its true tuples, None if they are unknown."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """The results of a batch: its rows (`store.COLUMNS`), and the seconds that the batch took."""
+@cache
+def code_digest() -> str:
+    """Sixteen hexadecimal digits of the digest of the source files of solvers and costs; empty if there are none.
 
-    batch: Batch
-    rows: list[tuple[Any, ...]]
-    seconds: float
-
-    def times(self) -> list[float]:
-        """Seconds of each run in the solver."""
-        return [row[COLUMNS.index("time")] or 0.0 for row in self.rows]
+    It changes during development, when the version does not.
+    """
+    package = Path(__file__).resolve().parent.parent
+    files = sorted(path for room in _ROOMS for path in (package / room).rglob("*.py"))
+    digest = hashlib.sha256()
+    for path in files:
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(package).as_posix()} {len(content)}\n".encode() + content)
+    return digest.hexdigest()[:16] if files else ""
 
 
 @dataclass(frozen=True)
@@ -59,66 +58,41 @@ class Job:
     sources: tuple[StudySource, ...]
     manifest: Manifest
     """Seed, limits and gating; a worker's version and code of assoc must be those in it."""
-    _problems: OrderedDict[tuple[int, int], tuple[AssignmentProblem, Tuples | None]] = field(
-        default_factory=OrderedDict, compare=False
-    )
-    _held: list[int] = field(default_factory=lambda: [0], compare=False)
-    _warm: set[Any] = field(default_factory=set, compare=False)
-    _busy: Any = field(default_factory=threading.Lock, compare=False)
+    _problems: dict[tuple[int, int], Known] = field(default_factory=dict, compare=False)
 
     def __reduce__(self) -> Any:
-        # without the cache of this process
+        # without the problems of this process
         return Job, (self.sources, self.manifest)
 
-    def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
-        """Return a problem and its true tuples (None if they are unknown); recent ones are cached."""
+    def problem(self, source: int, scan: int) -> Known:
+        """Return a problem and its true tuples; recent ones are kept."""
         key = (source, scan)
-        with self._busy:
-            if key in self._problems:
-                self._problems.move_to_end(key)
-                return self._problems[key]
-        made = self._make(source, scan)
-        with self._busy:
-            if key not in self._problems:
-                self._problems[key] = made
-                self._held[0] += made[0].num_tuples
-            while len(self._problems) > 1 and self._held[0] > _CACHED_TUPLES:
-                self._held[0] -= self._problems.popitem(last=False)[1][0].num_tuples
+        made = self._problems.pop(key, None) or self._make(source, scan)
+        self._problems[key] = made
+        while len(self._problems) > 1 and sum(p.num_tuples for p, _ in [*self._problems.values()]) > _CACHED_TUPLES:
+            self._problems.pop([*self._problems][0], None)
         return made
 
-    def _make(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
+    def _make(self, source: int, scan: int) -> Known:
         from assoc.costs import build_problem
         from assoc.packing.prepare import prepare
         from assoc.problem import AssignmentProblem
 
-        content = self.sources[source].content
+        content, truth = self.sources[source].content, None
         if isinstance(content, AssignmentProblem):
-            prepare(content)
-            return content, None
-        measured = content.scan(scan)
-        problem, truth = build_problem(content, measured, **self.manifest.gating), measured.true_tuples()
+            problem = content
+        else:
+            measured = content.scan(scan)
+            problem, truth = build_problem(content, measured, **self.manifest.gating), measured.true_tuples()
         # runs share the problem: its preparation must not count as time of the first run
         prepare(problem)
         return problem, None if truth is None else {*map(tuple, truth.tolist())}
 
     def seed_of(self, setting: Setting, source: int, repeat: int, scan: int) -> int:
         """Seed of a run; it depends on what is run, not on where or when."""
-        words = (*setting.words, int(self.sources[source].fingerprint[:8], 16), repeat, scan)
-        sequence = np.random.SeedSequence(self.manifest.seed, spawn_key=words)
+        words = (int(setting.key[:8], 16), int(setting.key[8:], 16), int(self.sources[source].fingerprint[:8], 16))
+        sequence = np.random.SeedSequence(self.manifest.seed, spawn_key=(*words, repeat, scan))
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
-
-    def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
-        """Load most of the code that a family of settings needs, on its first problem, for at most a second."""
-        from assoc.solvers.assign import assign
-
-        if setting.family in self._warm:
-            return
-        limit = min(_WARM_UP_SECONDS, self.manifest.time_limit or _WARM_UP_SECONDS)
-        try:
-            assign(problem, setting.solver, time_limit=limit, **setting.parameters)
-        except InfeasibleError:
-            pass
-        self._warm.add(setting.family)
 
     def _stop(self, setting: Setting) -> Callable[[object], bool] | None:
         """What stops a run that has had its processor time: after a point of its trace, about twice a second."""
@@ -132,16 +106,14 @@ class Job:
     def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
         """Solve a problem, with the solver's time alone.
 
-        A run during which code was compiled or loaded, or a module imported, is repeated: warming up on some
-        problems may miss code that a later one needs.
+        A run during which code was compiled or loaded, or a module imported, is repeated.
         """
         from assoc.solvers.assign import assign
 
-        self.warm_up(setting, problem)
+        limit = self.manifest.time_limit
         with with_foreign_kernels():
             for _ in range(_ATTEMPTS):
-                before = loaded()
-                limit, stop = self.manifest.time_limit, self._stop(setting)
+                before, stop = loaded(), self._stop(setting)
                 solution = assign(
                     problem, setting.solver, seed=seed, time_limit=limit, callback=stop, **setting.parameters
                 )
@@ -150,15 +122,18 @@ class Job:
         return solution
 
 
-def run_batch(job: Job, batch: Batch) -> Result:
-    """Do the runs of a batch one after the other; refused by a worker with another version of assoc."""
+def run_batch(job: Job, batch: list[RunNumbers]) -> tuple[list[RunNumbers], list[tuple[Any, ...]], float]:
+    """Do runs one after the other; returns them, their rows (`store.COLUMNS`) and the seconds that all took.
+
+    InvalidInputError: this worker has another version of assoc, or other code.
+    """
     started = time.perf_counter()
     if __version__ != job.manifest.assoc:
         raise InvalidInputError(f"a worker has version {__version__} of assoc, this is {job.manifest.assoc}")
     if code_digest() != job.manifest.code:
         raise InvalidInputError("a worker has other code of assoc than this process, with the same version")
-    rows = [_row(job, batch.settings[run[0]], *run[1:]) for run in batch.runs]
-    return Result(batch, rows, time.perf_counter() - started)
+    rows = [_row(job, *run) for run in batch]
+    return batch, rows, time.perf_counter() - started
 
 
 def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> tuple[Any, ...]:
@@ -172,18 +147,16 @@ def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> tup
         return (*head, None, None, None, None, "infeasible", number, None, b"")
     except InvalidInputError as error:
         raise InvalidInputError(f"{setting.solver} {dict(setting.parameters)}: {error}") from None
-    correct = None if truth is None else len(truth.intersection(map(tuple, solution.tuples.tolist())))
-    bound = solution.lower_bound if np.isfinite(solution.lower_bound) else None
     return (
         *head,
         float(solution.cost),
-        None if bound is None else float(bound),
+        float(solution.lower_bound) if np.isfinite(solution.lower_bound) else None,
         int(solution.iterations),
         round(solution.runtime, 9),
         # nothing else asks a run to stop
         "cpu_limit" if solution.stopped_by == "callback" else solution.stopped_by,
         number,
-        correct,
+        None if truth is None else len(truth.intersection(map(tuple, solution.tuples.tolist()))),
         _thinned(solution),
     )
 

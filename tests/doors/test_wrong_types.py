@@ -95,6 +95,14 @@ def test_one_wrong_argument(name, argument, tmp_path, monkeypatch):
         assert said, (name, argument, value)
 
 
+def test_the_line_names_the_argument():
+    import assoc
+
+    assert complaint(assoc.build_problem, 0, scene()) == "scene: expected Scene, got 0"
+    line = complaint(assoc.Scene, scene().sensors[0], [0.0], [])
+    assert line.startswith("sensors: expected Sequence[Sensor], got Radar3D") and "\n" not in line
+
+
 def test_doors_let_errors_of_other_kinds_through():
     """A mistake in a user's own function is the user's own error."""
     import assoc

@@ -6,9 +6,9 @@ import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.batches import Batches
 from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import Store
+from assoc.sweeps.study import Batches
 
 # many batches, so that there is a middle to interrupt in
 SMALL = {"batch_seconds": 0.04}
@@ -45,12 +45,13 @@ def expected(slow, tmp_path_factory):
 
 def test_batches_take_about_their_time_and_leave_nothing_out(study):
     runs = list(study.all_runs())
-    batches = list(Batches(study.settings, iter(runs), 1.0))
-    found = []
-    for batch in batches:
-        assert len(batch.runs) <= 8
-        found += [(study.settings.index(batch.settings[run[0]]), *run[1:]) for run in batch.runs]
-    assert found == runs
+    batches = Batches(iter(runs), 1.0)
+    first = next(batches)
+    assert len(first) == 8
+    # each took a quarter of the time
+    batches.learn(first, 2.0)
+    rest = [*batches]
+    assert {*map(len, rest)} == {4} and [run for batch in [first, *rest] for run in batch] == runs
 
 
 @pytest.mark.slow

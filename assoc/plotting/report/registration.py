@@ -13,8 +13,7 @@ from assoc._text.html import escape
 from assoc._types import Array
 from assoc.plotting.colours import BLUE, GREY, ORANGE
 from assoc.plotting.report.figures import layout
-from assoc.plotting.report.page import Part, cards, note, settings_part, table, write_page
-from assoc.plotting.report.plotly_script import check_report
+from assoc.plotting.report.page import Part, cards, check_report, note, settings_part, table, write_page
 from assoc.plotting.residuals import residual_columns
 from assoc.registration import Registration
 from assoc.registration.terms import label_of

@@ -15,11 +15,9 @@ from assoc._text.html import escape
 from assoc.plotting.colours import SERIES
 from assoc.plotting.heat_map import LABELS, cells
 from assoc.plotting.report.figures import FAINT, Choices, Dicts, layout, line, menu, plain_numbers, scatter
-from assoc.plotting.report.page import Part, cards, definitions, note, settings_part, table, write_page
-from assoc.plotting.report.plotly_script import check_report
+from assoc.plotting.report.page import Part, cards, check_report, definitions, note, settings_part, table, write_page
 from assoc.plotting.study_figures import setting_title
-from assoc.sweeps.excess import mean_excess, with_excess
-from assoc.sweeps.frame import RESULTS, load, load_traces
+from assoc.sweeps.frame import RESULTS, load, load_traces, mean_excess, with_excess
 from assoc.sweeps.store import Store
 from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 

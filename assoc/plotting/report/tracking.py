@@ -16,9 +16,8 @@ from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.metrics.trajectories import last_at_each_instant
 from assoc.plotting.report.figures import Dicts, over_time
 from assoc.plotting.report.lives import life_table
-from assoc.plotting.report.page import Part, cards, definitions, note, settings_part, write_page
+from assoc.plotting.report.page import Part, cards, check_report, definitions, note, settings_part, write_page
 from assoc.plotting.report.paths import Paths, counts_over_time, paths_of, tracks_figure, truth_of
-from assoc.plotting.report.plotly_script import check_report
 from assoc.scene.scene import Scene
 from assoc.tracking.offline.plots import PlotTracks
 from assoc.tracking.track_table import against_truth

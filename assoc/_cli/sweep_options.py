@@ -9,15 +9,14 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.options import COMMON, Given, Option, Parser, check_scheduler, flag_of, read_config, verbosity
+from assoc._cli.options import COMMON, Given, Option, Parser, check_scheduler, read_config, verbosity
 from assoc._cli.program import command
 from assoc._cli.values import OneOf, Output, html_page, scan_range, seconds, whole
-from assoc._parameters import parameters_of
 from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc.sweeps.space import Space
+    from assoc.sweeps.design import Space
     from assoc.sweeps.study import Study
     from assoc.sweeps.tuning import Report
 
@@ -81,7 +80,6 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
     from assoc.solvers import registry
 
     made = parser()
-    made.elsewhere = lambda: _of_grid(words)
     given = made.read(words)
     if given["tune"] is not None:
         check_extra("optuna", "tune")
@@ -113,16 +111,6 @@ def read_comparison(words: Sequence[str]) -> Given:
     given = made.read(words)
     _check_outputs(given, given["folder"])
     return given
-
-
-def _of_grid(words: Sequence[str]) -> dict[str, str]:
-    """How to give the parameters of solvers, by their flags."""
-    from assoc.solvers import registry
-
-    following = {word: value for word, value in zip(words, words[1:], strict=False) if not value.startswith("-")}
-    names = {parameter.name for name in registry.names() for parameter in parameters_of(registry.parameters(name))}
-    flags = {flag_of(name): name for name in names}
-    return {flag: f"--grid: write --grid {name}={following.get(flag, 'V1,V2')}" for flag, name in flags.items()}
 
 
 def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:

@@ -1,1 +1,0 @@
-"""Parts of `assoc.sweep`: its options, and the tables of a study."""
