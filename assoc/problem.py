@@ -10,6 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
+from assoc._problem_arrays import (
+    MOST_SINGLETON_NUMBERS,
+    all_finite,
+    allowed,
+    check_indices,
+    checked_dummy,
+    costs_alone,
+    entries_of_sparse,
+    frozen,
+    integers,
+    is_whole_matrix,
+    real_numbers,
+    rows_of_frame,
+    warn_of_dummy_cost,
+    with_singletons,
+)
 from assoc._system import memory
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError, LimitExceededError, warn
@@ -21,16 +37,12 @@ FORMAT = "assoc.problem"
 VERSION = 1
 
 _MAX_DENSE_ELEMENTS = 200_000_000
-# a measurement needs a singleton of S indices, a cost and a name: half a gigabyte in all
-_MAX_SINGLETON_NUMBERS = 64_000_000
 _DENSE = (np.ndarray, list, tuple)
 _FROM_DENSE = (
     "AssignmentProblem.from_matrix(costs) takes a matrix as scipy's linear_sum_assignment does, from_matrix(costs, "
     "unassigned=...) with costs of leaving rows and columns unassigned, from_dense(costs) one that has these as row 0 "
     "and column 0"
 )
-# larger sums of costs could overflow in a solver
-_MAX_TOTAL_COST = 1e300
 
 
 @explains_wrong_types
@@ -78,8 +90,8 @@ class AssignmentProblem:
     _listed: tuple[NDArray[np.int32], NDArray[np.float64]] | None
 
     def __init__(self, tuples: ArrayLike, costs: ArrayLike, sizes: ArrayLike, *, dummy: bool = True) -> None:
-        dummy = _checked_dummy(dummy)
-        sizes_ = _integers(sizes, "sizes", 1)
+        dummy = checked_dummy(dummy)
+        sizes_ = integers(sizes, "sizes", 1)
         if sizes_.size == 0:
             raise InvalidInputError("sizes: expected at least one sensor, got none")
         if sizes_.min() < 0:
@@ -87,13 +99,13 @@ class AssignmentProblem:
         total = sum(int(size) for size in sizes_)
         if total > np.iinfo(np.int32).max:
             raise InvalidInputError("sizes: more measurements in total than 32-bit indices can name")
-        if total * (sizes_.size + 2) > _MAX_SINGLETON_NUMBERS:
+        if total * (sizes_.size + 2) > MOST_SINGLETON_NUMBERS:
             raise LimitExceededError(
                 f"sizes: {total} measurements of {sizes_.size} sensors need more memory for their singletons than a "
                 "problem may take; split the problem"
             )
-        tuples_ = _integers(tuples, "tuples", 2)
-        costs_ = _numbers(costs, "costs")
+        tuples_ = integers(tuples, "tuples", 2)
+        costs_ = real_numbers(costs, "costs")
         if tuples_.shape == (0, 0):
             tuples_ = tuples_.reshape(0, sizes_.size)
         if tuples_.shape[1] != sizes_.size:
@@ -106,14 +118,14 @@ class AssignmentProblem:
             f"tuples: {tuples_.shape[0]} of {sizes_.size} sensors",
             "split the problem",
         )
-        alone = _check_indices(tuples_, sizes_, dummy)
-        if not _finite(costs_):
-            keep = _allowed(costs_)
+        alone = check_indices(tuples_, sizes_, dummy)
+        if not all_finite(costs_):
+            keep = allowed(costs_)
             costs_, tuples_, alone = costs_[keep], tuples_[keep], alone[keep]
         if dummy:
-            tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_, alone)
-        self._listed = _frozen(tuples_, np.int32), _frozen(costs_, np.float64)
-        self.sizes = _frozen(sizes_, np.int32)
+            tuples_, costs_ = with_singletons(tuples_, costs_, sizes_, alone)
+        self._listed = frozen(tuples_, np.int32), frozen(costs_, np.float64)
+        self.sizes = frozen(sizes_, np.int32)
         self.dummy = dummy
         self._matrix = None
         self._prepared: Any = None
@@ -183,8 +195,8 @@ class AssignmentProblem:
         AssocWarning
             With ``dummy`` the all-dummy entry is finite and not 0: the tensor may be an axial one.
         """
-        dense, dummy = _numbers(tensor, "tensor"), _checked_dummy(dummy)
-        if not dummy and _is_whole(dense):
+        dense, dummy = real_numbers(tensor, "tensor"), checked_dummy(dummy)
+        if not dummy and is_whole_matrix(dense):
             memory.require(18.0 * dense.size, f"tensor: {dense.size} elements", "list the allowed tuples instead")
             return cls._of_matrix(np.array(dense, order="C"))
         if dense.ndim == 0:
@@ -196,7 +208,7 @@ class AssignmentProblem:
         keep = ~np.isposinf(dense)
         if dummy:
             keep[(0,) * dense.ndim] = False
-            _warn_of_dummy_cost(float(dense[(0,) * dense.ndim]), "tensor")
+            warn_of_dummy_cost(float(dense[(0,) * dense.ndim]), "tensor")
         wrong = keep & ~(dense > -np.inf)
         if wrong.any():
             at = np.unravel_index(np.argmax(wrong), wrong.shape)
@@ -234,21 +246,21 @@ class AssignmentProblem:
         LimitExceededError
             The problem would take more memory than is available.
         """
-        matrix = _numbers(costs, "costs")
+        matrix = real_numbers(costs, "costs")
         if matrix.ndim != 2:
             raise InvalidInputError(f"costs: expected a matrix, got shape {matrix.shape}")
         if unassigned is None:
             return cls.from_dense(matrix, dummy=False)
         dense = np.zeros((matrix.shape[0] + 1, matrix.shape[1] + 1))
         dense[1:, 1:] = matrix
-        dense[1:, 0], dense[0, 1:] = _costs_alone(matrix, unassigned)
+        dense[1:, 0], dense[0, 1:] = costs_alone(matrix, unassigned)
         return cls.from_dense(dense)
 
     @classmethod
     def _of_matrix(cls, matrix: NDArray[np.float64]) -> AssignmentProblem:
-        """The problem of all pairs of two lists: a matrix that `_is_whole`, and that nobody changes."""
+        """The problem of all pairs of two lists: a matrix that `is_whole_matrix`, and that nobody changes."""
         problem = cls.__new__(cls)
-        problem.sizes, problem.dummy = _frozen(np.array(matrix.shape), np.int32), False
+        problem.sizes, problem.dummy = frozen(np.array(matrix.shape), np.int32), False
         problem._matrix, problem._listed, problem._prepared = matrix, None, None
         return problem
 
@@ -261,7 +273,7 @@ class AssignmentProblem:
             tuples = np.empty((rows * columns, 2), dtype=np.int32)
             tuples[:, 0] = np.repeat(np.arange(1, rows + 1), columns)
             tuples[:, 1] = np.tile(np.arange(1, columns + 1), rows)
-            self._listed = _frozen(tuples, np.int32), _frozen(self._matrix.ravel(), np.float64)
+            self._listed = frozen(tuples, np.int32), frozen(self._matrix.ravel(), np.float64)
         return self._listed
 
     @classmethod
@@ -286,21 +298,7 @@ class AssignmentProblem:
         AssocWarning
             As in `from_dense`.
         """
-        entries = array.tocoo(copy=True) if callable(getattr(array, "tocoo", None)) else array
-        if not all(hasattr(entries, name) for name in ("coords", "data", "shape")):
-            raise InvalidInputError(f"array: expected a sparse array (scipy.sparse), got {type(array).__name__}")
-        if hasattr(entries, "sum_duplicates"):
-            entries.sum_duplicates()
-        index = _integers(np.stack([np.asarray(axis) for axis in entries.coords], axis=1), "array: coords", 2)
-        costs = _numbers(entries.data, "array")
-        if dummy and min(entries.shape) == 0:
-            raise InvalidInputError(f"array: each dimension needs its dummy at index 0, got {entries.shape}")
-        keep = index.any(axis=1) if dummy else np.ones(costs.size, dtype=np.bool_)
-        for cost in costs[~keep]:
-            _warn_of_dummy_cost(float(cost), "array")
-        offset = 0 if dummy else 1
-        sizes = [int(n) - (1 - offset) for n in entries.shape]
-        return cls(index[keep].astype(np.int64) + offset, costs[keep], sizes, dummy=dummy)
+        return cls(*entries_of_sparse(array, dummy), dummy=dummy)
 
     @classmethod
     def from_frame(
@@ -325,31 +323,8 @@ class AssignmentProblem:
         InvalidInputError
             The frame is not a table, lacks the column of costs, or a value is not a number.
         """
-        if not hasattr(frame, "columns") or not hasattr(frame, "drop"):
-            raise InvalidInputError(f"frame: expected a pandas DataFrame, got {type(frame).__name__}")
-        if cost not in frame.columns:
-            raise InvalidInputError(f"frame: has no column {cost!r}, only {', '.join(map(str, frame.columns))}")
-        twice = frame.columns[frame.columns.duplicated()]
-        if len(twice):
-            raise InvalidInputError(f"frame: expected columns of different names, got {twice[0]!r} twice")
-        columns = []
-        for name in frame.columns.drop(cost):
-            try:
-                if frame[name].dtype.kind in "mM":
-                    raise TypeError("times are no numbers")
-                numbers = frame[name].to_numpy(dtype=np.float64, na_value=0.0)
-            except (TypeError, ValueError):
-                raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
-            numbers = np.where(np.isnan(numbers), 0.0, numbers)
-            # check the range before the cast
-            if (np.abs(numbers) > np.iinfo(np.int32).max).any() or (numbers != np.round(numbers)).any():
-                raise InvalidInputError(f"frame: column {name!r}: expected whole numbers")
-            columns.append(numbers.astype(np.int64))
-        if not columns:
-            raise InvalidInputError("frame: expected a column for each sensor beside the costs, got none")
-        tuples = np.stack(columns, axis=1)
-        counts = tuples.max(axis=0, initial=0) if sizes is None else sizes
-        return cls(tuples, _numbers(frame[cost].to_numpy(), f"frame: column {cost!r}"), counts, dummy=dummy)
+        tuples, costs = rows_of_frame(frame, cost)
+        return cls(tuples, costs, tuples.max(axis=0, initial=0) if sizes is None else sizes, dummy=dummy)
 
     def to_dense(self) -> NDArray[np.float64]:
         """Return the dense tensor of ``from_dense``; tuples not listed are ``inf``, the all-dummy entry 0.
@@ -425,17 +400,6 @@ class AssignmentProblem:
         InvalidInputError
             The file is missing, damaged, of another format or a later version, or its content is wrong.
         """
-        try:
-            data = cls._read(path)
-            return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(data["dummy"]))
-        except InvalidInputError as error:
-            text = str(error)
-            raise InvalidInputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-
-    @staticmethod
-    def _read(path: str | PathLike[str]) -> dict[str, Any]:
-        if is_text(path):
-            return read_problem_text(path)
         from assoc._files.npz import Field, load_npz
 
         fields = {
@@ -444,7 +408,12 @@ class AssignmentProblem:
             "sizes": Field("int", 1),
             "dummy": Field("bool", 0, required=False),
         }
-        return {"dummy": True, **load_npz(path, FORMAT, VERSION, fields)}
+        try:
+            data = read_problem_text(path) if is_text(path) else load_npz(path, FORMAT, VERSION, fields)
+            return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(data.get("dummy", True)))
+        except InvalidInputError as error:
+            text = str(error)
+            raise InvalidInputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
 def check_problem(problem: object) -> None:
@@ -460,7 +429,7 @@ def check_problem(problem: object) -> None:
 def taken_problem(problem: object) -> AssignmentProblem:
     """A problem as it is, and an array of costs as scipy takes it, with a warning that says so."""
     if isinstance(problem, _DENSE):
-        costs = _numbers(problem, "problem")
+        costs = real_numbers(problem, "problem")
         if costs.ndim < 2:
             found = f"an array of shape {costs.shape}"
             raise InvalidInputError(
@@ -470,153 +439,9 @@ def taken_problem(problem: object) -> AssignmentProblem:
             f"problem: an array of shape {costs.shape} is taken as by scipy's linear_sum_assignment, without dummies; "
             f"{_FROM_DENSE}"
         )
-        if _is_whole(costs):
+        if is_whole_matrix(costs):
             # not copied: it is gone after the call
             return AssignmentProblem._of_matrix(np.require(costs, requirements=["C", "W"]))
         return AssignmentProblem.from_dense(costs, dummy=False)
     check_problem(problem)
     return cast(AssignmentProblem, problem)
-
-
-def _costs_alone(matrix: NDArray[np.float64], unassigned: float | Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
-    """Costs of leaving rows (n,) and columns (m,) unassigned."""
-    single = isinstance(unassigned, (int, float, np.number))
-    both: list[Any] = (
-        [unassigned, unassigned] if single else list(unassigned) if isinstance(unassigned, (list, tuple)) else []
-    )
-    if len(both) != 2:
-        found = f"{len(both)} values" if both else type(unassigned).__name__
-        raise InvalidInputError(f"unassigned: expected a number, or costs of the rows and of the columns, got {found}")
-    alone = []
-    for name, costs, count in zip(("rows", "columns"), both, matrix.shape, strict=True):
-        numbers = _numbers(costs, f"unassigned: {name}")
-        if numbers.shape not in ((), (count,)):
-            raise InvalidInputError(f"unassigned: {name}: expected {count} numbers, got shape {numbers.shape}")
-        if not (numbers > -np.inf).all():
-            raise InvalidInputError(
-                f"unassigned: {name}: expected numbers, got {numbers[~(numbers > -np.inf)].flat[0]}"
-            )
-        alone.append(np.broadcast_to(numbers, (count,)).copy())
-    # to leave one more is dearer than any choice of pairs, but not so dear that costs are lost in rounding
-    finite = np.concatenate([matrix[np.isfinite(matrix)], *(costs[np.isfinite(costs)] for costs in alone)])
-    dear = min(matrix.shape) * float(np.ptp(finite)) + float(np.abs(finite).max()) if finite.size else 0.0
-    return [np.where(np.isposinf(costs), dear or 1.0, costs) for costs in alone]
-
-
-def _checked_dummy(dummy: object) -> bool:
-    if not isinstance(dummy, (bool, np.bool_)):
-        found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
-        raise InvalidInputError(f"dummy: expected True or False, got {found}")
-    return bool(dummy)
-
-
-def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise InvalidInputError(f"{name}: {error}") from None
-    if array.size == 0 and array.dtype.kind == "f":
-        array = array.astype(np.int64)
-    if array.dtype.kind not in "iu" or np.ma.is_masked(values):
-        found = "a masked array" if np.ma.is_masked(values) else array.dtype
-        raise InvalidInputError(f"{name}: expected integers, got {found}")
-    if array.ndim == 1 and ndim == 2 and array.size == 0:
-        array = array.reshape(0, 0)
-    if array.ndim != ndim:
-        raise InvalidInputError(f"{name}: expected {ndim} dimension(s), got shape {array.shape}")
-    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
-        raise InvalidInputError(f"{name}: a value exceeds 64 bits")
-    return array.astype(np.int64, copy=False) if array.dtype != np.int32 else array
-
-
-def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        raise InvalidInputError(f"{name}: expected rows of the same length; inf forbids an entry") from None
-    if array.dtype.kind not in "fiu" and array.size:
-        raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
-    numbers = array.astype(np.float64, copy=False)
-    # masked entries are forbidden
-    return np.where(np.ma.getmaskarray(np.ma.asarray(values)), np.inf, numbers) if np.ma.is_masked(values) else numbers
-
-
-def _is_whole(costs: NDArray[np.float64]) -> bool:
-    """Whether costs are a matrix without forbidden entries, whose sums stay in range."""
-    if costs.ndim != 2 or not costs.size or 4 * sum(costs.shape) > _MAX_SINGLETON_NUMBERS:
-        return False
-    # NaN is not below anything
-    return bool(max(-costs.min(), costs.max()) <= _MAX_TOTAL_COST / costs.size)
-
-
-def _warn_of_dummy_cost(cost: float, name: str) -> None:
-    """Warn of an all-dummy entry that is ignored although it looks like a cost."""
-    if cost != 0.0 and np.isfinite(cost):
-        at = "at index 0 of every dimension, which is the dummy"
-        warn(f"{name}: ignores the cost {cost:g} {at}; without dummies, pass dummy=False")
-
-
-def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> NDArray[np.bool_]:
-    """Refuse indices out of range and the all-dummy tuple; return which tuples are singletons."""
-    if tuples.shape[0] == 0:
-        return np.zeros(0, dtype=np.bool_)
-    # a contiguous array for each sensor: numpy is slow along the short axis of a long array
-    columns = np.ascontiguousarray(tuples.T)
-    low, high = columns.min(axis=1), columns.max(axis=1)
-    least = 0 if dummy else 1
-    wrong = (low < least) | (high > sizes)
-    if wrong.any():
-        sensor = int(np.argmax(wrong))
-        column = columns[sensor]
-        row = int(np.flatnonzero((column < least) | (column > sizes[sensor]))[0])
-        raise InvalidInputError(
-            f"tuples: row {row}, sensor {sensor + 1}: index {column[row]} is outside {least}..{sizes[sensor]}"
-        )
-    found = (columns != 0).sum(axis=0, dtype=np.int16)
-    if dummy and not found.all():
-        row = int(np.argmin(found))
-        raise InvalidInputError(f"tuples: row {row} is the all-dummy tuple: indices count from 1, 0 is the dummy")
-    return found == 1
-
-
-def _finite(costs: NDArray[np.float64]) -> bool:
-    """Whether all costs are finite and their sums stay in range."""
-    with np.errstate(over="ignore"):
-        return not costs.size or float(np.abs(costs).sum()) <= _MAX_TOTAL_COST
-
-
-def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which tuples are allowed (not inf); refuses NaN and -inf."""
-    bad = np.isnan(costs) | np.isneginf(costs)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InvalidInputError(f"costs: row {row} is {costs[row]}; expected a number, or inf for a forbidden tuple")
-    keep: NDArray[np.bool_] = ~np.isposinf(costs)
-    if not _finite(costs[keep]):
-        raise InvalidInputError(
-            f"costs: the sum of magnitudes exceeds {_MAX_TOTAL_COST:.0e}; inf forbids a tuple, or rescale the costs"
-        )
-    return keep
-
-
-def _with_singletons(
-    tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64], alone: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Append the singletons that are not listed, at cost 0; ``alone`` marks the tuples that are singletons."""
-    offsets = np.cumsum(sizes) - sizes
-    present = np.zeros(int(sizes.sum()), dtype=np.bool_)
-    listed = tuples[alone]
-    present[(listed + (offsets - 1))[listed > 0]] = True
-    if present.all():
-        return tuples, costs
-    missing = np.flatnonzero(~present)
-    sensor = np.searchsorted(offsets, missing, side="right") - 1
-    extra = np.zeros((missing.size, sizes.size), dtype=tuples.dtype)
-    extra[np.arange(missing.size), sensor] = missing - offsets[sensor] + 1
-    return np.concatenate([tuples, extra]), np.concatenate([costs, np.zeros(missing.size)])
-
-
-def _frozen(array: NDArray[Any], dtype: type) -> NDArray[Any]:
-    result: NDArray[Any] = np.array(array, dtype=dtype, order="C")
-    result.flags.writeable = False
-    return result

@@ -149,6 +149,29 @@ def link(
     return links
 
 
+def _linked(points: Points, moved: Array, costs: LinkCosts, predict: bool) -> tuple[Array, Solution, LinkCosts]:
+    """The links (K, 2), the solution that they are of, and the costs as far as these are learnt."""
+    estimated = bool(costs.memory and costs.skip is None)
+    pairs = candidates(points, moved, costs.reach, costs.memory)
+    # first how far particles move in a frame, from links of consecutive ones
+    used = pairs.within(1) if estimated else pairs
+    for _ in range(_ROUNDS):
+        problem, relations = lineage_problem(points, used, costs)
+        solution = assign(problem)
+        chosen, before, settled = relations.of(solution), costs, True
+        if not (predict or estimated):
+            break
+        costs, used = learnt(costs, used.of(chosen), points), pairs
+        if predict:
+            faster = velocities(points, chosen, moved)
+            settled = float(np.abs(faster - moved).max(initial=0.0)) <= 0.01 * costs.reach
+            moved = faster
+            used = pairs = candidates(points, moved, costs.reach, costs.memory)
+        if costs.settled(before) and settled:
+            break
+    return chosen, solution, costs
+
+
 def _points(frames: Iterable[object], frame: str, columns: Sequence[str] | None) -> tuple[Points, Array]:
     """All points frame by frame, and the place of each among what was given."""
     if hasattr(frames, "groupby") or hasattr(frames, "groups"):
