@@ -41,8 +41,8 @@ from assoc.solvers import registry
 
 if TYPE_CHECKING:
     from assoc.association.association import Association, Totals
-    from assoc.association.plan import Plan
     from assoc.association.scan import ScanAssociation
+    from assoc.association.solving import ScanOptions
     from assoc.association.source import Source
 
 _EARLY_END = EarlyEnd("assoc.solve")
@@ -98,6 +98,7 @@ def _solve(words: list[str]) -> None:
 
 def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     from assoc.association.association import Totals
+    from assoc.association.solving import associate_scans, gathered
     from assoc.association.source import load_source
 
     files, jobs = given["files"], given["jobs"] or 1
@@ -106,14 +107,16 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     given.check_use(_OPTIONS, input="scenes" if scenes else "problems, which have their tuples already")
     started = time.perf_counter()
     bar = ProgressBar("associating", "scans", shown=not given["quiet"])
-    plan = _plan(sources, solver, parameters, given)
-    items = _items(plan, given)
+    options = _scan_options(solver, parameters, given)
+    items = _items(sources, given)
     if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
     if given["verbose"]:
-        print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
+        print_lines(
+            ", ".join(f"{name} {value}" for name, value in {"solver": solver, **options.all_parameters}.items())
+        )
     names = [files[number] for number, _ in items]
-    progress = with_progress(plan.run(items, jobs, given["scheduler"]), len(items), bar)
+    progress = with_progress(associate_scans(sources, options, items, jobs, given["scheduler"]), len(items), bar)
     totals = Totals()
     scans: list[ScanAssociation] = []
     failed: LostError | LimitExceededError | None = None
@@ -133,13 +136,16 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
         if failed is not None:
             raise failed
         _EARLY_END.say("")
-    found, names = plan.gather(scans), names[: len(scans)]
+    found, names = gathered(scans, options), names[: len(scans)]
     of_items = [sources[number] for number, _ in items[: len(scans)]]
     write_all(
         (given["json"], lambda: _write_json(given["json"], found, names)),
         (given["csv"], lambda: _write_csv(given["csv"], found, names)),
         (given["report"], lambda: _write_report(given, found, of_items, names)),
-        (given["proof"], lambda: _write_proof(given["proof"], plan, found, items)),
+        (
+            given["proof"] if scans else None,
+            lambda: _write_proof(given["proof"], of_items[0], options, found, items[0][1]),
+        ),
         (given, lambda: _print(found, totals, names, elapsed, given["all"])),
     )
     if failed is not None:
@@ -203,11 +209,10 @@ def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) ->
     }
 
 
-def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given: Given) -> Plan:
-    from assoc.association.plan import Plan
+def _scan_options(solver: str, parameters: dict[str, Any], given: Given) -> ScanOptions:
+    from assoc.association.solving import ScanOptions
 
-    return Plan(
-        tuple(sources),
+    return ScanOptions(
         solver,
         parameters=parameters,
         gating=given.some(parameter.name for parameter in _GATING),
@@ -217,9 +222,11 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
     )
 
 
-def _items(plan: Plan, given: Given) -> list[tuple[int, int]]:
+def _items(sources: list[Source], given: Given) -> list[tuple[int, int]]:
     """The selected scans of each file."""
-    items, files, text = plan.items(), given["files"], given["scans"]
+    from assoc.association.solving import all_scans
+
+    items, files, text = all_scans(sources), given["files"], given["scans"]
     if text is None:
         return items
     counts = [sum(number == n for number, _ in items) for n in range(len(files))]
@@ -247,12 +254,12 @@ def _write_report(given: Given, association: Association, sources: list[Source],
     write_association_report(given["report"], association, sources, names, words=given.words)
 
 
-def _write_proof(path: str, plan: Plan, found: Association, items: Sequence[tuple[int, int]]) -> None:
-    if not found.scans:
-        return
+def _write_proof(path: str, source: Source, options: ScanOptions, found: Association, scan: int) -> None:
+    from assoc.costs import build_problem
     from assoc.proofs import write_proof
+    from assoc.scene.scene import Scene
 
-    problem = plan.problem(items[0])
+    problem = build_problem(source, scan, **options.gating) if isinstance(source, Scene) else source
     problem.save(_problem_beside(path))
     write_proof(path, problem, found.scans[0].solution)
 

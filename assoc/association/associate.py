@@ -59,10 +59,11 @@ def associate(
     LimitExceededError
         A scan has too many candidate tuples.
     """
-    from assoc.association.plan import Plan  # loads the compiler, which an Association by itself does not need
+    # loads the compiler, which an Association by itself does not need
+    from assoc.association.solving import ScanOptions, associate_scans, gathered
 
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
     gates = {} if gating is None else gating
-    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, marginals=bool(marginals))
-    return plan.gather(plan.run(plan.items(), jobs))
+    options = ScanOptions(solver, whole_seed(seed), time_limit, parameters, gates, marginals=bool(marginals))
+    return gathered(associate_scans((scene,), options, jobs=jobs), options)

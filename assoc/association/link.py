@@ -124,24 +124,7 @@ def link(
             raise InvalidInputError(f"{name} must be a number >= 0, got {value!r}")
     moved = _velocity(velocity, points.places.shape[1])
     costs = LinkCosts(reach, memory, start, end, skip, divisions, merges)
-    learns = bool(predict or (memory and skip is None))
-    pairs = candidates(points, moved, reach, memory)
-    # first how far particles move in a frame, from links of consecutive ones
-    used = pairs.within(1) if memory and skip is None else pairs
-    for _ in range(_ROUNDS if learns else 1):
-        problem, relations = lineage_problem(points, used, costs)
-        solution = assign(problem)
-        chosen, before = relations.of(solution), costs
-        if not learns:
-            break
-        costs, used = learnt(costs, used.of(chosen), points), pairs
-        if predict:
-            faster = velocities(points, chosen, moved)
-            settled = float(np.abs(faster - moved).max(initial=0.0)) <= 0.01 * reach
-            moved = faster
-            used = pairs = candidates(points, moved, reach, memory)
-        if costs.settled(before) and (not predict or settled):
-            break
+    chosen, solution, costs = _linked(points, moved, costs, predict)
     numbers, lineage = numbered(points, chosen)
     links = Links([numbers[low:high] for low, high in pairwise(points.first)], solution)
     links.particle, links.lineage, links.skip = np.empty_like(numbers), lineage, costs.skip_price

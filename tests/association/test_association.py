@@ -5,7 +5,7 @@ import pytest
 
 import assoc
 from assoc.association import associate
-from assoc.association.plan import Plan
+from assoc.association.solving import ScanOptions, associate_scan, associate_scans, gathered
 from assoc.association.table import to_csv
 from assoc.costs import positions_and_covariances
 from assoc.scene import Scene, Truth
@@ -57,7 +57,7 @@ def test_by_hand(by_hand, solver):
 
 def test_a_single_measurement_is_a_target_only_at_negative_cost():
     problem = assoc.AssignmentProblem([[1, 0], [0, 1]], [-1.0, 0.5], [1, 1])
-    scan = Plan((problem,), "greedy")((0, 0))
+    scan = associate_scan(problem, 0, ScanOptions("greedy"))
     assert scan.targets.tolist() == [[1, 0]]
     assert scan.false_alarms == 1 and scan.positions is None and scan.time is None
 
@@ -124,8 +124,8 @@ def test_positions_at_another_time_follow_the_speed():
 @pytest.mark.parametrize("kbest", [None, 3])
 def test_probabilities_of_targets_are_the_marginals_of_their_tuples(kbest):
     scene = simulate("crowd", 3, targets=8, scans=2, width=900.0, height=700.0, noise=60.0)
-    plan = Plan((scene,), "exact", kbest=kbest, marginals=True)
-    result = plan.gather(plan.run(plan.items()))
+    options = ScanOptions("exact", kbest=kbest, marginals=True)
+    result = gathered(associate_scans((scene,), options), options)
     for k, scan in enumerate(result.scans):
         found = assoc.marginals(assoc.build_problem(scene, k))
         known = dict(zip(map(tuple, found.tuples.tolist()), found.probability.tolist(), strict=True))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import assoc
-from assoc.association.plan import Plan
+from assoc.association.solving import ScanOptions, associate_scans, gathered
 from assoc.plotting.report import write_association_report
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
@@ -111,15 +111,15 @@ def test_problems_and_several_sources(tmp_path, scene, association):
 
 
 def _of_problem(problem):
-    plan = Plan((problem,), "exact")
-    return plan.gather(plan.run(plan.items()))
+    options = ScanOptions("exact")
+    return gathered(associate_scans((problem,), options), options)
 
 
 def test_the_chance_that_a_tuple_is_drawn_is_the_ants_own(tmp_path):
     scene = simulate("bearing-only", 0, targets=12, scans=2)
     parameters = {"mode": "mmas", "iterations": 20, "refinement": "none"}
-    plan = Plan((scene,), "aco", parameters=parameters, pheromone=True)
-    association = plan.gather(plan.run(plan.items()))
+    options = ScanOptions("aco", parameters=parameters, pheromone=True)
+    association = gathered(associate_scans((scene,), options), options)
     write_association_report(tmp_path / "out.html", association, scene)
     figure = figures_of(tmp_path / "out.html")["pheromone-0"]
     for k, one in enumerate(association.scans):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import assoc
-from assoc.association.plan import Plan
+from assoc.association.solving import ScanOptions, associate_scans, gathered
 from assoc.plotting.report import (
     write_association_report,
     write_registration_report,
@@ -41,10 +41,10 @@ def pages(tmp_path_factory):
     association = assoc.associate(scene, "aco")
     write_association_report(folder / "scene.html", association, scene, words=["scene.npz"])
     problem = assoc.AssignmentProblem.from_dense(np.random.default_rng(0).normal(size=(4, 4, 4)), dummy=False)
-    plan = Plan((problem,), "exact")
-    write_association_report(folder / "problem.html", plan.gather(plan.run(plan.items())), problem)
-    plan = Plan((scene,), "aco", parameters={"mode": "mmas", "iterations": 20, "refinement": "none"}, pheromone=True)
-    write_association_report(folder / "ants.html", plan.gather(plan.run(plan.items())), scene)
+    options = ScanOptions("exact")
+    write_association_report(folder / "problem.html", gathered(associate_scans((problem,), options), options), problem)
+    options = ScanOptions("aco", parameters={"mode": "mmas", "iterations": 20, "refinement": "none"}, pheromone=True)
+    write_association_report(folder / "ants.html", gathered(associate_scans((scene,), options), options), scene)
     rows = association.to_frame().rename(columns={"target": "track_id"})
     write_tracking_report(folder / "tracks.html", rows[["track_id", "time", "x", "y", "z"]].dropna(), scene)
     settings = grid("aco", {"alpha": [1, 2], "rho": [0.3, 0.9]})

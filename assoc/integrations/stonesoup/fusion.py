@@ -16,8 +16,8 @@ from stonesoup.reader import Reader
 from stonesoup.types.array import CovarianceMatrix, StateVector
 from stonesoup.types.detection import Detection
 
-from assoc.association.plan import Plan
 from assoc.association.scan import ScanAssociation
+from assoc.association.solving import ScanOptions, associate_scan
 from assoc.integrations.stonesoup.adapted import AdaptedSensor
 from assoc.integrations.stonesoup.frame import Frame, make_frame
 from assoc.integrations.stonesoup.ordering import sorted_detections
@@ -62,7 +62,7 @@ class FusionFeeder(DetectionFeeder):  # type: ignore[misc]
         self._frame = make_frame(self.sensors)
         nothing = [np.zeros((0, sensor.dim)) for sensor in self._frame.sensors]
         self._scene = Scene(self._frame.sensors, np.zeros(1), [nothing], region=region_of(self._frame, self.region))
-        self._plan = Plan((self._scene,), self.solver, self.seed, self.time_limit, self.parameters, self.gating)
+        self._options = ScanOptions(self.solver, self.seed, self.time_limit, self.parameters, self.gating)
 
     @BufferedGenerator.generator_method  # type: ignore[untyped-decorator]
     def data_gen(self) -> Iterator[tuple[datetime, OrderedSet[Detection]]]:
@@ -72,7 +72,7 @@ class FusionFeeder(DetectionFeeder):  # type: ignore[misc]
             zero = zero or time
             parts = self._frame.split(sorted_detections(d for found in sets for d in found))
             scan = Scan(k, (time - zero).total_seconds(), self._frame.measurements(parts))
-            self.association = self._plan.associate(self._scene, scan)
+            self.association = associate_scan(self._scene, scan, self._options)
             yield time, OrderedSet(_fused(self._frame, parts, self.association, time))
 
 
