@@ -25,7 +25,6 @@ from assoc.filters import (
     UnscentedKalmanFilter,
     transition_from_sojourns,
 )
-from assoc.filters.base import predict_each
 from assoc.filters.imm import Mixture, _mixed
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
@@ -242,34 +241,6 @@ def test_the_aircraft_is_the_papers_in_body_axes():
     seen = LinearMeasurement(np.eye(4)[[2]], np.eye(1))
     done = ExtendedKalmanFilter(motion).update(Gaussian(state, np.eye(4)), np.array([[6.0]]), seen)
     assert done.state.mean[0, 2] == pytest.approx(5.5)
-
-
-@pytest.mark.parametrize(
-    "kind",
-    [
-        lambda: ExtendedKalmanFilter(ConstantVelocity(3.0)),
-        lambda: ExtendedKalmanFilter(ConstantAcceleration(2.0, 2)),
-        lambda: ExtendedKalmanFilter(ConstantAcceleration(2.0, kind="continuous")),
-        lambda: UnscentedKalmanFilter(CoordinatedTurn(3.0, 0.1)),
-        lambda: InteractingMultipleModel(
-            [ExtendedKalmanFilter(ConstantVelocity(q, kind="continuous")) for q in (1.0, 30.0)],
-            np.array([[0.9, 0.1], [0.2, 0.8]]),
-            interval=4.0,
-        ),
-    ],
-)
-def test_each_target_moves_by_a_time_of_its_own_as_if_alone(kind):
-    rng = np.random.default_rng(1)
-    own = kind()
-    n = own.motion.dim
-    roots = rng.normal(size=(6, n, n))
-    state = own.start(Gaussian(rng.normal(size=(6, n)), roots @ roots.transpose(0, 2, 1) + np.eye(n)))
-    dt = np.array([0.0, 0.3, 1.7, 0.3, 4.0, 2.5])
-    moved = predict_each(own, state, dt)
-    for row, step in enumerate(dt.tolist()):
-        alone = own.predict(state[row : row + 1], step) if step else state[row : row + 1]
-        np.testing.assert_allclose(moved.mean[row], alone.mean[0], rtol=1e-12)
-        np.testing.assert_allclose(moved.covariance[row], alone.covariance[0], rtol=1e-11, atol=1e-11)
 
 
 class _Alone(ExtendedKalmanFilter):

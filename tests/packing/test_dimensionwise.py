@@ -9,8 +9,7 @@ from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise, sp
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.methods import EXACT_METHODS
-from experiments.common.instances.synthetic import planar_random
-from tests.oracles import brute_force, gated_problem, small_problems
+from tests.oracles import brute_force, small_problems
 from tests.packings import is_cover
 
 
@@ -49,22 +48,6 @@ def test_never_worse_and_feasible_on_every_kind_of_problem():
         improved += change < 0
         assert improve_dimensionwise(packing, cover.owner) == 0.0
     assert improved > 60
-
-
-def test_two_sensors_are_solved_at_once():
-    rng = np.random.default_rng(1)
-    for _ in range(40):
-        problem = gated_problem(rng, (5, 6), 0.5)
-        prepared = prepare(problem)
-        cover = Cover.empty(prepared.packing)
-        improve_dimensionwise(prepared.packing, cover.owner)
-        assert cover.weight + prepared.offset == pytest.approx(brute_force(problem), abs=1e-9)
-    cover = _random_cover(prepare(planar_random(40, 100)).packing, rng)
-    improve_dimensionwise(cover.packing, cover.owner)
-    from scipy.optimize import linear_sum_assignment
-
-    dense = planar_random(40, 100).to_dense()
-    assert cover.weight == pytest.approx(dense[linear_sum_assignment(dense)].sum(), abs=1e-9)
 
 
 def test_splits():

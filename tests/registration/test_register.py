@@ -309,29 +309,6 @@ def test_heading_and_position_of_platforms():
         register(replace(told, sensors=[*told.sensors[:2], replace(aside, platform=ship)]))
 
 
-def test_where_all_is_at_sea_level_heights_take_no_part():
-    """A radar beside positions that ships send: a height would explain each range that is too long."""
-    rng, view = np.random.default_rng(1), [[0.0, 20e3], [-np.pi, np.pi]]
-    radar = Radar2D(
-        position=[0, 0, 0], noise=[40.0, 7e-3], field_of_view=view, detection_probability=0.99, false_alarm_rate=0.1
-    )
-    ais = PositionSensor(
-        name="AIS",
-        position=[0, 0, 0],
-        noise=[10.0, 10.0],
-        field_of_view=[[-15e3, 15e3]] * 2,
-        detection_probability=0.99,
-    )
-    scans = []
-    for _ in range(40):
-        ships = np.linspace([-9e3, -8e3], [8e3, 10e3], 5)
-        plots = np.column_stack([np.hypot(*ships.T) + 50.0, np.arctan2(*ships.T[::-1])])
-        scans.append([plots + rng.normal(size=(5, 2)) * [40.0, 7e-3], ships + rng.normal(size=(5, 2)) * 10.0])
-    region = [[-15e3, 15e3], [-15e3, 15e3], [0.0, 1.0]]
-    found = register(Scene([radar, ais], np.arange(40.0), scans, region), reference=["AIS"])
-    assert found.biases[0] == pytest.approx(50.0, abs=4 * found.deviations[0]) and found.deviations[0] < 6.0
-
-
 @pytest.mark.parametrize("gain", [2e-3, -1e-3])
 def test_gain_of_ranges(gain):
     truth = [{"range": 120.0, "gain": gain}, {"azimuth": 0.002}, {"range": -80.0}]

@@ -81,31 +81,6 @@ def test_windows_and_the_radar_are_recovered(several):
         assert radar_of(recording).noise == pytest.approx([NMI / 12**0.5, math.radians(1440 / 4095) / 12**0.5])
 
 
-PAIRS = {"crossing": (0, 0.1), "head-on": (0, 0.1), "parallel": (5, 5.4)}
-
-
-@pytest.mark.parametrize("traffic", PAIRS)
-def test_pairs(traffic):
-    least, most = PAIRS[traffic]
-    for seed in range(10):
-        one = simulate_recording("rotating-radar", seed, traffic=traffic, detection_probability=0.99)
-        truth = one.truth
-        assert np.unique(truth.ids).tolist() == [0, 1]
-        grid = np.arange(0.0, 1130.0, 0.5)
-        paths = []
-        for k in (0, 1):
-            rows = truth.ids == k
-            axes = [np.interp(grid, truth.times[rows], axis) for axis in truth.positions[rows].T]
-            paths.append(np.column_stack(axes))
-        apart = np.hypot(*(paths[0] - paths[1])[:, :2].T) / NMI
-        assert least - 0.01 <= apart.min() <= most
-        # apart in height by 1,000 feet
-        assert np.abs((paths[0] - paths[1])[:, 2]) == pytest.approx(304.8)
-        if traffic != "parallel":
-            assert abs(grid[np.argmin(apart)] - 565) < 2
-            assert apart[0] > 40
-
-
 @pytest.mark.parametrize(
     ("values", "message"),
     [

@@ -1,14 +1,13 @@
 """Compiling is told apart from solving: in a first process after installation, in a later one, and in none."""
 
 import json
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import assoc
-from assoc._system.compile_time import compile_seconds, loading
+from assoc._system.compile_time import loading
 from assoc.packing.run import Run
 from assoc.simulation import simulate
 from tests.running import printed
@@ -110,18 +109,3 @@ def test_results_report_it_apart(scene):
     assert 0.0 <= scan.solution.compile_time <= scan.compile_time
     assert result.totals()["compile_time"] == scan.compile_time == scan.to_dict()["compile_time"]
     assert assoc.associate(scene, "greedy").totals()["compile_time"] < 1e-3
-
-
-def test_only_the_own_thread_counts():
-    def load():
-        with loading():
-            time.sleep(0.02)
-
-    before = compile_seconds()
-    other = threading.Thread(target=load)
-    other.start()
-    other.join()
-    assert compile_seconds() == before
-    with loading(), loading():
-        time.sleep(0.02)
-    assert 0.02 <= compile_seconds() - before < 5.0

@@ -20,12 +20,6 @@ def tracker_of(sensor, **options):
     return plain.tracker_of(JointProbabilisticTracker, [sensor], **options)
 
 
-def survived(score, seconds):
-    """Logarithm of the odds that a target is there so many seconds later; it stays for 600 s on average."""
-    there = math.exp(-seconds / 600.0) / (1.0 + math.exp(-score))
-    return math.log(there / (1.0 - there))
-
-
 def close_targets(rng, count=3):
     """States of targets side by side, and a scan with one false alarm."""
     mean = np.concatenate([rng.uniform(420, 450, (count, 3)), rng.normal(0, 10, (count, 3))], axis=1)
@@ -124,47 +118,6 @@ def test_intervals_of_few_events_hold(seed):
     assert (found.lower - 1e-12 <= true).all()
     assert (true <= found.upper + 1e-12).all()
     assert (found.upper - found.lower).max() > 1e-3
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_measurements_of_own_times_are_compared_at_these(seed):
-    """One sensor whose plots contend: each track is predicted to each plot's own time."""
-    rng, sensor = np.random.default_rng(seed), plain.sensor()
-    mean, cov, z = close_targets(rng)
-    tracker = tracker_of(sensor, permutations="all")
-    tracker.begin(0.0, Gaussian(mean, np.repeat(cov[None], len(mean), axis=0)), score=SCORE)
-    times = rng.uniform(0.0, 2.0, len(z))
-    # targets leave: the tracks of the step exist a little less likely than before it
-    before = np.full(len(mean), survived(SCORE, 2.0))
-    tracker.step(2.0, [z], [times])
-    P, density = sensor.detection_probability, sensor.false_alarm_rate / sensor.volume
-    p = 1 / (1 + np.exp(-before))
-    plots = list(zip(times, z, strict=True))
-    done = [[plain.correct(*plain.predict(m, cov, t), one, sensor.covariance) for t, one in plots] for m in mean]
-    weight = np.array([[p[t] * P * math.exp(one[2]) / density for one in row] for t, row in enumerate(done)])
-    pair, total = np.zeros_like(weight), 0.0
-    for way in itertools.product(range(-1, len(z)), repeat=len(mean)):
-        used = [w for w in way if w >= 0]
-        if len(used) == len(set(used)):
-            one = math.prod(weight[t, w] if w >= 0 else 1 - p[t] * P for t, w in enumerate(way))
-            total += one
-            for t, w in enumerate(way):
-                if w >= 0:
-                    pair[t, w] += one
-    pair /= total
-    (found,) = tracker.probabilities
-    true = pair[found.track_id - 1, found.measurement]
-    np.testing.assert_allclose(found.probability, true, atol=1e-9)
-    left = (1 - pair.sum(axis=1)) * p * (1 - P) / (1 - p * P)
-    tracks = {track.track_id: track for track in tracker.tracks}
-    for t in range(len(mean)):
-        parts = [(left[t], *plain.predict(mean[t], cov, 2.0))]
-        parts += [(pair[t, m], *plain.predict(*done[t][m][:2], 2.0 - times[m])) for m in range(len(z))]
-        exists = sum(w for w, _, _ in parts)
-        middle = sum(w * x for w, x, _ in parts) / exists
-        # parts with a share below 1e-5 are dropped
-        np.testing.assert_allclose(tracks[t + 1].mean, middle, rtol=1e-4, atol=1e-3)
-        assert tracks[t + 1].score == pytest.approx(math.log(exists / (1 - exists)) + SCORE - before[t], abs=1e-5)
 
 
 def test_models_are_merged_each_by_itself():

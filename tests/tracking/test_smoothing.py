@@ -1,15 +1,11 @@
 """Smoothed tracks against one large linear system, and against the truth."""
 
-from types import SimpleNamespace
-
 import numpy as np
-import pandas as pd
 import pytest
 
 from assoc import filters
 from assoc.scene import Scene
 from assoc.tracking import Decision, MultiSensorTracker, smoothed
-from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from tests.tracking import plain
 
 
@@ -59,22 +55,3 @@ def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements(own_times
     assert frame["time"].tolist() == times.tolist()
     assert frame["hits"].tolist() == [1, 2, 2, 3, 4]
     assert frame["last_detection"].tolist() == [0.0, 1.0, 1.0, 3.0, 5.0]
-
-
-def test_ended_tracks_wait_for_late_decisions():
-    """Two targets, one after the other; decisions come three windows late, and it is asked after each window."""
-    times, path = np.arange(12.0), [np.array([[300.0 + 20.0 * k, 400.0, 200.0]]) for k in range(12)]
-    stamps = [[np.array([time])] for time in times]
-    scene = Scene([plain.sensor()], times, [[z] for z in path], plain.REGION, measurement_times=stamps)
-    tracker = MultiSensorTracker.for_scene(scene)
-    decisions = [Decision(k, times[k], (np.array([1 + k // 6]),), (np.array([True]),)) for k in range(12)]
-    smoothing, found = EndedSmoothing(tracker), []
-    for k in range(12):
-        step = SimpleNamespace(
-            time=times[k], final=decisions[8:] if k == 11 else decisions[max(k - 3, 0) : max(k - 2, 0)]
-        )
-        smoothing.take(step, [path[k]], stamps[k], {})
-        found.append(smoothing.end({1} if k < 5 else {2} - {k // 11 * 2}).to_frame())
-    assert [len(frame) for frame in found] == [0] * 8 + [6, 0, 0, 6]
-    whole = smoothed(tracker, scene, decisions, altitudes={}).to_frame()
-    assert pd.concat(found, ignore_index=True).equals(whole)
