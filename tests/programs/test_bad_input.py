@@ -85,7 +85,7 @@ def test_bad_scenes(run, tmp_path, scene_fields, case):
         (["s.npz", "--json", "no/such/o.json"], "does not exist"),
         (["s.npz", "--json", "s.npz"], "s.npz: is given twice, or would overwrite an input file"),
         (["s.npz", "none.npz"], "none.npz: no such file"),
-        (["s.npz", "--config", "s.npz"], "s.npz: is not a TOML file"),
+        (["s.npz", "--config", "broken.toml"], "broken.toml: is not a TOML file"),
         (["s.npz", "--config", "unknown.toml"], "unknown.toml: colour: unknown key"),
         (["s.npz", "--config", "type.toml"], "seed: expected a whole number >= 0, got 'four'"),
         (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
@@ -95,6 +95,7 @@ def test_bad_scenes(run, tmp_path, scene_fields, case):
 def test_bad_options(run, tmp_path, scene_fields, words, message):
     np.savez(tmp_path / "s.npz", **scene_fields)
     (tmp_path / "unknown.toml").write_text('colour = "red"\n')
+    (tmp_path / "broken.toml").write_text("colour =\n")
     (tmp_path / "type.toml").write_text('seed = "four"\n')
     (tmp_path / "ants.toml").write_text('solver = "aco"\n[aco]\nants = "many"\n')
     (tmp_path / "solver.toml").write_text("[bees]\nants = 3\n")
