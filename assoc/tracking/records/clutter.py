@@ -155,16 +155,18 @@ def _densities(
     nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
     others = np.cumsum(nearer >= _TARGETS, axis=1)
     last = np.argmax(others == _OTHERS, axis=1)
-    radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
     within = np.arange(near.shape[1]) <= last[:, None]
     hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
+    often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
+    dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
+    radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
     # the volume of an ellipsoid as they lie: many places are flat
     off = places[near] - at[dense, None]
-    off -= np.array(around)[:d] * np.rint(off / np.where(np.array(around)[:d] > 0.0, around[:d], np.inf))
+    period = np.array(around)[:d]
+    off -= period * np.rint(off / np.where(period > 0.0, period, np.inf))
     spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
     size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
     ratio = (last + 1) / (size * usual)
-    found = (others[:, -1] >= _OTHERS) & (ratio > least) & (hits >= _NEEDED[before])
-    result[dense] = np.where(found, np.log(np.maximum(ratio, 1.0)), 0.0)
+    result[dense] = np.where(ratio > least, np.log(np.maximum(ratio, 1.0)), 0.0)
     used[dense] = (votes[near].mean(axis=1) > 0.0) & (before >= YOUNG)
     return np.where(used, result, 0.0), result
