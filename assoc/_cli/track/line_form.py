@@ -24,6 +24,7 @@ SENSOR = ("sensor", "radar", "source", "station")
 """What the column of sensors is called."""
 ADDRESS = ("address", "icao_address", "icao", "icao24", "mode_s", "address_hex", "mmsi")
 """What the column of addresses is called."""
+_TIME = tuple(map(plain_name, COLUMNS["time"]))
 
 
 class LineForm:
@@ -56,12 +57,12 @@ class LineForm:
         if any(_is_number(cell) for cell in cells):
             return False
         names = [plain_name(cell) for cell in cells]
-        if not {*names} & {*SENSOR, *COLUMNS["time"]}:
+        if not {*names} & {*SENSOR, *_TIME}:
             return False
         self._header, self._wrong = names, ""
         if not {*names} & {*SENSOR} and len(self.scene.sensors) > 1:
             self._wrong = f"the header has no column {' or '.join(SENSOR[:2])}"
-        elif not {*names} & {*COLUMNS["time"]}:
+        elif not {*names} & {*_TIME}:
             self._wrong = "the header has no column time"
         if self._wrong:
             raise InvalidInputError(self._wrong)
@@ -76,8 +77,8 @@ class LineForm:
         if len(cells) > len(self._header):
             raise ValueError(f"{len(cells)} values, the header has {len(self._header)} columns")
         found: dict[str, Any] = dict(zip(self._header, cells, strict=False))
-        for name, usual in (("sensor", SENSOR), ("address", ADDRESS), ("time", COLUMNS["time"])):
-            own = next((other for other in usual if other in found), None)
+        for name, usual in (("sensor", SENSOR), ("address", ADDRESS), ("time", _TIME)):
+            own = next((other for other in map(plain_name, usual) if other in found), None)
             if own is not None:
                 found[name] = found[own]
         found.setdefault("sensor", "1")
@@ -163,7 +164,8 @@ def _columns(names: Sequence[str]) -> tuple[dict[str, int], dict[str, str]] | No
     except InvalidInputError:
         return None
     is_plain = plain[columns["bearing"]] == "azimuth" and plain[columns["range"]] == "range"
-    return None if is_plain else (columns, units)
+    usual = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
+    return None if is_plain else (columns, usual | units)
 
 
 def _is_number(text: str) -> bool:
