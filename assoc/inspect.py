@@ -39,6 +39,11 @@ def _inspect(words: list[str]) -> None:
     given = parser().read(words)
     given.check_outputs([given["file"]])
     with messages(given):
+        if not given["file"].lower().endswith(".toml"):
+            raise InvalidInputError(
+                f"{given['file']}: expected a description of radars (radars.toml); plots and scenes are tracked by "
+                "'assoc track', which says what their file holds"
+            )
         found = read_radars(given["file"])
         for line in _lines(found):
             print_lines(line)

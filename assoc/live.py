@@ -46,11 +46,13 @@ def _live(words: list[str]) -> None:
 
     scene, form = _scene(given, settings)
     going_on = given["state"] is not None and os.path.exists(given["state"])
-    _check_output(given["output"], header_of(scene.origin), going_on)
+    whole = _check_output(given["output"], header_of(scene.origin), going_on)
     with announcement.silenced() if given["quiet"] else nullcontext():
         tracker = _tracker(scene, given, settings)
     if going_on:
         tracker.restore(given["state"])
+        if whole is not None:
+            os.truncate(given["output"], whole)
         _say(given, f"goes on from {given['state']}, which ends at {moment(tracker.state.newest)}")
     state = _StateFile(given["state"], tracker)
     page = _page(scene, given, heights=len(tracker.positions) > 2)
@@ -140,19 +142,19 @@ class _StateFile:
         self._due, self._ids = time.monotonic() + _EVERY, next_id + reserve
 
 
-def _check_output(path: str | None, header: str, going_on: bool) -> None:
-    """Refuse an output other than tracks to go on with; cut off a line that a crash left unfinished."""
+def _check_output(path: str | None, header: str, going_on: bool) -> int | None:
+    """Refuse an output other than tracks to go on with; its bytes without a line that a crash left unfinished."""
     if path in (None, STDOUT) or is_stream(path) or not os.path.exists(path) or not os.path.getsize(path):
-        return
+        return None
     if not going_on:
         raise InvalidInputError(f"{path}: is there already; expected a new name, or --state to go on with its tracks")
-    with open(path, "rb+") as file:
+    with open(path, "rb") as file:
         if file.readline().decode("utf-8", "replace").strip() != header:
             raise InvalidInputError(f"{path}: holds other columns than those of these tracks; expected a new name")
         end = file.seek(0, os.SEEK_END)
         file.seek(max(0, end - _LONGEST))
         tail = file.read()
-        file.truncate(end - len(tail) + tail.rfind(b"\n") + 1)
+    return end - len(tail) + tail.rfind(b"\n") + 1
 
 
 def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracker:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -34,6 +35,9 @@ class Program:
     def start(self, arguments: Sequence[str] | None = None) -> int:
         """Run the program as the whole process; returns its exit code."""
         prepare_streams()
+        if not sys.warnoptions:
+            # of numpy, on infinities and the like: what matters is told by lines of our own
+            warnings.simplefilter("ignore", RuntimeWarning)
         self.listen()
         code = self.main(arguments)
         if code == INTERRUPTED or (self.interruption is not None and self.interruption.code):

@@ -14,7 +14,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from assoc._files.output import write_atomically
-from assoc._files.reading import check_unpacked, expands, open_member
+from assoc._files.reading import check_unpacked, expands, open_member, refuse_pipe
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 
@@ -81,6 +81,7 @@ def load_npz(
     `fields` are ignored, and optional ones that are missing are missing in the result.
     """
     file = Path(path)
+    refuse_pipe(file)
     try:
         if file.is_dir():
             raise InvalidInputError(f"{file}: is a folder, expected a file of format {format_name!r}")

@@ -6,6 +6,7 @@ import os
 
 from assoc._files.npz import format_of
 from assoc._files.problem_text import is_text
+from assoc._files.reading import refuse_pipe
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
@@ -40,6 +41,12 @@ def load_source(path: str) -> Source:
     """Load a scene or a problem from a file; see `load`."""
     if is_text(path):
         return AssignmentProblem.load(path)
+    refuse_pipe(path)
+    if path.lower().endswith(".toml"):
+        raise InvalidInputError(
+            f"{path}: is a description, expected a scene or problem (.npz); that of radars is looked at by "
+            "'assoc inspect' and tracked by 'assoc track', settings come with --config"
+        )
     found = format_of(path)
     if found is None and _is_table(path):
         raise InvalidInputError(

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc import inspect
 from assoc._cli.program import run_program
+from assoc.errors import InvalidInputError
+from assoc.recordings import read_plots
+from assoc.recordings.flights.reports import read_flight_reports
+from assoc.scene import Scene
 from assoc.simulation import simulate
 from assoc.solve import main
 
@@ -107,6 +112,25 @@ def test_bad_options(run, tmp_path, scene_fields, words, message):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("name", ["plots.csv", "link.csv", "plots.parquet", "scene.npz"])
+def test_a_pipe_that_nobody_may_write_to_is_no_file(name, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / name).symlink_to("pipe")
+    for read in (read_plots, lambda path: read_flight_reports(str(path), {}), assoc.load, Scene.load):
+        with pytest.raises(InvalidInputError, match=f"{name}: is a named pipe, expected a file"):
+            read(tmp_path / name)
+
+
+def test_the_right_program_is_named(tmp_path, capsys):
+    (tmp_path / "plots.csv").write_text("time,range,bearing\n1,2,3\n")
+    (tmp_path / "radars.toml").write_text("[[radar]]\n")
+    assert inspect.main([str(tmp_path / "plots.csv")]) == main([str(tmp_path / "radars.toml")]) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert "plots and scenes are tracked by 'assoc track'" in first
+    assert "looked at by 'assoc inspect' and tracked by 'assoc track'" in second
+
+
 def test_limits_and_infeasible_problems_leave_with_3(run, tmp_path, scene_fields):
     np.savez(tmp_path / "s.npz", **scene_fields)
     assoc.AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False).save(tmp_path / "p.npz")

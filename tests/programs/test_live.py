@@ -224,3 +224,14 @@ def test_a_killed_run_goes_on(scene_file, tmp_path):
         early.sort_values(["time", "track_id"]).reset_index(drop=True),
     )
     assert len(found) == len(expected)
+
+
+def test_a_state_that_is_refused_leaves_the_tracks_as_they_were(scene_file, tmp_path, capsys):
+    from assoc._cli.track.plot_lines import header_of
+
+    tracks, state = tmp_path / "tracks.csv", tmp_path / "live.npz"
+    tracks.write_text(header_of(Scene.load(scene_file).origin) + "\n7,1.5,")
+    state.write_bytes(b"junk")
+    words = [str(scene_file), "--turns", "4,5,5.5", "--replay", "0", "-q", "-o", str(tracks), "--state", str(state)]
+    assert live.main(words) == 2
+    assert "live.npz: is not a readable npz file" in capsys.readouterr().err and tracks.read_text().endswith("7,1.5,")

@@ -1,5 +1,6 @@
 """Recorded trajectories: the geometry against independent formulas, resampling, bad files."""
 
+import gzip
 import math
 
 import numpy as np
@@ -123,3 +124,13 @@ def test_speeds_in_knots(tmp_path):
     assert any(np.abs(a - b).max(initial=0.0) > 1.0 for a, b in pairs)
     with pytest.raises(InvalidInputError, match="speed_unit: expected 'm/s' or 'kt'"):
         simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), speed_unit="mph")
+
+
+def test_reports_as_people_have_them(tmp_path):
+    """Names of columns in any spelling, packed, blanks, and a place that cannot be, which is left out and counted."""
+    rows = ["Time,ICAO24,LAT,Lon,Geo Altitude", "0,a,47,8,3000", "10,a,947,8,3000", "20,a,NULL,8,3000", "30,a,47.1,8,-"]
+    (tmp_path / "t.bin").write_bytes(gzip.compress("\n".join([*rows, "40,a,47.2,8,3000"]).encode()))
+    reports, _, notes = read_flight_reports(str(tmp_path / "t.bin"), {})
+    assert reports.time.tolist() == [0, 40]
+    assert notes["rows left out whose time or position cannot be"] == 1
+    assert notes["rows left out, without altitude"] == 1

@@ -8,15 +8,15 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.reading import check_unpacked, open_input, refuse_pipe
+from assoc._files.reading import check_unpacked, kind_of, open_input, refuse_pipe
 from assoc._system.imports import check_extra
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError, warn
+from assoc.recordings.columns import BLANKS, plain_name
 from assoc.recordings.reading import MOST_PLOTS
 
 if TYPE_CHECKING:
@@ -42,8 +42,6 @@ SPEED_UNITS = {"m/s": (1.0, 1.0), "kt": (1852.0 / 3600.0, 0.3048 / 60.0)}
 
 HIGH = 18_000.0
 """Metres. Aircraft seldom fly higher: if a tenth of all reports does, feet were probably taken for metres."""
-
-_MISSING = ["", "nan", "NaN", "-nan", "-NaN", "NA", "<NA>", "#N/A", "N/A", "n/a", "null", "NULL", "None"]
 
 # bytes in which the names of the columns are
 _START = 1_000_000
@@ -106,14 +104,17 @@ def read_flight_reports(
     known = known_id & placed & high
     if not known.any():
         raise InvalidInputError(f"{path}: no row has a time, an identity and a position")
+    rows = known
     for meaning, limit in _LIMITS.items():
         wrong = known & (np.abs(columns[meaning]) > limit)
-        if wrong.any():
+        known = known & ~wrong
+        if not known.any():
             row = int(np.argmax(wrong))
             raise InvalidInputError(
                 f"{_cell(path, row, chosen[meaning])}: "
                 f"expected at most {limit:g} in size, got {columns[meaning][row]:g}"
             )
+    impossible = int(rows.sum() - known.sum())
     # without missing ones: beside these pandas cuts texts to their first letter
     target, ids = pd.factorize(identity[known].astype(str), sort=True)
     time, lat, lon, height = (columns[meaning][known] for meaning in ("time", "latitude", "longitude", "altitude"))
@@ -134,6 +135,7 @@ def read_flight_reports(
         "rows left out, without time, latitude or longitude": int((~placed).sum()),
         "rows left out, without identity": int((placed & ~known_id).sum()),
         "rows left out, without altitude": int((placed & known_id & ~high).sum()),
+        "rows left out whose time or position cannot be": impossible,
         "rows left out, second report of an aircraft at one instant": int((~first).sum()),
     }
     calls = table[chosen["name"]][known] if "name" in chosen else None
@@ -144,7 +146,7 @@ def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, di
     import pandas as pd
 
     refuse_pipe(path)
-    parquet = _is_parquet(path)
+    parquet = kind_of(path) == "parquet"
     if parquet:
         check_extra("pyarrow", "parquet")
     try:
@@ -158,7 +160,7 @@ def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, di
             chosen = choose_columns(path, list(pd.read_csv(io.BytesIO(start), nrows=0).columns), named)
             # nan and null are missing numbers, but valid names
             texts: Any = {chosen[meaning]: str for meaning in ("id", "name") if meaning in chosen}
-            missing = {column: [""] if column in texts else _MISSING for column in chosen.values()}
+            missing = {column: [""] if column in texts else list(BLANKS) for column in chosen.values()}
             with open_input(path) as file:
                 table = pd.read_csv(
                     file,
@@ -179,10 +181,6 @@ def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, di
     if len(table) > MOST_PLOTS:
         raise LimitExceededError(f"{path}: more than {MOST_PLOTS} rows; split the file")
     return table, chosen
-
-
-def _is_parquet(path: str) -> bool:
-    return Path(path).suffix.lower() in (".parquet", ".pq")
 
 
 def _read_parquet(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, dict[str, str]]:
@@ -218,20 +216,25 @@ def _read_parquet(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFr
 
 
 def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]) -> dict[str, str]:
-    """Return the column of each meaning; a name may be missing, any other is refused, as one with two meanings."""
+    """Return the column of each meaning; a name may be missing, any other is refused, as one with two meanings.
+
+    Upper case, spaces and other signs make no difference.
+    """
     chosen: dict[str, str] = {}
+    known = {plain_name(str(name)): str(name) for name in header[::-1]}
     for meaning, usual in COLUMNS.items():
         wanted = named.get(meaning)
         candidates = usual if wanted is None else (wanted,)
-        found = next((name for name in candidates if name in header), None)
+        found = next((known[plain_name(name)] for name in candidates if plain_name(name) in known), None)
         if found is None and (meaning != "name" or wanted is not None):
             have = ", ".join(str(column)[:30] for column in header[:12])
             raise InvalidInputError(f"{path}: no column {' or '.join(candidates)} for the {meaning}; it has: {have}")
         if found is not None:
-            chosen[meaning] = str(found)
+            chosen[meaning] = found
     for meaning, usual_name in MOTION.items():
-        if usual_name in header and usual_name not in chosen.values():
-            chosen[meaning] = usual_name
+        found = known.get(plain_name(usual_name))
+        if found is not None and found not in chosen.values():
+            chosen[meaning] = found
     if len(set(chosen.values())) < len(chosen):
         raise InvalidInputError(f"{path}: the columns must be different, got {', '.join(chosen.values())}")
     return chosen
@@ -254,7 +257,7 @@ def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Arra
 
 
 def _cell(path: str, row: int, column: str) -> str:
-    if _is_parquet(path):
+    if kind_of(path) == "parquet":
         return f"{path}: row {row}, column {column!r}"
     with open_input(path) as file:
         # empty lines are not rows
