@@ -27,7 +27,7 @@ class Trap:
 
 
 def spoil(rng: np.random.Generator, content: bytes, kind: str) -> bytes:
-    """Return a spoiled copy of a file's content; ``kind`` is "npz", "text" or "sqlite"."""
+    """Return a spoiled copy of a file's content; ``kind`` is "npz", "text", "sqlite" or "bytes"."""
     draw = rng.random()
     if draw < 0.05:
         return rng.bytes(int(rng.integers(0, 3000)))

@@ -19,7 +19,7 @@ class Room:
     ----------
     name : str
     kind : str
-        How it is spoiled: "npz", "text" or "sqlite".
+        How it is spoiled: "npz", "text", "sqlite" or "bytes".
     make : callable
         Writes valid files into a folder; returns those to be spoiled.
     read : callable
@@ -63,6 +63,22 @@ def _plots(folder: Path) -> list[Path]:
     rows += [f"12:{t:02d}:0{t % 10},{20 + t},{(t * 37) % 360},{1200 + t},{300 + t}" for t in range(30)]
     (folder / "plots.csv").write_text("\n".join(rows) + "\n")
     return [folder / "plots.csv"]
+
+
+def _asterix(folder: Path) -> list[Path]:
+    """Plots of two radars in blocks, and the same in the packets of a capture."""
+    from assoc.integrations.asterix import write_plots
+    from assoc.simulation import simulate_recording
+    from tests.integrations.captures import ipv4, pcap, udp
+
+    recording = simulate_recording("rotating-radar", 1, duration=30.0).recording
+    blocks = []
+    for radar in (1, 2):
+        write_plots(folder / "plots.ast", recording, (1, radar))
+        blocks.append((folder / "plots.ast").read_bytes())
+    (folder / "plots.ast").write_bytes(b"".join(blocks))
+    (folder / "plots.pcap").write_bytes(pcap([ipv4(udp(block)) for block in blocks], 101))
+    return [folder / "plots.ast", folder / "plots.pcap"]
 
 
 def _solver_config(folder: Path) -> list[Path]:
@@ -119,6 +135,13 @@ def _use_plots(path: Path) -> None:
     read_plots(path)
 
 
+def _use_asterix(path: Path) -> None:
+    from assoc.integrations.asterix import read_asterix, read_records
+
+    read_records(path)
+    read_asterix(path)
+
+
 def _refused_in_one_line(main: Callable[[list[str]], int], words: list[str]) -> None:
     """Run a program that has nothing to work on: it reads its configuration and complains, and nothing else happens."""
     with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
@@ -150,6 +173,7 @@ ROOMS = [
     Room("problem.npz", "npz", _problems, _use_problem),
     Room("tracks.csv", "text", _tracks, _use_tracks),
     Room("plots.csv", "text", _plots, _use_plots),
+    Room("plots.ast", "bytes", _asterix, _use_asterix),
     Room("solve.toml", "text", _solver_config, _use_solver_config),
     Room("design.toml", "text", _design, _use_design),
     Room("study", "sqlite", _study, _use_study),
