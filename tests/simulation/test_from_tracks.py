@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError
+from assoc.recordings.flights.reports import read_flight_reports
 from assoc.scene.geodesy import earth_centered, east_north_up
 from assoc.simulation import simulate
 
