@@ -26,7 +26,7 @@ _STRAY = 0.1
 # share of targets that keep the range or the azimuth of a certain other one
 _STATION = 0.003
 # before any was seen: echoes, and targets
-_BEFORE = (0.03, 20.0)
+_BEFORE = (0.02, 20.0)
 # standard deviations by which more must be seen than chance brings
 _SURELY = 2.0
 
@@ -81,8 +81,8 @@ class Echoes(NamedTuple):
         P = np.clip(detection_probability, 0.05, 0.95)
         echo = betaln(_ECHO[0] + hits, _ECHO[1] + misses) - betaln(*_ECHO)
         target = betaln(_LOOKS * P + hits, _LOOKS * (1.0 - P) + misses) - betaln(_LOOKS * P, _LOOKS * (1.0 - P))
-        # what was hidden may have been targets, as long as no short tracks tell of echoes
-        known = np.where(self.seen > 0.0, self.seen + self.found, 0.0)[tuple(self.kinds.T)]
+        # one that was hidden may have been a target
+        known = (self.seen + np.maximum(self.found - 1.0, 0.0))[tuple(self.kinds.T)]
         prior = np.log((_BEFORE[0] + known) / (_BEFORE[1] + self.targets))
         # a target that is there by chance stays the more seldom the longer; one that keeps station does as an echo does
         tied = -np.log(_STATION + chance / np.maximum(hits, 1.0)) - 0.5 * np.maximum(square - hits, 0.0)
