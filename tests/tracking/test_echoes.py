@@ -87,14 +87,16 @@ def test_an_echo_that_goes_on_without_the_target_is_a_target():
     rng = np.random.default_rng(3)
     pair = Echoes.none(1)._replace(ids=np.array([[2, 1]]), kinds=np.array([[0, RANGE]]))
 
-    def odds(hits, misses, strays, square):
+    def odds(hits, misses, strays, square, seen=0.9):
         counts = np.array([[hits, misses, strays, square, 0.01, 1.0]], dtype=float)
-        return pair._replace(counts=counts).log_odds(np.array([0.9]))[0]
+        return pair._replace(counts=counts).log_odds(np.array([seen]))[0]
 
     seldom = odds(8, 12, 0, 8.0)
     assert seldom > 2.0
     assert odds(18, 2, 0, 18.0) < -1.5
     assert odds(8, 12, 3, 8.0) < seldom - 6.0
+    # also where the sensor hardly sees: others have detected it
+    assert odds(1, 0, 20, 1.0, seen=0.01) < -20.0
     # squared differences of one that flies elsewhere grow
     assert odds(8, 12, 0, np.sum(np.arange(8.0) ** 2) + rng.chisquare(8)) < -20.0
 

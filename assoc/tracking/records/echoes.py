@@ -86,4 +86,4 @@ class Echoes(NamedTuple):
         prior = np.log((_BEFORE[0] + known) / (_BEFORE[1] + self.targets))
         # a target that is there by chance stays the more seldom the longer; one that keeps station does as an echo does
         tied = -np.log(_STATION + chance / np.maximum(hits, 1.0)) - 0.5 * np.maximum(square - hits, 0.0)
-        return np.asarray(prior + tied + echo - target + strays * (np.log(_STRAY) - np.log(P)))
+        return np.asarray(prior + tied + echo - target + strays * np.log(_STRAY))

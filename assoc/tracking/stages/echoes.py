@@ -25,6 +25,8 @@ from assoc.tracking.stages.coverage import dwells
 _HIDDEN, _TARGET = math.log(3.0), -8.0
 # a track is young up to so many detections
 _YOUNG = 12
+# and its first detections may be older than the track of the target
+_UNTRACKED = 3.0
 # standard deviations within which plots share a component, and beyond which they differ
 _APART = 3.0
 # standard deviations within which other tracks are counted, for how often targets share a component by chance
@@ -115,7 +117,10 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
     fresh = ~np.isin(tracks.track_id, progress.before.track_id)
     z, sensor = progress.scan.measurements[s], progress.settings.sensors[s]
     low, width = sensor.field_of_view[:2, 0], np.diff(sensor.field_of_view[:2], axis=1)[:, 0]
-    expected = echoes.expected.copy()
+    expected, tied = echoes.expected.copy(), np.zeros(len(tracks) + 1)
+    np.maximum.at(tied, _at(tracks.track_id, echoes.ids[:, 0]), echoes.counts[:, HITS])
+    # detections before that no pair explains, but for those when the other was not yet tracked
+    alone = np.maximum(tracks.hits - _UNTRACKED - tied[:-1], 0.0)
     for axis in (RANGE, AZIMUTH):
         values, ours, theirs = z[:, axis], plots[young, s] - 1, plots[here, s] - 1
         spread = np.sqrt(2.0 * np.diagonal(sensor.covariance)[:2])
@@ -141,7 +146,7 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         ids = np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1)
         new = (away > _APART) & (square < _APART**2) & ~crowded & (first != second) & ~_known(echoes, ids, s, axis)
         counts = np.zeros((np.count_nonzero(new), 6))
-        counts[:, HITS] = 1.0
+        counts[:, HITS], counts[:, STRAYS] = 1.0, alone[first[new]]
         counts[:, SQUARE], counts[:, CHANCE], counts[:, FRESH] = square[new], chance[new], fresh[first[new]]
         echoes = echoes._replace(
             ids=np.concatenate([echoes.ids, ids[new]]),
