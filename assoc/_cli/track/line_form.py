@@ -24,7 +24,6 @@ SENSOR = ("sensor", "radar", "source", "station")
 """What the column of sensors is called."""
 ADDRESS = ("address", "icao_address", "icao", "icao24", "mode_s", "address_hex", "mmsi")
 """What the column of addresses is called."""
-_TIME = tuple(map(plain_name, COLUMNS["time"]))
 
 
 class LineForm:
@@ -56,13 +55,13 @@ class LineForm:
         """
         if any(_is_number(cell) for cell in cells):
             return False
-        names = [plain_name(cell) for cell in cells]
-        if not {*names} & {*SENSOR, *_TIME}:
+        names = {plain_name(cell) for cell in cells}
+        if not names & {*map(plain_name, (*SENSOR, *COLUMNS["time"]))}:
             return False
-        self._header, self._wrong = names, ""
-        if not {*names} & {*SENSOR} and len(self.scene.sensors) > 1:
+        self._header, self._wrong = [cell.lower() for cell in cells], ""
+        if not names & {*SENSOR} and len(self.scene.sensors) > 1:
             self._wrong = f"the header has no column {' or '.join(SENSOR[:2])}"
-        elif not {*names} & {*_TIME}:
+        elif not names & {*map(plain_name, COLUMNS["time"])}:
             self._wrong = "the header has no column time"
         if self._wrong:
             raise InvalidInputError(self._wrong)
@@ -77,8 +76,9 @@ class LineForm:
         if len(cells) > len(self._header):
             raise ValueError(f"{len(cells)} values, the header has {len(self._header)} columns")
         found: dict[str, Any] = dict(zip(self._header, cells, strict=False))
-        for name, usual in (("sensor", SENSOR), ("address", ADDRESS), ("time", _TIME)):
-            own = next((other for other in map(plain_name, usual) if other in found), None)
+        for name, usual in (("sensor", SENSOR), ("address", ADDRESS), ("time", COLUMNS["time"])):
+            plain = [plain_name(other) for other in usual]
+            own = next((other for other in self._header[: len(cells)] if plain_name(other) in plain), None)
             if own is not None:
                 found[name] = found[own]
         found.setdefault("sensor", "1")
@@ -107,7 +107,7 @@ class LineForm:
             cell = cells[columns[meaning]] if meaning in columns else None
             if cell is None or (isinstance(cell, str) and not cell.strip()):
                 return math.nan
-            return (number(cell.strip()) if isinstance(cell, str) else float(cell)) * UNITS[meaning][units[meaning]]
+            return (number(cell.strip()) if isinstance(cell, str) else float(cell)) * _factor(meaning, units)
 
         altitude = value("altitude")
         z = np.array([[value("range"), math.pi / 2 - value("bearing")]])
@@ -116,7 +116,7 @@ class LineForm:
             found["values"].append("" if math.isnan(altitude) else altitude)
         dialled = cells[columns["mode3"]] if "mode3" in columns else ""
         try:
-            bits = code(str(dialled).strip(), UNITS["mode3"][units["mode3"]])
+            bits = code(str(dialled).strip(), _factor("mode3", units))
         except (ValueError, OverflowError):
             bits = -1
         found["mode3"] = int(f"{bits:o}") if 0 <= bits <= 0o7777 else -1
@@ -127,7 +127,7 @@ class LineForm:
         plain = {plain_name(str(name)): value for name, value in found.items()}
         values = []
         for meaning in ("latitude", "longitude", "altitude"):
-            names = [name + ending for name in NAMES[meaning] for ending in ENDINGS]
+            names = [plain_name(name + ending) for name in NAMES[meaning] for ending in ENDINGS]
             values.append(next((plain[name] for name in names if plain.get(name) not in (None, "")), None))
         if values[0] is None or values[1] is None or self.scene.origin is None:
             return False
@@ -160,12 +160,16 @@ def _columns(names: Sequence[str]) -> tuple[dict[str, int], dict[str, str]] | No
     if {"values", "position"} & {*plain}:
         return None
     try:
-        columns, units = choose(plain, {}, {})
+        columns, units = choose(names, {}, {})
     except InvalidInputError:
         return None
     is_plain = plain[columns["bearing"]] == "azimuth" and plain[columns["range"]] == "range"
-    usual = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
-    return None if is_plain else (columns, usual | units)
+    return None if is_plain else (columns, units)
+
+
+def _factor(meaning: str, units: dict[str, str]) -> float:
+    """What makes metres and radians of a column, or the base of its codes; the usual unit where none is said."""
+    return UNITS[meaning][units.get(meaning, next(iter(UNITS[meaning])))]
 
 
 def _is_number(text: str) -> bool:

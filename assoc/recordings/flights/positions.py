@@ -188,7 +188,9 @@ def _chosen(path: str, header: Sequence[str], given: Mapping[str, str]) -> dict[
     plain = [plain_name(name) for name in header]
     found = {}
     for meaning, usual in NAMES.items():
-        wanted = [plain_name(given[meaning])] if meaning in given else [n + e for n in usual for e in ENDINGS]
+        wanted = (
+            [plain_name(given[meaning])] if meaning in given else [plain_name(n + e) for n in usual for e in ENDINGS]
+        )
         name = next((name for name in wanted if name in plain), None)
         if name is not None:
             found[meaning] = header[plain.index(name)]
