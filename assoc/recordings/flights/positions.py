@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assoc._files.reading import open_input
+from assoc._files.reading import kind_of, open_input
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.columns import plain_name
@@ -138,7 +138,7 @@ def read_positions(
     if {*(units or {})} - {"altitude"} or unit not in ALTITUDES:
         raise InvalidInputError(f"units: expected altitude = one of {', '.join(ALTITUDES)}, got {dict(units or {})}")
     try:
-        if path.lower().endswith((".parquet", ".pq")):
+        if kind_of(path) == "parquet":
             table = pd.read_parquet(path)
         else:
             with open_input(path) as file:
