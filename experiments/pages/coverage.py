@@ -276,6 +276,15 @@ def dubins_enkf() -> str:
     }
     measured = [c for c in r.starting("RMS of") if c.holds is not None]
     high = r["RMS of height: measuring x / all"]
+    as_printed = r.starting("equation 1 as printed, N 300")
+    under = [c for c in r.claims if "runs that come below the ground" in c.quantity]
+    lost = r.starting("speed after a step by equation 21")[0]
+    longer = {figure: [number(c.ours, 2) for c in r.starting(f"between the ends of {figure}")]
+              for figure in ("figure 2", "figure 3")}  # fmt: skip
+
+    def times(pair: str) -> str:
+        return " and ".join(f"{number(c.ours)} ({interval(c)})" for c in measured if pair in c.quantity)
+
     speeds = [c for c in r.claims if "speed of all runs" in c.quantity]
     noises = R_SIGMA / Q_SIGMA
     heights = " and ".join(number(r[f"{kind} attack: least height of all runs"].ours) for kind in ("fixed", "changing"))
