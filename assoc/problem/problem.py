@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
-from assoc._problem_arrays import (
+from assoc._system import memory
+from assoc._system.wrong_types import explains_wrong_types
+from assoc.errors import InvalidInputError, LimitExceededError, warn
+from assoc.problem.arrays import (
     MOST_SINGLETON_NUMBERS,
     all_finite,
     allowed,
@@ -26,9 +29,6 @@ from assoc._problem_arrays import (
     warn_of_dummy_cost,
     with_singletons,
 )
-from assoc._system import memory
-from assoc._system.wrong_types import explains_wrong_types
-from assoc.errors import InvalidInputError, LimitExceededError, warn
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -42,6 +42,7 @@ def costs_alone(matrix: NDArray[np.float64], unassigned: float | Sequence[ArrayL
 
 
 def checked_dummy(dummy: object) -> bool:
+    """Whether measurements may be false alarms, as a caller says it."""
     if not isinstance(dummy, (bool, np.bool_)):
         found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
         raise InvalidInputError(f"dummy: expected True or False, got {found}")
@@ -49,6 +50,7 @@ def checked_dummy(dummy: object) -> bool:
 
 
 def integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
+    """Whole numbers of a caller; with another type, dimension or fraction one line says so."""
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -68,6 +70,7 @@ def integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
 
 
 def real_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Numbers of a caller; complex ones, texts and ragged lists are refused in one line."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -155,6 +158,7 @@ def with_singletons(
 
 
 def frozen(array: NDArray[Any], dtype: type) -> NDArray[Any]:
+    """A copy in C order that cannot be written."""
     result: NDArray[Any] = np.array(array, dtype=dtype, order="C")
     result.flags.writeable = False
     return result
