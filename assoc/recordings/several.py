@@ -91,15 +91,9 @@ def scene_of_radars(
     parts = parts_of_radars(recordings, radars)
     swept = [_sectors(recording, turn, edges) for recording, turn in zip(recordings, turns, strict=True)]
     for part in parts:
-        z = part.recording.measurements
-        if part.radar.dim == 3:
-            heights = part.recording.trusted_altitudes
-            z = np.column_stack(
-                [z, heights if origin is None else heights_above(z, heights, part.radar.position, origin)]
-            )
         # a plot on an edge belongs to the scan before it, but for the first
         cut = np.searchsorted(part.recording.times, edges[1:-1], side="right")
-        measured.append(np.split(z, cut))
+        measured.append(np.split(_measured(part, origin), cut))
         stamps.append(np.split(part.recording.times, cut))
         sectors.append(swept[part.number])
     return Scene(
@@ -112,6 +106,15 @@ def scene_of_radars(
         name=" + ".join(recording.name for recording in recordings if recording.name),
         origin=origin,
     )
+
+
+def _measured(part: Part, origin: Origin | None) -> Array:
+    """The measurements of a part's plots, with heights where its radar measures them."""
+    z = part.recording.measurements
+    if part.radar.dim < 3:
+        return z
+    heights = part.recording.trusted_altitudes
+    return np.column_stack([z, heights if origin is None else heights_above(z, heights, part.radar.position, origin)])
 
 
 class Part(NamedTuple):
