@@ -394,6 +394,10 @@ TABLES: dict[str, Callable[[], str]] = {
         _plain, "probabilities", "",
         ("mean error", "largest error", "within four errors", "seconds"),
     ),
+    "linking": partial(
+        _plain, "linking", "points",
+        [f"{what}, {who}" for who in ("assoc", "trackpy", "laptrack") for what in ("recall", "precision", "seconds")],
+    ),
     "prior": partial(
         _plain, "ambiguous_bearings", "scene, cost",
         ("targets found of each 100 there", "true tuples found", "chosen tuples that are true", "proven optima"),

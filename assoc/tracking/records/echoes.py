@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import betaln, pdtrik
+from scipy.special import betaln
 
 from assoc._types import Array
 
@@ -27,8 +27,8 @@ _STRAY = 0.1
 _STATION = 0.003
 # before any was seen: echoes, and targets
 _BEFORE = (0.02, 20.0)
-# probability that chance brings no more than what is not counted
-_SURELY = 0.999
+# standard deviations by which more must be seen than chance brings
+_SURELY = 2.0
 
 
 class Echoes(NamedTuple):
@@ -73,7 +73,9 @@ class Echoes(NamedTuple):
     @property
     def seen(self) -> Array:
         """Short tracks of echoes beyond what chance brings, (S, 2)."""
-        return np.maximum(self.short - np.ceil(pdtrik(_SURELY, np.maximum(self.expected, 1e-9))), 0.0)
+        beyond = self.short - self.expected - _SURELY * np.sqrt(self.expected)
+        # a single one may be chance in one of many sensors
+        return np.where(self.short > 1.0, np.maximum(beyond, 0.0), 0.0)
 
     def log_odds(self, detection_probability: Array) -> Array:
         """Log odds of an echo against a target of its own, which the sensor detects with this probability (K,)."""

@@ -198,9 +198,7 @@ def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
     """Decide which tracks are hidden, and forget pairs that are decided."""
     echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
     odds, confirmed = _log_odds(progress, echoes, tracks), np.append(tracks.confirmed, False)
-    # once tied is nobody's echo: each track is compared with many
-    above = (odds > _HIDDEN) & (echoes.counts[:, HITS] > 1.0) & confirmed[target]
-    above &= confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden)
+    above = (odds > _HIDDEN) & confirmed[target] & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden))
     # echoes have no echoes of their own; the surest first
     rows, theirs, sure = {}, set[int](), np.flatnonzero(above)
     for row in sure[np.argsort(-odds[sure], kind="stable")].tolist():
