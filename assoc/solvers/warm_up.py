@@ -34,7 +34,8 @@ from assoc.solvers.methods import EXACT_METHODS
 _ROWS = 24
 _TUPLES = 2000
 # iterations without improvement, or nodes, after which a search has used all its kernels
-_LIMITS = {"patience": 12, "nodes": 60}
+_LIMITS = {"patience": 12}
+_EXACT = {"nodes": 60}
 
 # solvers that need branch and bound, at least on hard problems; a second process compiles it, half of all kernels,
 # while this process compiles the rest
@@ -132,6 +133,7 @@ def prepare(names: Iterable[str]) -> None:
 def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
     known = {field.name for field in fields(registry.parameters(name))}  # type: ignore[arg-type]
     limits: dict[str, Any] = {key: value for key, value in _LIMITS.items() if key in known}
+    limits |= _EXACT if name == "exact" else {}
     for problem in problems:
         # with and without a time limit: kernels that check the time take another path
         for limit in (None, 1e3):
