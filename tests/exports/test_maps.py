@@ -143,6 +143,6 @@ def test_parquet(tmp_path):
     for other in scenes[1:]:
         np.testing.assert_allclose(other.times, scenes[0].times)
         np.testing.assert_allclose(other.truth.positions[5], scenes[0].truth.positions[5])
-    (tmp_path / "bad.parquet").write_bytes(b"nothing of that kind")
+    (tmp_path / "bad.parquet").write_bytes(b"PAR1 and nothing more of that kind")
     with pytest.raises(InvalidInputError, match=r"bad.parquet: is not a Parquet file"):
         simulate("from-tracks", 1, file=str(tmp_path / "bad.parquet"))
