@@ -254,9 +254,7 @@ def _agreeing(tracks: TrackBatch, hypotheses: Hypotheses) -> list[Cluster]:
     owner = np.where(history > 0, tracks.track_id[:, None] * (history.max(initial=0) + 1) + history, 0)
     decided = np.asarray(owner.any(axis=1))
     return [
-        agreeing(group, owner[group.branches], tracks.track_id[group.branches])
-        if decided[group.branches].any()
-        else group
+        agreeing(group, owner[group.branches]) if decided[group.branches].any() else group
         for group in hypotheses.clusters
     ]
 

@@ -147,16 +147,13 @@ def without(whole: Cluster, gone: Array) -> Cluster:
     return cluster(whole.branches[~gone], holds, weight)
 
 
-def agreeing(whole: Cluster, owner: Array, track: Array) -> Cluster:
-    """Keep the hypotheses that agree with the best one about some measurements of the tracks in it.
+def agreeing(whole: Cluster, owner: Array) -> Cluster:
+    """Keep the hypotheses that agree with the best one about some measurements.
 
-    `owner` (B, M) is, for each branch and each of M sensors, a number for track and measurement, 0: missed; `track`
-    (B,) are the branches' tracks. What the best one leaves to false alarms may yet be of others: of targets that are
-    seldom detected nothing is decided in a few scans.
+    `owner` (B, M) is, for each branch and each of M sensors, a number for track and measurement; 0: missed.
     """
     if len(whole.weight) == 1:
         return whole
-    known = np.isin(track, track[whole.holds[0]])
-    decided = np.sort((whole.holds & known)[:, :, None] * owner, axis=1)
+    decided = np.sort(whole.holds[:, :, None] * owner, axis=1)
     same = (decided == decided[0]).all(axis=(1, 2))
     return cluster(whole.branches, whole.holds[same], whole.weight[same])
