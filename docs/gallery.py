@@ -1,6 +1,6 @@
 """All pictures of the documentation, drawn again: ``python -m docs.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds, or of published results (surfaces-*). They have two pixels for each
+Pictures are of fixed scenes and seeds. They have two pixels for each
 of a plain screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
 """
 
@@ -18,7 +18,6 @@ import assoc
 from assoc._files.output import write_atomically
 from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
-from experiments.metaheuristics import sweep
 
 FOLDER = Path(__file__).parent / "images"
 LARGEST = 250_000
@@ -192,7 +191,6 @@ _DRAWN = (
     first_sight, scene, solution, ghosts, gates, costs, convergence, pheromone, heat_map, tracks, metric, overview,
 )  # fmt: skip
 PICTURES: dict[str, Callable[[Any], None]] = {draw.__name__.replace("_", "-"): draw for draw in _DRAWN}
-PICTURES["surfaces-ghosts-20"] = lambda figure: sweep.draw(figure, "ghosts 20")
 
 
 def drawn(draw: Callable[[Any], None]) -> bytes:

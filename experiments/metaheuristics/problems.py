@@ -1,15 +1,13 @@
 """The problems of these experiments, by name.
 
-Their seeds were used for nothing else, but for one thing: on twelve scenes of 20 and of 40 targets the sweep of
-settings (sweep.py) chose the defaults of `aco`.
+Their seeds were used for nothing else, but for one thing: on twelve scenes of 20 and of 40 targets the defaults of
+`aco` were chosen.
 """
 
 from collections.abc import Callable
 
 from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scene
-from assoc.simulation import simulate
 from experiments.common.instances import scenes, synthetic
 
 # of the first problem of each name; benchmarks begin with 1000, tuning ends before 100
@@ -30,16 +28,6 @@ def _known(n: int) -> Callable[[int], AssignmentProblem]:
     return lambda seed: synthetic.axial_known_optimum(n, seed)[0]
 
 
-def _radars(noise: float, false_alarms: float) -> Callable[[int], AssignmentProblem]:
-    """One scan of the ant colony paper's scene, another one for each seed."""
-
-    def make(seed: int) -> AssignmentProblem:
-        scene: Scene = simulate("three-radar", seed=seed, scans=100, noise=noise, false_alarms=false_alarms)
-        return build_problem(scene, seed % scene.num_scans)
-
-    return make
-
-
 PROBLEMS: dict[str, Callable[[int], AssignmentProblem]] = {
     **{f"ghosts {targets}": _ghosts(targets) for targets in (10, 20, 40, 60, 100)},
     "wide gaps 36": _wide_gap,
@@ -47,8 +35,6 @@ PROBLEMS: dict[str, Callable[[int], AssignmentProblem]] = {
     "wide gates 350": lambda seed: synthetic.wide_gates(350, seed, 1.0),
     "Grundel-Pardalos 30": _known(30),
     "Grundel-Pardalos 50": _known(50),
-    "noisy radars": _radars(200.0, 10.0),
-    "poor radars": _radars(4000.0, 30.0),
 }
 """Name -> what makes its problem of a seed."""
 

@@ -60,8 +60,6 @@ def ant_colony() -> str:
     def state(what: str) -> str:
         return number(states[what].ours)
 
-    sweep = Results("metaheuristics.sweep")
-    many = {n: sweep.starting(f"ghosts {n}, paper: table 1's advice")[0] for n in (20, 40)}
     return filled("ant-colony", locals(), _of=_of, _excess=_excess)
 
 

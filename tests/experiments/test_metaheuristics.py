@@ -7,7 +7,7 @@ import pytest
 
 import assoc
 from assoc.packing.run import Run
-from experiments.metaheuristics import ablation, parts, running, sweep
+from experiments.metaheuristics import ablation, parts, running
 from experiments.metaheuristics.problems import problem
 
 
@@ -104,17 +104,3 @@ def test_figures_are_differences_from_the_whole():
     assert alone.ours == pytest.approx(7.5) and alone.interval == pytest.approx((5.0, 10.0))
     part = claims[f"ghosts 40, 2 s: aco, {parts.OWN[2].words}, above all parts"]
     assert part.ours == pytest.approx(0.0, abs=1e-12) and part.interval == pytest.approx((-1.0, 1.0))
-
-
-@pytest.mark.slow
-def test_sweep_measures_settings_of_small_problems(monkeypatch):
-    monkeypatch.setattr(sweep, "GRID", {"alpha": (1.0, 2.0), "beta": (1.0,), "rho": (0.3, 0.9), "ants": (5, 15)})
-    problems = [problem("ghosts 10", number) for number in range(2)]
-    optima = np.array([assoc.assign(one).cost for one in problems])
-    for how in sweep.HOW:
-        excess = sweep.excesses(how, problems, optima, 0)
-        assert excess.shape == (8, 2) and excess.min() >= -1e-9
-        claims = {one.quantity: one.ours for one in sweep.claims_of("x", excess)}
-        assert claims["x: worst setting"] >= claims["x: rho 0.3, ants 15"] >= -1e-9
-        # with everything at work small problems are solved
-        assert how != "mmas, full" or claims["x: worst setting"] == pytest.approx(0.0, abs=1e-9)
