@@ -34,7 +34,7 @@ KINDS = {
     "k-ballistic": "ballistic", "k-orbital": "satellites", "n-dense": "formation of twelve",
 }  # fmt: skip
 """Kinds of unseen scenes in words."""
-GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "comparison", "biases", "benchmark")
+GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "benchmark")
 """Experiments of trackers whose goals are listed, in this order."""
 _HEADS = {
     "oracle": "oracle",
@@ -177,23 +177,6 @@ def asynchronous() -> str:
     return with_size(r, table(["tracker", *heads], rows))
 
 
-def comparison() -> str:
-    """All trackers on three radars and on recorded traffic."""
-    r = Results("trackers.comparison")
-    rows = []
-    for label in labels(r, ", oracle: GOSPA"):
-        for name, shown in SHOWN.items():
-            start = f"{label}, {name}: "
-            parts = " / ".join(number(r[start + part].ours) for part in ("localisation", "missed", "false"))
-            rows.append(
-                [label, shown, mean(r[start + "GOSPA"]), parts, _tenths(r[start + "switches"]),
-                 number(r[start + "OSPA(2)"].ours), f"{r[start + 'HOTA'].ours:.3f}",
-                 number(r[start + "CPU time of a scan"].ours, 2)]
-            )  # fmt: skip
-    heads = ["GOSPA, m", "localisation / missed / false, m", "switches", "OSPA(2), m", "HOTA", "time, ms"]
-    return with_size(r, table(["scenes", "tracker", *heads], rows, lambda column: column > 1))
-
-
 def benchmark() -> str:
     """Ours and those of other packages on the same detections."""
     r = Results("trackers.benchmark")
@@ -218,20 +201,6 @@ def benchmark() -> str:
             rows.append([label, words, f"{done.ours:.0f} of {done.quantity.rpartition(' ')[2]}", *cells])
     heads = ["scans", "ours, ms a scan", "theirs / ours", "GOSPA, theirs, m", "GOSPA, ours - theirs, m"]
     return with_size(r, table(["", "theirs, ours", *heads], rows, lambda column: column > 1))
-
-
-def registration() -> str:
-    """Errors of the biases found, and GOSPA with them."""
-    r = Results("trackers.biases")
-    rows = []
-    for kind in labels(r, ", no biases: GOSPA"):
-        for size in ("0 m, 0 deg", "100 m, 0.1 deg", "200 m, 0.2 deg", "300 m, 0.3 deg"):
-            start = f"{kind}, {size}"
-            errors = [mean(r[f"{start}: RMS error of {what}"], 2) for what in ("range", "azimuth")]
-            ways = [r[f"{start}, {way}: GOSPA / without biases"] for way in ("with biases", "registered", "online")]
-            rows.append([kind, size, *errors, number(ways[0].ours, 2), *(mean(claim, 4) for claim in ways[1:])])
-    heads = ["error of range, m", "of azimuth, deg", "with biases", "registered", "online"]
-    return with_size(r, table(["traffic", "biases", *heads], rows, lambda column: column > 1))
 
 
 def goals(names: Sequence[str] = GOALS, folder: Path = RESULTS) -> str:
@@ -405,9 +374,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "close-targets": close_targets,
     "bearings": bearings,
     "turning-radars": asynchronous,
-    "trackers": comparison,
     "stone-soup": benchmark,
-    "biases": registration,
     "goals": goals,
     "as-they-are": as_they_are,
     "unseen": unseen,

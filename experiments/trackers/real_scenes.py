@@ -10,14 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
-from assoc.sensors import Platform, PositionSensor, Radar2D, Radar3D, Sensor
+from assoc.sensors import Radar2D, Radar3D, Sensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.tracking import Initiation
 from assoc.tracking.filter_choice import make_filter
-from experiments.trackers.close_targets import REGION, SETTINGS, Setting, level, radars, simulate
+from experiments.trackers.close_targets import REGION, SETTINGS, Setting, radars, simulate
 
 TARGETS, SCANS, INTERVAL = 12, 40, 4.0
 TIMES = INTERVAL * np.arange(SCANS)
@@ -84,16 +82,6 @@ def _radar(place: Array, name: str, **more: Any) -> Radar3D:
     return radar_over(REGION, place, name=name, **usual | more)
 
 
-def dark_band(seed: int) -> Case:
-    """Nothing is detected within 2 km of the plane x = 0, and nobody knows."""
-    scene = simulate(SEPARATE, seed)
-    kept = []
-    for ids, at, scan in zip(scene.truth.target_ids, scene.truth.positions, scene.truth.sources, strict=True):
-        hidden = ids[np.abs(at[:, 0]) < 2e3]
-        kept.append([~np.isin(sources, hidden) for sources in scan])
-    return Case(_left(scene, kept))
-
-
 def _left(scene: Scene, kept: Sequence[Sequence[Array]]) -> Scene:
     """The scene with these measurements alone, bool (n_s,) each."""
 
@@ -108,10 +96,10 @@ def _with(scene: Scene, measurements: Any, sources: Any) -> Scene:
     return replace(scene, measurements=measurements, truth=replace(scene.truth, sources=sources))
 
 
-def _all_seen(paths: Array, rng: np.random.Generator, interval: float = INTERVAL) -> Case:
+def _all_seen(paths: Array, rng: np.random.Generator) -> Case:
     """Targets that are there all the time (K, T, 3), seen by the usual radars."""
-    times, ids = interval * np.arange(SCANS), [np.arange(paths.shape[1])] * SCANS
-    return Case(observe(radars(SEPARATE), times, ids, list(paths), rng, region=REGION))
+    ids = [np.arange(paths.shape[1])] * SCANS
+    return Case(observe(radars(SEPARATE), TIMES, ids, list(paths), rng, region=REGION))
 
 
 def wind_farm(seed: int) -> Case:
@@ -130,40 +118,6 @@ def wind_farm(seed: int) -> Case:
     return Case(_with(scene, measurements, sources))
 
 
-def ships(seed: int, reports: bool = True) -> Case:
-    """Ships seen by a radar; with `reports`, each tells its position every 10 s, as a sensor that never looks."""
-    rng, region = np.random.default_rng(seed), np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 1.0]])
-    velocity = level(rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(3.0, 10.0, TARGETS))
-    middle = np.append(rng.uniform(-8e3, 8e3, (TARGETS, 2)), np.zeros((TARGETS, 1)), axis=1)
-    paths = middle + (TIMES - TIMES.mean())[:, None, None] * velocity
-    view = np.array([[0.0, 15e3], [-np.pi, np.pi]])
-    radar = Radar2D(
-        position=np.zeros(3), noise=np.array([50.0, 5e-3]), detection_probability=0.9, false_alarm_rate=10.0,
-        field_of_view=view, name="radar",
-    )  # fmt: skip
-    ais = PositionSensor(
-        position=np.zeros(3), noise=np.array([10.0, 10.0]), detection_probability=0.9, false_alarm_rate=0.1,
-        field_of_view=region[:2], name="AIS",
-    )  # fmt: skip
-    ids = [np.arange(TARGETS)] * SCANS
-    sensors: list[Sensor] = [radar, ais] if reports else [radar]
-    scene = observe(sensors, TIMES, ids, list(paths), rng, region=region)
-    filter = ExtendedKalmanFilter(ConstantVelocity(0.1, dimensions=2, kind="continuous"))
-    options = {"filter": filter, "initiation": Initiation(speed=8.0)}
-    if not reports:
-        return Case(scene, options=options)
-    phase = rng.uniform(0.0, 10.0, TARGETS)
-    turn = np.floor((TIMES[:, None] + phase) / 10.0)
-    due = np.diff(turn, axis=0, prepend=turn[:1] - (phase < INTERVAL)) > 0
-    kept = [
-        [np.full(len(seen), True), np.append(row, True)[told]]
-        for (seen, told), row in zip(scene.truth.sources, due, strict=True)
-    ]
-    everywhere, nowhere = (-np.pi, np.pi), (0.0, 0.0)
-    sectors = np.array([[everywhere, nowhere]] * SCANS)
-    return Case(replace(_left(scene, kept), sectors=sectors), options=options)
-
-
 def misdeclared(declared: Setting, true: Setting) -> Make:
     """Scenes of true sensors, of which trackers are told something else."""
 
@@ -174,10 +128,10 @@ def misdeclared(declared: Setting, true: Setting) -> Make:
     return row
 
 
-def agile(seed: int, interval: float = INTERVAL) -> Case:
+def agile(seed: int) -> Case:
     """Targets of 250 m/s that now and then turn with 8 g for 2 to 6 s."""
     rng, fine, turn = np.random.default_rng(seed), 0.1, 8 * 9.81 / 250.0
-    steps = round(SCANS * interval / fine)
+    steps = round(SCANS * INTERVAL / fine)
     rate = np.zeros((steps, TARGETS))
     for target in range(TARGETS):
         k = 0
@@ -191,7 +145,7 @@ def agile(seed: int, interval: float = INTERVAL) -> Case:
     path = np.cumsum(velocity, axis=0) * fine
     middle = rng.uniform([-12e3, -12e3, 0.0], [12e3, 12e3, 1.0], (TARGETS, 3))
     middle[:, 2] = rng.permutation(np.linspace(1e3, 11e3, TARGETS))
-    return _all_seen((path - path.mean(axis=0) + middle)[:: round(interval / fine)], rng, interval)
+    return _all_seen((path - path.mean(axis=0) + middle)[:: round(INTERVAL / fine)], rng)
 
 
 def one_planar(seed: int, declared: float = 100.0) -> Case:
@@ -199,7 +153,7 @@ def one_planar(seed: int, declared: float = 100.0) -> Case:
     scene, region = simulate(SEPARATE, seed), np.array([*REGION[:2], [0.0, 2e3]])
     radar = replace(_planar(scene.sensors[0]), false_alarm_rate=100.0, name="radar")
     rng = np.random.default_rng([seed, 1])
-    paths = [_at_height(at, 1e3) for at in scene.truth.positions]
+    paths = [np.column_stack([at[:, :2], np.full(len(at), 1e3)]) for at in scene.truth.positions]
     scene = observe([radar], scene.times, scene.truth.target_ids, paths, rng, region=region)
     told = [replace(radar, false_alarm_rate=declared)]
     filter = make_filter("imm-cv", told, pace=INTERVAL, region=region)
@@ -214,43 +168,11 @@ def _planar(radar: Sensor) -> Radar2D:
     )  # fmt: skip
 
 
-def _at_height(places: Array, height: float) -> Array:
-    return np.column_stack([places[:, :2], np.full(len(places), height)])
-
-
-def flat_radars(seed: int, height: float | None = None) -> Case:
-    """Three radars without elevations, and the filter of the programs; with a height, all targets fly there."""
+def flat_radars(seed: int) -> Case:
+    """Three radars without elevations, and the filter of the programs."""
     sensors: list[Sensor] = [_planar(radar) for radar in radars(SEPARATE)]
-    scene = simulate(SEPARATE, seed, sensors=sensors)
-    if height is not None:
-        paths = [_at_height(at, height) for at in scene.truth.positions]
-        rng = np.random.default_rng(seed)
-        scene = observe(sensors, scene.times, scene.truth.target_ids, paths, rng, region=REGION)
     filter = make_filter("imm-cv", sensors, pace=INTERVAL, region=REGION)
-    return Case(scene, options={"filter": filter}, level=True)
-
-
-def under_way(seed: int) -> Case:
-    """Three radars on ships that circle at 10 m/s."""
-    rng, times = np.random.default_rng(seed), np.arange(0.0, INTERVAL * SCANS)
-    sensors: list[Sensor] = []
-    for number, place in enumerate(on_circle(np.zeros(3), 20e3, 3), 1):
-        heading = rng.uniform(-np.pi, np.pi) + rng.choice([-1.0, 1.0]) * 0.01 * times
-        step = 10.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros(len(times))], axis=1)
-        carrier = Platform(times, place + np.cumsum(step, axis=0), np.angle(np.exp(1j * heading)))
-        sensors.append(Radar3D(
-            position=np.array([5.0, 0.0, 20.0]), noise=np.array([80.0, 1.6e-3, 1.6e-3]), detection_probability=0.9,
-            false_alarm_rate=10.0, field_of_view=np.array([[0.0, 60e3], [-np.pi, np.pi], [-0.1, np.pi / 2]]),
-            name=f"radar {number}", platform=carrier,
-        ))  # fmt: skip
-    return Case(simulate(SEPARATE, seed, sensors=sensors))
-
-
-def range_rates(seed: int) -> Case:
-    """Formations under radars that measure range rates, too (1 m/s)."""
-    more = {"range_rate_noise": 1.0, "fastest": 300.0}
-    sensors = [_radar(radar.position, radar.name, **more) for radar in radars(SETTINGS["formations"])]
-    return Case(simulate(SETTINGS["formations"], seed, sensors=sensors))
+    return Case(simulate(SEPARATE, seed, sensors=sensors), options={"filter": filter}, level=True)
 
 
 NOISY, LOUD = (160.0,) * 3, (240.0,) * 3
@@ -281,24 +203,16 @@ ROWS: dict[str, Row] = {
     "six radars of 17 km": Row(short_radars, {"gospa": 190.0}),
     "six radars of 17 km, P_d 0.6": Row(lambda seed: short_radars(seed, 0.6), {"gospa": 300.0}),
     "six radars, P_d falling with range": Row(farther_seen_less),
-    "ships, radar alone": Row(lambda seed: ships(seed, reports=False)),
-    "ships, radar and AIS": Row(ships),
     "three 2-D radars": Row(flat_radars, {"gospa": 170.0}),
-    "three 2-D radars, all at 9 km": Row(lambda seed: flat_radars(seed, 9e3)),
     "P_d 0.6, declared 0.9": Row(misdeclared(SEPARATE, _separate(detection_probability=0.6)), {"gospa": 310.0}),
     "noise twice the declared": Row(misdeclared(SEPARATE, _separate(noise=NOISY)), {"gospa": 360.0}),
     "noise three times the declared": Row(misdeclared(SEPARATE, _separate(noise=LOUD)), {"gospa": 450.0, "false": 0.3}),
     "formations, noise twice the declared": Row(misdeclared(SETTINGS["formations"], Setting("formations", NOISY))),
     "8 g": Row(agile, {"gospa": 260.0}),
-    "8 g, scans of 2 s": Row(lambda seed: agile(seed, 2.0)),
     "wind farm": Row(wind_farm, {"gospa": 230.0, "false": 0.5}),
     "one 2-D radar, 100 false alarms": Row(one_planar, {"missed": 0.2 * TARGETS, "false": 0.02}),
     "one 2-D radar, 100 false alarms, declared 20": Row(lambda seed: one_planar(seed, 20.0)),
-    "one 2-D radar, 100 false alarms, declared 500": Row(lambda seed: one_planar(seed, 500.0)),
-    "dark band of 4 km": Row(dark_band),
     "formations": Row(lambda seed: Case(simulate(SETTINGS["formations"], seed)), {"gospa": 205.0}, judged=JOINT),
-    "formations, range rates": Row(range_rates),
-    "radars on ships under way": Row(under_way),
     "all as declared": Row(lambda seed: Case(simulate(SEPARATE, seed)), harmless=True),
     "P_d 0.6, rightly declared": Row(
         lambda seed: Case(simulate(_separate(detection_probability=0.6), seed)), harmless=True

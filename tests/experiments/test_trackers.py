@@ -9,23 +9,11 @@ from experiments.trackers import (
     as_they_are,
     asynchronous,
     benchmark,
-    biases,
     close_targets,
-    comparison,
     judging,
     plane,
 )
 from experiments.trackers.plane import in_plane
-
-
-@pytest.mark.slow
-def test_comparison_as_a_program(tmp_path, capsys):
-    names = ("oracle", "multi-sensor", "static", "mht", "nearest-neighbour")
-    assert comparison.program(["--quick", "--json", str(tmp_path / "a.json"), "--only", *names]) == 0
-    by_name = {claim.quantity: claim for claim in load_json(tmp_path / "a.json")}
-    assert by_name["three radars, multi-sensor: GOSPA"].ours < 300
-    assert by_name["three radars, multi-sensor: switches"].ours == 0
-    assert "switches" in capsys.readouterr().out
 
 
 def test_stone_soup_and_ours_on_the_same_detections():
@@ -81,7 +69,7 @@ def test_rows_of_sensors_as_they_are(row):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("one", [asynchronous, benchmark, biases], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("one", [asynchronous, benchmark], ids=lambda one: one.__name__)
 def test_other_experiments_as_programs(one, tmp_path, capsys):
     if one is benchmark:
         pytest.importorskip("stonesoup")
