@@ -95,6 +95,7 @@ check-dist: $(VENV)/.installed-release
 audit: $(VENV)/.installed-release
 	$(PY) -m pip freeze --exclude-editable > $(VENV)/frozen.txt
 	$(PY) -m pip_audit --strict --disable-pip --no-deps -r $(VENV)/frozen.txt
+	$(VENV)/bin/pip-licenses --partial-match --fail-on "GNU General Public;GNU Affero;GPLv"
 
 bench: $(VENV)/.installed-peers
 	$(PY) -m experiments.benchmarks
