@@ -133,8 +133,6 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) 
     if given["origin"] is not None:
         raise InvalidInputError(f"--origin: {file} says where the radars stand")
     given["filter"] = given["filter"] or "imm-cv"
-    if given["registration"] == "online":
-        raise InvalidInputError("--registration: online needs scans of one instant; take first")
     found = read_radars(file)
     settings["initiation"] = closing(settings["initiation"], found.closed)
     scene = _registered(found.scene, given, settings, found.references)
@@ -185,12 +183,8 @@ def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = No
 def _registered(scene: Scene, given: Given, settings: dict[str, Any], references: Sequence[str] = ()) -> Scene:
     """The scene without the biases of its sensors, if they are to be found first; references have none."""
     from assoc.registration import register
-    from assoc.tracking.offline.smoothing import check_smoothable
 
-    if given["registration"] != "first":
-        settings |= given.some(("registration",))
-        if given["smooth"]:
-            check_smoothable(corrects="registration" in settings)
+    if given["registration"] is None:
         return scene
     found = register(
         scene,

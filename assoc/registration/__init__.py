@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from assoc._system.imports import lazy_names
 from assoc.registration.correction import with_biases
-from assoc.registration.online import OnlineRegistration
 from assoc.registration.parameters import COMPONENTS, RegistrationParameters
 from assoc.registration.register import register
 from assoc.registration.result import Registration
@@ -11,10 +11,11 @@ from assoc.registration.terms import Term
 
 __all__ = [
     "COMPONENTS",
-    "OnlineRegistration",
     "Registration",
     "RegistrationParameters",
     "Term",
     "register",
     "with_biases",
 ]
+
+__getattr__, __dir__ = lazy_names(__name__, {})

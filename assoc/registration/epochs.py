@@ -9,7 +9,6 @@ import numpy as np
 from assoc._types import Array
 from assoc.registration.pairing import Epoch
 from assoc.registration.velocities import target_velocities
-from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 
@@ -24,7 +23,11 @@ def scene_epochs(scene: Scene, *, moving: bool) -> list[Epoch]:
     groups = scan_groups(scene)
     if scene.measurement_times is None and len(groups) == scene.num_scans:
         velocities = scene_velocities(scene) if moving else None
-        return [epoch_of(scene.scan(k), None if velocities is None else velocities[k]) for k in range(scene.num_scans)]
+        scans = [scene.scan(k) for k in range(scene.num_scans)]
+        return [
+            Epoch(scan.time, scan.measurements, scan.own_times(), None if velocities is None else velocities[k])
+            for k, scan in enumerate(scans)
+        ]
     velocities = scene_velocities(scene)
     epochs = []
     for group in groups:
@@ -55,11 +58,6 @@ def scan_groups(scene: Scene) -> list[list[int]]:
         turning = [float(width[width > 0].mean()) for width in widths.T if (width > 0).any()]
         together = max((math.ceil(2.0 * math.pi / width - 0.05) for width in turning), default=1)
     return [list(range(k, min(k + together, scene.num_scans))) for k in range(0, scene.num_scans, together)]
-
-
-def epoch_of(scan: Scan, velocities: list[Array] | None = None) -> Epoch:
-    """The epoch of one scan."""
-    return Epoch(scan.time, scan.measurements, scan.own_times(), velocities)
 
 
 def scene_velocities(scene: Scene) -> list[list[Array]]:

@@ -30,8 +30,6 @@ class RegistrationParameters(Parameters):
         Names of sensors without bias (or their numbers from 1).
     range_spread, angle_spread, gain_spread, time_spread, position_spread : float
         Metres, radians, metres per metre, seconds, metres.
-    drift : float
-        Only online: change of biases in an hour, as a share of their spread.
     max_tuples : int
         Scans with more candidate tuples are passed over.
     seed : int
@@ -45,7 +43,6 @@ class RegistrationParameters(Parameters):
     gain_spread: float = 0.001
     time_spread: float = 1.0
     position_spread: float = 300.0
-    drift: float = 0.1
     max_tuples: int = 200_000
     seed: int = 0
 
@@ -60,7 +57,6 @@ class RegistrationParameters(Parameters):
             if component not in COMPONENTS:
                 raise InvalidInputError(f"components: unknown {component!r}; known: {', '.join(COMPONENTS)}")
         self._number("range_spread", "angle_spread", "gain_spread", "time_spread", "position_spread", above=0.0)
-        self._number("drift", least=0.0)
         self._whole("max_tuples")
         self._whole("seed", least=0)
 

@@ -104,8 +104,6 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         **{f"unresolved.{name}": value for name, value in state.unresolved._asdict().items()},
         **settings.method.arrays(state.method_state),
     }
-    if state.registration is not None:
-        found |= state.registration.arrays()
     if state.identities is not None:
         found |= state.identities.arrays()
     if state.estimates is not None:
@@ -145,7 +143,6 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
-        registration=None if model.registration is None else model.registration.restored(saved),
         identities=None if model.identities is None else model.identities.restored(saved),
         estimates=None if model.estimates is None else _estimates(model.estimates, saved.part("estimates.")),
         clutter=None if model.clutter is None else _clutter(settings, model.clutter, saved.part("clutter.")),
@@ -296,7 +293,8 @@ def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
         "life_cycle": repr(settings.life_cycle),
         "initiation": repr(settings.initiation),
         "gate_probability": repr(settings.gate_probability),
-        "registration": "none" if settings.registration is None else repr(settings.registration.parameters),
+        # as files from before still say
+        "registration": "none",
         "identity": repr(settings.identity),
         # left out where it is not on: files from before it are still read
         **({"adapt": "True"} if settings.adapt else {}),

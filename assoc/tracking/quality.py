@@ -148,8 +148,6 @@ class Qualities:
         """
         scan = Scan(step.scan, step.time, tuple(measurements), times=None if times is None else tuple(times))
         scan = scan.aligned(tracker.sensors)
-        if tracker.registration is not None:
-            scan = Scan(scan.index, scan.time, tuple(tracker.registration.correct(scan.measurements)))
         settings = tracker.settings.at(step.time)
         if before.estimates is not None:
             settings = in_use(settings, before.estimates)

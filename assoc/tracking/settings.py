@@ -15,7 +15,6 @@ from assoc.costs.views import Views
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.measurement import LinearMeasurement
-from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
 from assoc.solvers.registry import make_parameters
@@ -47,8 +46,6 @@ class TrackerSettings:
     initiation: Initiation
     gate_probability: float
     max_tuples: int
-    registration: OnlineRegistration | None
-    """Its state before the first scan."""
     identity: IdentityParameters | None
     adapt: bool = False
     """Whether to estimate what is declared of the sensors, and the manoeuvres."""
@@ -79,11 +76,6 @@ class TrackerSettings:
         # numbers of numpy's are the same settings
         object.__setattr__(self, "gate_probability", float(self.gate_probability))
         object.__setattr__(self, "max_tuples", int(self.max_tuples))
-        online = self.registration
-        if not (online is None or isinstance(online, OnlineRegistration)):
-            raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {online!r}")
-        if online is not None and online.sensors != self.sensors:
-            raise InvalidInputError("registration: its sensors are not those of the tracker")
         if not (self.identity is None or isinstance(self.identity, IdentityParameters)):
             raise InvalidInputError(f"identity must be IdentityParameters, got {type(self.identity).__name__}")
 

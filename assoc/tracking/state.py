@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.registration.online import OnlineRegistration
 from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
@@ -47,14 +46,13 @@ class TrackerState(NamedTuple):
     next_id: int = 1
     solver_calls: int = 0
     """Number of calls of the solver so far."""
-    registration: OnlineRegistration | None = None
     identities: Identities | None = None
     estimates: Estimates | None = None
     """What was learnt about sensors and targets; None where the tracker does not adapt."""
     clutter: ClutterMap | None = None
     """Where false alarms come from; None where the tracker does not adapt."""
     biases: Biases | None = None
-    """Biases of sensors that see the same targets; None where the tracker does not adapt, or registers."""
+    """Biases of sensors that see the same targets; None where the tracker does not adapt."""
     echoes: Echoes | None = None
     """Tracks that may be echoes of others; None where the tracker does not adapt."""
     starter: Starter | None = None
@@ -85,11 +83,10 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         empty_batch(settings.filter),
         Doubles.none(count),
         Unresolved.none(count),
-        registration=settings.registration,
         identities=None if settings.identity is None else Identities(settings.identity),
         estimates=Estimates.declared(settings.sensors) if settings.adapt else None,
         clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
-        biases=Biases.none(settings.sensors) if settings.adapt and settings.registration is None else None,
+        biases=Biases.none(settings.sensors) if settings.adapt else None,
         echoes=Echoes.none(count) if settings.adapt else None,
         starter=starter,
         rng=rng_of(settings),

@@ -1,4 +1,4 @@
-"""A step of a tracker: check -> register -> predict -> associate -> life cycle -> report, one function a stage.
+"""A step of a tracker: check -> predict -> associate -> life cycle -> report, one function a stage.
 
 A stage takes a step under way (`assoc.tracking.progress`) and returns the next one; `stages_of` lists the stages of a
 tracker. Scores of measurements come from the filter's update, so associating and updating are one stage. Stages do not
@@ -46,7 +46,6 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
     """The stages of a step after its input has been checked, in order."""
     starting = settings.starter is not None
     return [
-        *([register] if settings.registration is not None else []),
         *([correct, use_estimates, use_speeds] if settings.adapt else []),
         keep_pace,
         *([take_over] if starting else [share]),
@@ -102,8 +101,6 @@ def check(
     checked = checked_measurements(measurements, sensors)
     stamps = None if times is None else _checked_stamps(times, checked, when, state.time)
     passed = None if sectors is None else checked_sectors(sectors, len(sensors), "sectors")
-    if settings.registration is not None and stamps is not None:
-        raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
     codes = None
     if identities is not None:
         codes = tuple(checked_identities(identities, [len(z) for z in checked]))
@@ -143,15 +140,6 @@ def _warned(settings: TrackerSettings, state: TrackerState, scan: Scan) -> Track
         what = "measurements with times, sectors or identities start no tracks"
         warn(f"all sensors measure angles alone: {what}, only those of one instant without do")
     return state._replace(warned=True)
-
-
-def register(progress: Progress) -> Progress:
-    """Update the estimated biases of the sensors by the scan, and correct its measurements."""
-    scan = progress.scan
-    assert progress.state.registration is not None
-    registration = progress.state.registration.after(scan.time, scan.measurements)
-    corrected = replace(scan, measurements=tuple(registration.correct(scan.measurements)))
-    return progress.with_state(registration=registration)._replace(scan=corrected)
 
 
 def predict(progress: Progress) -> Progress:

@@ -18,7 +18,6 @@ from assoc.costs.limits import MAX_TUPLES
 from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import Filter
 from assoc.filters.state import Gaussian
-from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking import file
@@ -66,14 +65,13 @@ class Tracker:
         Share of true measurements inside the gate, above 0 and below 1.
     max_tuples : int
         The most candidate tuples in a scan.
-    registration : "online" or OnlineRegistration, optional
-        Estimates the sensors' biases while tracking and corrects the measurements; all measurements of a scan must
-        then be of one instant. Without it measurements are not corrected.
+    registration : "online", optional
+        The same as `adapt`: biases of sensors are among what is estimated, and measurements are corrected by them.
     identity : IdentityParameters, optional
         How to weigh Mode 3/A codes and addresses that `step` is given. Without it they are ignored.
     adapt : bool
-        Whether to estimate noise, detection probabilities, false alarms and manoeuvres while tracking, and to use the
-        estimates while they predict better than what was declared; see `health`.
+        Whether to estimate noise, detection probabilities, false alarms, biases and manoeuvres while tracking, and to
+        use the estimates while they predict better than what was declared; see `health`.
     **options
         Settings of this kind of tracker.
 
@@ -115,22 +113,22 @@ class Tracker:
         initiation: Initiation | None = None,
         gate_probability: float = GATE_PROBABILITY,
         max_tuples: int = MAX_TUPLES,
-        registration: str | OnlineRegistration | None = None,
+        registration: str | None = None,
         identity: IdentityParameters | None = None,
         adapt: bool = False,
         **options: Any,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         scene = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
-        online: Any = registration
-        if registration == "online":
-            online = OnlineRegistration(tuple(scene.sensors), scene.region)
+        if registration not in (None, "online"):
+            raise InvalidInputError(f"registration: expected 'online', got {registration!r}")
         settings = TrackerSettings(
             name=self.name, method=self.method(**options), scene=scene, filter=filter or two_speeds(), solver=solver,
             solver_parameters=dict(solver_parameters or {}), seed=whole_seed(seed),
             time_limit=checked_time_limit(time_limit), life_cycle=LifeCycle() if life_cycle is None else life_cycle,
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
-            max_tuples=max_tuples, registration=online, identity=identity, adapt=bool(adapt),
+            max_tuples=max_tuples, identity=identity,
+            adapt=bool(adapt) or registration is not None,
         )  # fmt: skip
         text = settings.initiation.warning(scene.region)
         if text:
@@ -184,11 +182,6 @@ class Tracker:
     def num_steps(self) -> int:
         """Number of scans so far."""
         return self.state.scan
-
-    @property
-    def registration(self) -> OnlineRegistration | None:
-        """The present estimates of the sensors' biases; None if they are not estimated."""
-        return self.state.registration
 
     @property
     def health(self) -> Health | None:

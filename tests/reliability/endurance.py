@@ -55,7 +55,7 @@ def track_some(seed: int, number: int, folder: Path, stepped: Callable[[], None]
     rng = np.random.default_rng([seed, number, 7])
     name, filter_name = list(TRACKERS)[number % len(TRACKERS)], FILTERS[number // len(TRACKERS) % len(FILTERS)]
     scene = simulate(_SCENES[int(rng.integers(len(_SCENES)))], number, scans=SCANS)
-    options: dict[str, Any] = {"adapt": bool(rng.random() < 0.5), "registration": rng.choice([None, "online"])}
+    options: dict[str, Any] = {"adapt": bool(rng.random() < 0.5)}
     options["filter"] = make_filter(filter_name, scene.sensors, region=scene.region, seed=number)
     options["max_tuples"] = int(rng.choice([300, 3000, 20_000]))
     tracker = TRACKERS[name].for_scene(scene, **options)

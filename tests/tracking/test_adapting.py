@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from assoc.costs.views import BANDS, bands_of
+from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
 from assoc.scene.scan import Scan
@@ -280,6 +281,9 @@ def test_biases_and_clocks_are_found_and_taken_out():
                 plots.append(np.column_stack([z[:, 0], wrap_angle(z[:, 1]), z[:, 2]]))
             tracker.step(2.0 * k, plots)
         assert tracker.state.biases.used.any() == bool(wrong)
+    assert TRACKERS["multi-sensor"](sensors, registration="online").settings.adapt
+    with pytest.raises(InvalidInputError, match="registration: expected 'online', got 'batch'"):
+        TRACKERS["multi-sensor"](sensors, registration="batch")
     found = tracker.state.biases.of(sensors)
     assert found[0]["azimuth"] - found[1]["azimuth"] == pytest.approx(0.01, abs=0.003)
     assert found[2]["time"] == pytest.approx(1.0, abs=0.2) and found[0]["time"] == pytest.approx(0.0, abs=0.2)

@@ -119,8 +119,8 @@ TRACK = (
 OF_SCENES = (
     Option("cutoff", "M", f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})",
            kinds.positive, _SCENES),
-    Option("registration", "NAME", "estimate biases of sensors and correct for them: first, from all plots (with gains "
-           "of range), or online, while tracking", kinds.OneOf(("first", "online")), {"input": ("scenes", "radars")}),
+    Option("registration", "NAME", "first: estimate biases from all plots (with gains of range) and correct for them",
+           kinds.OneOf(("first",)), {"input": ("scenes", "radars")}),
 )  # fmt: skip
 OF_PLOTS = (
     Option("window", "NAME",

@@ -49,8 +49,7 @@ def _with(settings: TrackerSettings, used: bytes, bands: bytes | None, manoeuvre
     changed["by_range"] = by_range
     if starter is not None:
         starter = replace(starter, **changed)
-    # registration goes on with the sensors as declared
-    return replace(settings, **changed, starter=starter, registration=None)
+    return replace(settings, **changed, starter=starter)
 
 
 def _seen(sensor: Sensor, used: Sequence[float]) -> Sensor:

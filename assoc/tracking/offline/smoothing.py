@@ -51,9 +51,8 @@ def smoothed(
     Raises
     ------
     InvalidInputError
-        The tracker corrects biases of sensors, or the decisions belong to other scans.
+        The decisions belong to other scans.
     """
-    check_smoothable(corrects=tracker.settings.registration is not None)
     for decision in decisions:
         scan = scene.scan(decision.scan)
         if decision.time != scan.time or [len(ids) for ids in decision.assigned] != scan.sizes.tolist():
@@ -113,12 +112,6 @@ def _moments(scan: Scan, taken: Array) -> list[tuple[float, Array]]:
         return [(scan.time, taken)]
     stamps = np.array([scan.times[s][m - 1] if m else np.nan for s, m in enumerate(taken.tolist())])
     return [(float(time), np.where(stamps == time, taken, 0)) for time in np.unique(stamps[taken > 0])]
-
-
-def check_smoothable(*, corrects: bool) -> None:
-    """Refuse a tracker that corrects measurements."""
-    if corrects:
-        raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
 
 
 def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:

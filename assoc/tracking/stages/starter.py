@@ -36,7 +36,7 @@ def with_starter(settings: TrackerSettings) -> TrackerSettings:
     method = settings.method.starter
     if method is None or not settings.angles_alone:
         return settings
-    return replace(settings, starter=replace(settings, method=method, registration=None, identity=None, adapt=False))
+    return replace(settings, starter=replace(settings, method=method, identity=None, adapt=False))
 
 
 def current(settings: TrackerSettings, state: TrackerState) -> TrackBatch:
