@@ -91,12 +91,6 @@ def add_seeds(parser: argparse.ArgumentParser, default: int, of: str, least: int
     parser.add_argument("--seeds", type=whole(least), default=default, metavar="N", help=f"{of} (default {default})")
 
 
-def add_recording(parser: argparse.ArgumentParser) -> None:
-    """Add the file of recorded trajectories."""
-    text = "recorded trajectories, as for the scenario from-tracks (default: simulated ones only)"
-    parser.add_argument("file", nargs="?", metavar="FILE.csv", help=text)
-
-
 def add_files(parser: argparse.ArgumentParser, name: str) -> None:
     """Add the options that write what an experiment found: a file, and its result file."""
     parser.add_argument("--json", metavar="FILE", help="write the results here")

@@ -34,7 +34,7 @@ KINDS = {
     "k-ballistic": "ballistic", "k-orbital": "satellites", "n-dense": "formation of twelve",
 }  # fmt: skip
 """Kinds of unseen scenes in words."""
-GOALS = ("close_targets", "as_they_are", "bearings", "asynchronous", "benchmark")
+GOALS = ("close_targets", "as_they_are", "bearings", "benchmark")
 """Experiments of trackers whose goals are listed, in this order."""
 _HEADS = {
     "oracle": "oracle",
@@ -157,23 +157,6 @@ def bearings() -> str:
     }
     names = [name for name in SHOWN if name != "oracle"]
     rows = [[SHOWN[name], *(mean(r[words.format(name)], 2) for words in heads.values())] for name in names]
-    return with_size(r, table(["tracker", *heads], rows))
-
-
-def asynchronous() -> str:
-    """Trackers of turning radars."""
-    r = Results("trackers.asynchronous")
-    kinds = labels(r, ", oracle: GOSPA")
-    rows = []
-    own = [name.removeprefix(f"{kinds[0]}, ") for name in labels(r, ": GOSPA") if name.startswith(f"{kinds[0]}, ")]
-    for plain in sorted(own, key=lambda name: [*SHOWN, name].index(name)):
-        cells = []
-        for kind in kinds:
-            gospa, switches = r[f"{kind}, {plain}: GOSPA"], r[f"{kind}, {plain}: switches"]
-            cells += [f"{mean(gospa)} / {_tenths(switches)}", number(r[f"{kind}, {plain}: OSPA(2)"].ours),
-                      number(r[f"{kind}, {plain}: CPU time of a scan"].ours, 2)]  # fmt: skip
-        rows.append([SHOWN.get(plain, plain.replace("as one", "as if of one")), *cells])
-    heads = [words for kind in kinds for words in (f"{kind}: GOSPA, m / switches", "OSPA(2), m", "time, ms")]
     return with_size(r, table(["tracker", *heads], rows))
 
 
@@ -373,7 +356,6 @@ TABLES: dict[str, Callable[[], str]] = {
     ),
     "close-targets": close_targets,
     "bearings": bearings,
-    "turning-radars": asynchronous,
     "stone-soup": benchmark,
     "goals": goals,
     "as-they-are": as_they_are,

@@ -1,13 +1,13 @@
 """Running trackers and judging them, beside an oracle: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._types import Array
-from assoc.metrics import Trajectories, gospa_over_time, hota, identity, mean_gospa, ospa2
+from assoc.metrics import Trajectories, gospa_over_time, hota, identity, ospa2
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Tracker, TrackTable
 from assoc.tracking.associate.all_sensors import whole_scan
@@ -119,8 +119,6 @@ class Judged(NamedTuple):
 
     distances: Array
     """GOSPA of each scan, metres."""
-    parts: dict[str, float]
-    """What it consists of: localisation, missed, false; metres, root mean squares."""
     ospa2: float
     hota: float
     switches: int
@@ -143,7 +141,6 @@ def judge(name: str, scene: Scene) -> Judged:
     _, windows = ospa2(truth, done.tracks, CUTOFF)
     return Judged(
         distances(scene, done.tracks),
-        mean_gospa(gospa_over_time(truth, done.tracks, CUTOFF)[1]),
         float(np.mean([window.distance for window in windows])) if windows else 0.0,
         hota(truth, done.tracks, CUTOFF).hota,
         identity(truth, done.tracks, CUTOFF).switches,
@@ -163,24 +160,10 @@ def means(runs: Sequence[Judged]) -> Array:
     return np.array([run.distances.mean() for run in runs])
 
 
-def compare(
-    label: str, names: Sequence[str], scenes: Sequence[Scene], judge: Callable[[str, Scene], Judged] = judge
-) -> tuple[list[Claim], dict[str, list[Judged]]]:
+def compare(label: str, names: Sequence[str], scenes: Sequence[Scene]) -> tuple[list[Claim], dict[str, list[Judged]]]:
     """What trackers of these names did on the same scenes: the claims, and all runs."""
     found = {name: [judge(name, scene) for scene in scenes] for name in names}
     return [claim for name, runs in found.items() for claim in claims_of(label, name, runs)], found
-
-
-def beside(
-    label: str, name: str, other: str, runs: Mapping[str, Sequence[Judged]], most: float, **how: bool
-) -> list[Claim]:
-    """The goal for GOSPA of a tracker beside another's: as a ratio to the oracle's, else as a difference."""
-    if not {name, other} <= set(runs):
-        return []
-    first, second = means(runs[name]), means(runs[other])
-    if other == "oracle":
-        return [goal(f"{label}: GOSPA, {name} / oracle", "", first / second, most, **how)]
-    return [goal(f"{label}: GOSPA, {name} - {other}", "m", first - second, most, **how)]
 
 
 def claims_of(label: str, name: str, runs: Sequence[Judged]) -> list[Claim]:

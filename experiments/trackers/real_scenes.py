@@ -12,6 +12,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.scene import Scene
 from assoc.sensors import Radar2D, Radar3D, Sensor
+from assoc.simulation import simulate as made
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking.filter_choice import make_filter
@@ -175,6 +176,7 @@ def flat_radars(seed: int) -> Case:
     return Case(simulate(SEPARATE, seed, sensors=sensors), options={"filter": filter}, level=True)
 
 
+TURNING: Mapping[str, Any] = {"turns": "4,5,5.5", "interval": INTERVAL, "duration": SCANS * INTERVAL}
 NOISY, LOUD = (160.0,) * 3, (240.0,) * 3
 ADAPTING = "multi-sensor, adapting"
 """What the programs run."""
@@ -204,6 +206,7 @@ ROWS: dict[str, Row] = {
     "six radars of 17 km, P_d 0.6": Row(lambda seed: short_radars(seed, 0.6), {"gospa": 300.0}),
     "six radars, P_d falling with range": Row(farther_seen_less),
     "three 2-D radars": Row(flat_radars, {"gospa": 170.0}),
+    "radars turning in 4, 5 and 5.5 s": Row(lambda seed: Case(made("rotating-radars", seed, **TURNING))),
     "P_d 0.6, declared 0.9": Row(misdeclared(SEPARATE, _separate(detection_probability=0.6)), {"gospa": 310.0}),
     "noise twice the declared": Row(misdeclared(SEPARATE, _separate(noise=NOISY)), {"gospa": 360.0}),
     "noise three times the declared": Row(misdeclared(SEPARATE, _separate(noise=LOUD)), {"gospa": 450.0, "false": 0.3}),

@@ -7,7 +7,6 @@ from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, T
 from experiments.common.claims import load_json
 from experiments.trackers import (
     as_they_are,
-    asynchronous,
     benchmark,
     close_targets,
     judging,
@@ -69,7 +68,7 @@ def test_rows_of_sensors_as_they_are(row):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("one", [asynchronous, benchmark], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("one", [benchmark], ids=lambda one: one.__name__)
 def test_other_experiments_as_programs(one, tmp_path, capsys):
     if one is benchmark:
         pytest.importorskip("stonesoup")
