@@ -29,8 +29,7 @@ _OF_FILE = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "*"}),
     Option("solver", "NAME", f"one or more solvers (default {DEFAULT_SOLVER})", rest={"nargs": "+"}),
     Option("grid", "NAME=V1,V2", "parameter values; every combination is run. SOLVER.NAME=... is for one of several "
-           "solvers; --random and --tune also take ranges LOW:HIGH or LOW:HIGH:log", rest={"nargs": "+"}),
-    Option("random", "N", "run N random settings from the values and ranges of --grid", whole(1)),
+           "solvers; --tune also takes ranges LOW:HIGH or LOW:HIGH:log", rest={"nargs": "+"}),
     Option("repeats", "N", "runs of each setting on each scan, each with its own seed (default 1)", whole(1)),
     Option("scans", "A:B", "only scans A to B-1 of each scene, counted from 0; A alone is one scan"),
     *(COMMON[name] for name in ("seed", "time_limit")),
@@ -125,8 +124,8 @@ def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:
     check_scheduler(given)
     if given["target"] is not None and given["tune"] is None:
         raise InvalidInputError(f"{given.label('target')}: can be given only with --tune")
-    if given["tune"] is not None and (tables or given["random"] or len(_solvers(given)) != 1):
-        raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without --random or tables")
+    if given["tune"] is not None and (tables or len(_solvers(given)) != 1):
+        raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without tables")
 
 
 def _check_outputs(given: Given, folder: str) -> None:
@@ -158,14 +157,15 @@ def _spaces(given: Given) -> dict[str, dict[str, Space]]:
 
 def make_study(given: Given, tables: Mapping[str, Any]) -> Study:
     """Return the study that the options describe."""
-    from assoc.sweeps.design import designed, settings_from
+    from assoc.sweeps.design import combinations, settings_of
     from assoc.sweeps.study import Study
 
     # report a wrong design before reading scenes
     if tables:
-        settings = settings_from(tables, given["random"], given["seed"] or 0, f"{given.file}: ")
+        settings = settings_of(tables, f"{given.file}: ")
     else:
-        settings = designed(list(_spaces(given).items()), given["random"], given["seed"] or 0, given.label("grid"))
+        designs = _spaces(given).items()
+        settings = [setting for design in designs for setting in combinations(*design, given.label("grid"))]
     return Study(settings=settings, **_scenes(given), **given.some(("seed", "time_limit", "cpu_limit", "repeats")))
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
-    from assoc.sweeps.design import grid, random_settings, settings_from
+    from assoc.sweeps.design import grid
     from assoc.sweeps.frame import load, load_traces
     from assoc.sweeps.setting import Setting
     from assoc.sweeps.study import Study
@@ -25,8 +25,6 @@ __all__ = [
     "grid",
     "load",
     "load_traces",
-    "random_settings",
-    "settings_from",
     "summarize",
     "tune",
 ]
@@ -40,8 +38,6 @@ __getattr__, __dir__ = lazy_names(
         "grid": "design",
         "load": "frame",
         "load_traces": "frame",
-        "random_settings": "design",
-        "settings_from": "design",
         "summarize": "summary",
         "tune": "tuning",
     },

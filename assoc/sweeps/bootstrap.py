@@ -24,7 +24,7 @@ def mean_interval(values: Floats, weights: Floats | None = None, *, resamples: i
     share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
     if not share.any():
         return np.nan, np.nan
-    of_rows, of_columns = _draws(*values.shape, resamples)
+    of_rows, of_columns = draws(*values.shape, resamples)
     # relative to the middle of the values, so that large equal numbers give an interval of width 0
     middle = weighted_mean(values, weights)
     away = np.where(share > 0, values - middle, 0.0)
@@ -35,19 +35,8 @@ def mean_interval(values: Floats, weights: Floats | None = None, *, resamples: i
     return float(low), float(high)
 
 
-def resampled_means(tables: Floats) -> Floats:
-    """Means (resamples, S) of S settings over the same resampled problems and repeats, for comparison in pairs.
-
-    ``tables`` is (S, problems, repeats), without NaN.
-    """
-    _, rows, columns = tables.shape
-    of_rows, of_columns = _draws(rows, columns, RESAMPLES)
-    weights = of_columns / (rows * columns)
-    return np.stack([((of_rows @ table) * weights).sum(axis=1) for table in tables], axis=1)
-
-
 @lru_cache(maxsize=8)
-def _draws(rows: int, columns: int, resamples: int) -> tuple[Floats, Floats]:
+def draws(rows: int, columns: int, resamples: int) -> tuple[Floats, Floats]:
     """Number of times that each row and each column is drawn, for each resample."""
     rng = np.random.default_rng(0)
     resamples = max(200, min(resamples, _MOST_NUMBERS // max(rows, columns)))

@@ -1,4 +1,4 @@
-"""Designs: the settings that a study runs. A grid takes every combination, a random design draws some."""
+"""Designs: the settings that a study runs, every combination of values; and the values or ranges that are searched."""
 
 from __future__ import annotations
 
@@ -10,61 +10,34 @@ from typing import Any
 
 import numpy as np
 
-from assoc._parameters import Parameter, whole_seed
+from assoc._parameters import Parameter
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.solvers import registry
 from assoc.sweeps.setting import Setting, parameter
 
-
-@dataclass(frozen=True)
-class Values:
-    """A list of values without duplicates."""
-
-    values: tuple[Any, ...]
-
-    @property
-    def single(self) -> bool:
-        """Whether there is nothing to choose."""
-        return len(self.values) == 1
-
-    def __contains__(self, value: object) -> bool:
-        return value in self.values
-
-    def draw(self, rng: np.random.Generator) -> Any:
-        """Draw a value."""
-        return self.values[int(rng.integers(len(self.values)))]
+MOST_SETTINGS = 1_000_000
+"""Largest number of settings of a design; more are taken for a typing error."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Numbers from ``low`` to ``high``, both included."""
+    """Numbers from ``low`` to ``high``, both included, for a search."""
 
     low: float
     high: float
     logarithmic: bool = False
     """Whether equal ratios are equally likely, rather than equal differences."""
     whole: bool = False
-    """Whether only whole numbers are drawn."""
-
-    single = False
+    """Whether only whole numbers are tried."""
 
     def __contains__(self, value: Any) -> bool:
         return self.low <= value <= self.high
 
-    def draw(self, rng: np.random.Generator) -> Any:
-        """Draw a number."""
-        if self.whole and not self.logarithmic:
-            return int(rng.integers(int(self.low), int(self.high) + 1))
-        share = float(rng.random())
-        if self.logarithmic:
-            value = self.low * (self.high / self.low) ** share
-        else:
-            value = self.low + (self.high - self.low) * share
-        return round(value) if self.whole else value
 
-
+Values = tuple[Any, ...]
 Space = Values | Range
+"""Values without duplicates, or a range."""
 
 
 def read_text(parameter: Parameter, text: str, label: str) -> Space:
@@ -78,27 +51,18 @@ def read_text(parameter: Parameter, text: str, label: str) -> Space:
     words = [word.strip() for word in text.split(",")]
     if not any(words):
         raise InvalidInputError(f"{label}: no values given, expected {parameter.name}=VALUE[,VALUE...]")
-    return values([_parse(parameter, word, label) for word in words])
+    return tuple(dict.fromkeys(_parse(parameter, word, label) for word in words))
 
 
-def read_value(parameter: Parameter, value: Any, label: str) -> Space:
-    """Read a value of a TOML file: one value, a list of them, or ``{low = .., high = .., log = true}``."""
-    if isinstance(value, dict):
-        unknown = sorted({*value} - {"low", "high", "log"})
-        if unknown or not {"low", "high"} <= {*value} or parameter.kind not in (int, float):
-            raise InvalidInputError(f"{label}: expected a value, a list or {{low, high, log}}, got {value!r}")
-        low, high = (parameter.check(value[end], f"{label}.{end}") for end in ("low", "high"))
-        return make_range(parameter, low, high, value.get("log", False) is True, label)
-    if not isinstance(value, list):
-        return Values((parameter.check(value, label),))
+def read_values(parameter: Parameter, value: Any, label: str) -> Values:
+    """Read one value, or a list of them."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple, range)):
+        return (parameter.check(value, label),)
     if not value:
         raise InvalidInputError(f"{label}: the list is empty, expected at least one value")
-    return values([parameter.check(item, label) for item in value])
-
-
-def values(found: list[Any]) -> Values:
-    """Return the values without duplicates, in the given order."""
-    return Values(tuple(dict.fromkeys(found)))
+    return tuple(dict.fromkeys(parameter.check(item, label) for item in value))
 
 
 def make_range(parameter: Parameter, low: float, high: float, logarithmic: bool, label: str) -> Range:
@@ -121,10 +85,6 @@ def _parse(parameter: Parameter, text: str, label: str) -> Any:
         expected = {int: "a whole number", float: "a number", bool: "true or false"}[parameter.kind]
         raise InvalidInputError(f"{label}: expected {expected}, got {text!r}") from None
     return parameter.check(value, label)
-
-
-MOST_SETTINGS = 1_000_000
-"""Largest number of settings of a design; more are taken for a typing error."""
 
 
 @explains_wrong_types
@@ -150,68 +110,25 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     LimitExceededError
         More than a million settings.
     """
-    return _combinations(solver, _spaces(solver, space or {}), "grid", "assoc.sweeps.random_settings")
+    return combinations(solver, _read(solver, space or {}), "grid")
 
 
-@explains_wrong_types
-def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int | None = 0) -> list[Setting]:
-    """Draw settings at random; the first n of a longer design are the design of length n.
-
-    Parameters
-    ----------
-    solver : str
-    space : mapping
-        For each parameter a list of values or ``{"low": .., "high": .., "log": True}``.
-    count : int
-        Number of settings to draw.
-    seed : int or None, default 0
-        None: a random seed.
-
-    Returns
-    -------
-    list of Setting
-        At most ``count``, without duplicates.
-    """
-    return _drawn(solver, _spaces(solver, space), count, whole_seed(seed), "count")
+def _read(solver: str, space: Mapping[str, Any]) -> dict[str, Values]:
+    return {name: read_values(parameter(solver, name), value, f"{solver}.{name}") for name, value in space.items()}
 
 
-def _spaces(solver: str, space: Mapping[str, Any]) -> dict[str, Space]:
-    return {
-        name: read_value(parameter(solver, name), _plain(value), f"{solver}.{name}") for name, value in space.items()
-    }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return list(value) if isinstance(value, (tuple, range)) else value
-
-
-def _combinations(solver: str, spaces: Mapping[str, Space], label: str, drawn_by: str) -> list[Setting]:
+def combinations(solver: str, spaces: Mapping[str, Space], label: str) -> list[Setting]:
+    """Every combination of the values of a solver's parameters."""
     registry.parameters(solver)
     lists = []
     for name, space in spaces.items():
         if isinstance(space, Range):
-            raise InvalidInputError(
-                f"{label}: {solver}.{name} is a range, which only a random design takes ({drawn_by}); give values"
-            )
-        lists.append(space.values)
+            raise InvalidInputError(f"{label}: {solver}.{name} is a range, which only --tune takes; give values")
+        lists.append(space)
     count = math.prod(map(len, lists))
     if count > MOST_SETTINGS:
-        raise LimitExceededError(f"{label}: {count} settings, at most {MOST_SETTINGS}; a random design can be smaller")
-    made = (Setting(solver, dict(zip(spaces, chosen, strict=True))) for chosen in itertools.product(*lists))
-    return list(dict.fromkeys(made))
-
-
-def _drawn(solver: str, spaces: Mapping[str, Space], count: int, seed: int, label: str) -> list[Setting]:
-    if not spaces:
-        raise InvalidInputError(f"space: no parameter of {solver} to draw; give values or a range")
-    if count > MOST_SETTINGS:
         raise LimitExceededError(f"{label}: {count} settings, at most {MOST_SETTINGS}")
-    made = []
-    for number in range(count):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-        made.append(Setting(solver, {name: space.draw(rng) for name, space in spaces.items()}))
+    made = (Setting(solver, dict(zip(spaces, chosen, strict=True))) for chosen in itertools.product(*lists))
     return list(dict.fromkeys(made))
 
 
@@ -253,59 +170,15 @@ def _owners(name: str, solvers: list[str], label: str) -> list[str]:
     return owners
 
 
-@explains_wrong_types
-def settings_from(
-    tables: Mapping[str, Any], random: int | None = None, seed: int = 0, label: str = ""
-) -> list[Setting]:
-    """Settings of a study described by tables, as a TOML file holds them.
-
-    Parameters
-    ----------
-    tables : mapping
-        For each solver a table or a list of tables: parameter to a value, a list of values, or
-        ``{low, high, log}`` (drawn, with ``random``).
-    random : int, optional
-        Number of settings to draw from each table with a list or a range; by default every combination is taken.
-    seed : int, default 0
-    label : str
-        Prefix of errors.
-    """
+def settings_of(tables: Mapping[str, Any], label: str) -> list[Setting]:
+    """Settings of the tables of a TOML file: for each solver a table or a list of tables, each a grid."""
+    found: list[Setting] = []
     try:
-        designs = [
-            (solver, _spaces(solver, _table(solver, table)))
-            for solver, given in tables.items()
-            for table in (given if isinstance(given, list) else [given])
-        ]
-        return designed(designs, random, seed, "random", "random")
+        for solver, given in tables.items():
+            for table in given if isinstance(given, list) else [given]:
+                if not isinstance(table, Mapping):
+                    raise InvalidInputError(f"[{solver}]: expected a table of parameters, got {table!r}")
+                found += grid(solver, {key.replace("-", "_"): value for key, value in table.items()})
     except (InvalidInputError, LimitExceededError) as error:
         raise type(error)(f"{label}{error}") from None
-
-
-def _table(solver: str, given: object) -> dict[str, Any]:
-    if not isinstance(given, Mapping):
-        raise InvalidInputError(f"[{solver}]: expected a table of parameters, got {given!r}")
-    return {key.replace("-", "_"): value for key, value in given.items()}
-
-
-def _is_open(spaces: Mapping[str, Space]) -> bool:
-    """Whether there is something to draw: a range, or several values."""
-    return any(isinstance(space, Range) or len(space.values) > 1 for space in spaces.values())
-
-
-def designed(
-    designs: Sequence[tuple[str, Mapping[str, Space]]],
-    random: int | None,
-    seed: int,
-    label: str = "--grid",
-    drawn_by: str = "--random",
-) -> list[Setting]:
-    """Settings of several solvers without duplicates: every combination, or ``random`` drawn ones of each design."""
-    found: list[Setting] = []
-    for solver, spaces in designs:
-        if random is not None and _is_open(spaces):
-            found += _drawn(solver, spaces, random, seed, drawn_by)
-        else:
-            found += _combinations(solver, spaces, label, f"{drawn_by}=N")
-    if random is not None and designs and not any(_is_open(spaces) for _, spaces in designs):
-        raise InvalidInputError(f"{label}: nothing to draw; give lists of values or ranges")
     return list(dict.fromkeys(found))

@@ -20,7 +20,7 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
-from assoc.sweeps.design import Space, Values
+from assoc.sweeps.design import Range, Space
 from assoc.sweeps.frame import load
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import study_sources
@@ -136,12 +136,12 @@ def _search(
     progress: Callable[[Counts], object] | None,
     where: Mapping[str, Any],
 ) -> Report:
-    searched = {name: choice for name, choice in space.items() if not choice.single}
+    fixed = {name: choice[0] for name, choice in space.items() if not isinstance(choice, Range) and len(choice) == 1}
+    searched = {name: choice for name, choice in space.items() if name not in fixed}
     if not searched:
         raise InvalidInputError(f"--tune: nothing to tune for {solver!r}; give ranges in --grid, as in NAME=LOW:HIGH")
     optuna = load_extra("optuna", "tune")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    fixed = {name: choice.values[0] for name, choice in space.items() if isinstance(choice, Values) and choice.single}
     default = Setting(solver, fixed)
     first = study(default)
     total = Counts(first.size * trials + study(default, last=True).size * 2, 0)
@@ -210,8 +210,8 @@ def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[
 
 
 def _suggest(trial: Any, name: str, space: Space) -> Any:
-    if isinstance(space, Values):
-        return trial.suggest_categorical(name, list(space.values))
+    if not isinstance(space, Range):
+        return trial.suggest_categorical(name, list(space))
     if space.whole:
         return trial.suggest_int(name, int(space.low), int(space.high), log=space.logarithmic)
     return trial.suggest_float(name, space.low, space.high, log=space.logarithmic)

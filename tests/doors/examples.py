@@ -108,7 +108,6 @@ def examples() -> dict[str, dict[str, Any]]:
             "scans": None,
         },
         "assoc.sweeps.grid": {"solver": "aco", "space": {"alpha": [1.0]}},
-        "assoc.sweeps.random_settings": {"solver": "aco", "space": {"alpha": [1.0, 2.0]}, "count": 1, "seed": 0},
         "assoc.tracking.track_scene": {"tracker": tracker(), "scene": one, "confirmed": True, "scans": None},
         "assoc.metrics.gospa": {"truth": points, "estimates": points, "cutoff": 10.0, "order": 2.0},
         "assoc.metrics.ospa": {"truth": points, "estimates": points, "cutoff": 10.0, "order": 2.0},

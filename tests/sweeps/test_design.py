@@ -1,12 +1,12 @@
-"""Designs: grids, random designs, TOML tables, and what is refused."""
+"""Designs: grids, TOML tables, and what is refused."""
 
 import pickle
 
 import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.sweeps import Setting, grid, random_settings, settings_from
-from assoc.sweeps.design import read_words
+from assoc.sweeps import Setting, grid
+from assoc.sweeps.design import combinations, read_words, settings_of
 
 
 def test_a_grid_is_every_combination_and_the_last_varies_fastest():
@@ -30,17 +30,17 @@ def test_equal_settings_have_equal_keys_whatever_was_left_out():
         (lambda: grid("aco", {"alhpa": [1]}), "did you mean alpha"),
         (lambda: grid("aco", {"alpha": []}), "empty"),
         (lambda: grid("aco", {"alpha": ["much"]}), "expected a number"),
-        (
-            lambda: grid("aco", {"alpha": {"low": 1, "high": 2}}),
-            r"takes \(assoc.sweeps.random_settings\)",
-        ),
-        (lambda: random_settings("aco", {"alpha": {"low": 2, "high": 1}}, 3), "low < high"),
-        (lambda: random_settings("aco", {"alpha": {"low": 0, "high": 1, "log": True}}, 3), "low > 0"),
+        (lambda: combinations("aco", read_words(["alpha=1:2"], ["aco"])["aco"], "--grid"), "which only --tune takes"),
+        (lambda: read_words(["alpha=2:1"], ["aco"]), "low < high"),
+        (lambda: read_words(["alpha=0:1:log"], ["aco"]), "low > 0"),
         (lambda: read_words(["alpha"], ["aco"]), "expected NAME=VALUE"),
         (lambda: read_words(["alpha=1,,2"], ["aco"]), "expected a number, got ''"),
         (lambda: read_words(["alpha=1", "alpha=2"], ["aco"]), "twice"),
         (lambda: read_words(["milp.backend=scip"], ["aco"]), "no solver of the study"),
-        (lambda: settings_from({"aco": {"alpha": {"low": 1, "high": 2}}}), r"^random: aco.alpha is .* \(random=N\)"),
+        (
+            lambda: settings_of({"aco": {"alpha": {"low": 1}}}, "study.toml: "),
+            "^study.toml: aco.alpha: expected",
+        ),
     ],
 )
 def test_bad_designs_are_one_clear_line(make, message):
@@ -52,7 +52,3 @@ def test_bad_designs_are_one_clear_line(make, message):
 def test_a_design_without_end_is_refused_before_it_is_made():
     with pytest.raises(LimitExceededError, match="settings"):
         grid("aco", {name: list(range(1, 2000)) for name in ("ants", "iterations", "patience")})
-    with pytest.raises(LimitExceededError, match="^count: "):
-        random_settings("aco", {"alpha": [1, 2]}, 10**7)
-    with pytest.raises(LimitExceededError, match="^study.toml: random: "):
-        settings_from({"aco": {"alpha": [1, 2]}}, 10**7, label="study.toml: ")

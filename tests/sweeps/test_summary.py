@@ -7,7 +7,7 @@ from scipy import stats
 
 from assoc.problem import AssignmentProblem
 from assoc.sweeps import grid, load, summarize
-from assoc.sweeps.bootstrap import mean_interval, resampled_means
+from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.study import Study
 from assoc.sweeps.summary import paired
 
@@ -30,14 +30,6 @@ def test_the_interval_covers_the_mean_where_problems_differ():
         covered += low <= 0.0 <= high
     # 190 expected; repeats alone would cover about 40
     assert covered >= 180
-
-
-def test_settings_are_compared_over_the_same_draws():
-    values = np.random.default_rng(2).normal(size=(20, 5))
-    means = resampled_means(np.stack([values, values + 1.0]))
-    assert means.shape == (2000, 2) and np.allclose(means[:, 1] - means[:, 0], 1.0)
-    low, high = np.quantile(means[:, 0], [0.025, 0.975])
-    assert (low, high) == pytest.approx(mean_interval(values))
 
 
 def test_the_summary_is_the_mean_of_the_rows(study, tmp_path):

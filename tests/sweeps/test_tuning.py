@@ -5,12 +5,12 @@ import json
 import pytest
 
 from assoc.sweeps import load, tune
-from assoc.sweeps.design import Range, Values
+from assoc.sweeps.design import Range
 
 
 def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_path):
     # one ant cannot disagree with itself: it stops after the greedy cycle, with a gap
-    space = {"mode": Values(("paper",)), "ants": Range(1, 20, whole=True), "iterations": Values((1,))}
+    space = {"mode": ("paper",), "ants": Range(1, 20, whole=True), "iterations": (1,)}
     report = tune(tmp_path / "t", study.sources, "aco", space, 8, repeats=2, seed=1)
     assert report.default.parameters["mode"] == "paper" and report.default.parameters["ants"] == 15
     assert report.training[1] <= report.training[0]

@@ -168,7 +168,7 @@ def claims(measured: dict[str, Measured], cut_off: int = 0) -> list[Claim]:
 
 
 def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
-    from assoc.sweeps.bootstrap import resampled_means
+    from assoc.sweeps.bootstrap import RESAMPLES, draws
 
     settings = list(PAPER)
     greater = np.array([alpha > beta for alpha, beta, _ in settings])
@@ -188,6 +188,13 @@ def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
         ours = means[..., [best]]
         # settings that tie share the places between them
         return 1 + (means[..., others] < ours).sum(axis=-1) + (means[..., others] == ours).sum(axis=-1) / 2
+
+    def resampled_means(tables: Any) -> Any:
+        """Means (resamples, settings) over the same resampled problems and repeats, for comparison in pairs."""
+        _, rows, columns = tables.shape
+        of_rows, of_columns = draws(rows, columns, RESAMPLES)
+        weights = of_columns / (rows * columns)
+        return np.stack([((of_rows @ table) * weights).sum(axis=1) for table in tables], axis=1)
 
     def compared(words: str, unit: str, values: Any, measure: Any, **how: Any) -> Claim:
         # rounded, so that equal means tie
