@@ -44,8 +44,9 @@ class PlainGNN:
         """Predict, associate sensor by sensor, start, confirm and end tracks."""
         if self.ids and time > self.time:
             self.states = self.filter.predict(self.states, time - self.time)
-        self.time, hit = time, np.zeros(len(self.ids), dtype=bool)
-        for s, (z, sensor) in enumerate(zip(measurements, self.scene.sensors, strict=True)):
+        self.time, self.now, hit = time, self.scene.at(time), np.zeros(len(self.ids), dtype=bool)
+        for s, (z, sensor) in enumerate(zip(measurements, self.now.sensors, strict=True)):
+            z = self.scene.sensors[s].aligned(z, np.full(len(z), time))
             free = np.ones(len(z), dtype=bool)
             if len(z) and self.ids:
                 expected, gate = self.filter.expected(self.states, sensor), chi2.ppf(GATE, sensor.dim)
@@ -76,7 +77,7 @@ class PlainGNN:
         """Start a track at each measurement that says where it is; whether tracks were detected, (T,)."""
         if not len(z):
             return hit
-        places, covariances = single_positions(self.scene, s, z)
+        places, covariances = single_positions(self.now, s, z)
         diagonal = float(np.linalg.norm(np.diff(self.scene.region, axis=1)))
         fit = np.flatnonzero((covariances[:, [0, 1], [0, 1]] <= (self.initiation.widest * diagonal) ** 2).all(axis=1))
         if not len(fit):
