@@ -216,7 +216,6 @@ def _scan_options(solver: str, parameters: dict[str, Any], given: Given) -> Scan
         solver,
         parameters=parameters,
         gating=given.some(parameter.name for parameter in _GATING),
-        pheromone=given["report"] is not None,
         marginals=bool(given["marginals"]),
         **given.some(("seed", "time_limit", "kbest")),
     )

@@ -34,12 +34,6 @@ def _radars() -> tuple[assoc.Scene, assoc.Association]:
     return scene, assoc.associate(scene, "aco")
 
 
-@cache
-def _ghosts() -> assoc.AssignmentProblem:
-    """Crossing bearings: many tuples are likely, and solvers need some time."""
-    return assoc.build_problem(simulate("bearing-only", 0, targets=30, scans=1), 0)
-
-
 def first_sight(figure: Any) -> None:
     """Draw what goes in and what comes out: plots of three sensors, and which of them are one target."""
     from assoc.plotting import plot_scene, plot_solution
@@ -86,27 +80,6 @@ def ghosts(figure: Any) -> None:
     plot_solution(scene, assoc.associate(scene, "exact").scans[0], ax=figure.subplots())
 
 
-def gates(figure: Any) -> None:
-    """Draw the gates of a scan near its targets, and how the chosen tuples fill theirs."""
-    from assoc.plotting import plot_gates, plot_scene
-
-    figure.set_size_inches(11, 4.6)
-    left, right = figure.subplots(1, 2)
-    scene, association = _radars()
-    plot_scene(scene, 50, gates=True, ax=left).set_title("gates around a target, 0.999")
-    place = 1e-3 * association.scans[50].positions[0]
-    left.set_xlim(place[0] - 0.5, place[0] + 0.5)
-    left.set_ylim(place[1] - 0.4, place[1] + 0.4)
-    plot_gates(scene, association, ax=right).set_title("100 scans")
-
-
-def costs(figure: Any) -> None:
-    """Draw all candidate tuples of a scan of crossing bearings, and which were chosen."""
-    from assoc.plotting import plot_costs
-
-    plot_costs(_ghosts(), assoc.assign(_ghosts(), "exact"), ax=figure.subplots())
-
-
 def convergence(figure: Any) -> None:
     """Draw cost and bound of two searches on a hard problem, which neither of them closes."""
     from assoc.plotting import plot_convergence
@@ -132,64 +105,17 @@ def pheromone(figure: Any) -> None:
         axes.legend(loc="lower left", fontsize=8) if of == "visibility" else axes.get_legend().remove()
 
 
-def heat_map(figure: Any) -> None:
-    """Draw a small study of the ants of the paper, with intervals."""
-    from assoc.plotting import plot_heat_map
-    from assoc.sweeps import Study, grid, load
-    from assoc.sweeps.sources import StudySource
-
-    source = StudySource(simulate("three-radar", 0, scans=10), "three-radar")
-    settings = grid("aco", {"mode": ["paper"], "alpha": [1.0, 2.0, 3.0], "rho": [0.3, 0.5, 0.7, 0.9]})
-    with tempfile.TemporaryDirectory() as folder:
-        study = Study([source], settings, repeats=5)
-        study.run(Path(folder) / "study")
-        plot_heat_map(load(Path(folder) / "study"), "iterations", ax=figure.subplots())
-
-
 def tracks(figure: Any) -> None:
     """Draw the tracks that a multi-sensor tracker makes of the radars' scene, over the truth."""
     from assoc.plotting import plot_tracks
-
-    scene, frame = _tracked()
-    plot_tracks(frame, scene, ax=figure.subplots())
-
-
-@cache
-def _tracked() -> tuple[assoc.Scene, Any]:
     from assoc.tracking import MultiSensorTracker, track_scene
 
     scene = _radars()[0]
     table, _ = track_scene(MultiSensorTracker.for_scene(scene), scene)
-    return scene, table.to_frame()
+    plot_tracks(table.to_frame(), scene, ax=figure.subplots())
 
 
-def metric(figure: Any) -> None:
-    """Draw GOSPA over time, and its parts."""
-    from assoc.metrics import Trajectories, gospa_over_time
-    from assoc.plotting import plot_metric
-
-    figure.set_size_inches(7, 4)
-    scene, frame = _tracked()
-    truth = Trajectories.from_scene(scene)
-    found = Trajectories(frame["time"], frame["track_id"], frame[["x", "y", "z"]])
-    at, values = gospa_over_time(truth, found, 300.0)
-    parts = {"GOSPA": [value.distance for value in values]}
-    parts |= {name: [getattr(value, name) ** 0.5 for value in values] for name in ("localisation", "missed", "false")}
-    plot_metric(at, parts, name="GOSPA with cutoff 300 m", unit="m", ax=figure.subplots())
-
-
-def overview(figure: Any) -> None:
-    """Draw an association at a glance."""
-    from assoc.plotting import plot_overview
-
-    figure.set_size_inches(11, 9)
-    scene = simulate("bearing-only", 0, targets=30, scans=1)
-    plot_overview(scene, assoc.associate(scene, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
-
-
-_DRAWN = (
-    first_sight, scene, solution, ghosts, gates, costs, convergence, pheromone, heat_map, tracks, metric, overview,
-)  # fmt: skip
+_DRAWN = (first_sight, scene, solution, ghosts, convergence, pheromone, tracks)
 PICTURES: dict[str, Callable[[Any], None]] = {draw.__name__.replace("_", "-"): draw for draw in _DRAWN}
 
 

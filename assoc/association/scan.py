@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from assoc._text.shown import Shown
 from assoc._text.times import moment
 from assoc.solution import Solution
-
-if TYPE_CHECKING:
-    from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +42,6 @@ class ScanAssociation(Shown):
         Those of them whose measurements form exactly a chosen tuple.
     ranked : tuple of ScanAssociation
         The k best associations of the scan, this one first; empty if not requested.
-    pheromone : PheromoneHistory or None
-        Largest pheromone values, if requested (solver aco).
     compile_time : float
         Seconds of compiling or loading kernels for this scan, costs and positions included; not part of
         ``solution.runtime``.
@@ -66,7 +61,6 @@ class ScanAssociation(Shown):
     true_tuples: int | None = None
     correct_tuples: int | None = None
     ranked: tuple[ScanAssociation, ...] = ()
-    pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
     probabilities: NDArray[np.float64] | None = None
 

@@ -26,7 +26,6 @@ from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
 from assoc.solvers import registry
-from assoc.solvers.aco.pheromone_history import pheromone
 from assoc.solvers.assign import assign
 
 GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tuples")
@@ -34,8 +33,6 @@ GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tupl
 
 # most scans that are sent to a process at once
 _TOGETHER = 64
-# tuples whose pheromone is kept
-_NODES = 30
 
 
 @dataclass(frozen=True)
@@ -50,8 +47,6 @@ class ScanOptions:
     """Options of ``assoc.build_problem``."""
     kbest: int | None = None
     """Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver."""
-    pheromone: bool = False
-    """Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it."""
     marginals: bool = False
 
     def __post_init__(self) -> None:
@@ -88,7 +83,7 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Sca
 
 def associate_scan(source: Source, scan: int | Scan, options: ScanOptions) -> ScanAssociation:
     """Associate a scan of a scene, or of its sensors; of a problem, which has no scans, the problem."""
-    compiled, history = compile_seconds(), None
+    compiled = compile_seconds()
     seed: int | np.random.SeedSequence = options.seed
     if isinstance(source, AssignmentProblem):
         problem = source
@@ -100,9 +95,6 @@ def associate_scan(source: Source, scan: int | Scan, options: ScanOptions) -> Sc
     common: Any = {"seed": seed, "time_limit": options.time_limit, **options.parameters}
     if options.kbest is not None:
         solutions = kbest(problem, options.kbest, time_limit=options.time_limit)
-    elif options.pheromone and options.solver == "aco":
-        history = pheromone(problem, **common).top(_NODES)
-        solutions = [history.solution]
     else:
         solutions = [assign(problem, options.solver, **common)]
     found = [_of_problem(problem, solution) for solution in solutions]
@@ -111,7 +103,7 @@ def associate_scan(source: Source, scan: int | Scan, options: ScanOptions) -> Sc
         found = [_placed(one, source, measured, options.gating.get("speed", SPEED)) for one in found]
     if options.marginals:
         found = _with_probabilities(found, marginals(problem, time_limit=options.time_limit))
-    found = [replace(one, pheromone=history, compile_time=compile_seconds() - compiled) for one in found]
+    found = [replace(one, compile_time=compile_seconds() - compiled) for one in found]
     return found[0] if options.kbest is None else replace(found[0], ranked=tuple(found))
 
 

@@ -11,25 +11,14 @@ from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
     from assoc.plotting.convergence import plot_convergence
-    from assoc.plotting.costs import plot_costs, plot_gates
-    from assoc.plotting.heat_map import plot_heat_map
-    from assoc.plotting.metric import plot_metric
-    from assoc.plotting.overview import plot_overview
     from assoc.plotting.pheromone import plot_pheromone
-    from assoc.plotting.residuals import plot_residuals
     from assoc.plotting.scene import plot_scene
     from assoc.plotting.solution import plot_solution
     from assoc.plotting.tracks import plot_tracks
 
 __all__ = [
     "plot_convergence",
-    "plot_costs",
-    "plot_gates",
-    "plot_heat_map",
-    "plot_metric",
-    "plot_overview",
     "plot_pheromone",
-    "plot_residuals",
     "plot_scene",
     "plot_solution",
     "plot_tracks",
@@ -39,13 +28,7 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "plot_convergence": "convergence",
-        "plot_costs": "costs",
-        "plot_gates": "costs",
-        "plot_heat_map": "heat_map",
-        "plot_metric": "metric",
-        "plot_overview": "overview",
         "plot_pheromone": "pheromone",
-        "plot_residuals": "residuals",
         "plot_scene": "scene",
         "plot_solution": "solution",
         "plot_tracks": "tracks",

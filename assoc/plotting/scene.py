@@ -9,10 +9,8 @@ import numpy as np
 
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
-from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
-from assoc.plotting.ellipses import ellipses, position_covariances
 from assoc.plotting.measured import distances_to_border, positions_of
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -24,8 +22,6 @@ def plot_scene(
     scene: Scene,
     scan: int | None = None,
     *,
-    gates: bool = False,
-    gate_probability: float = 0.999,
     ax: Any = None,
 ) -> Any:
     """Draw sensors, targets and measurements.
@@ -35,11 +31,6 @@ def plot_scene(
     scene : Scene
     scan : int, optional
         The scan to draw; default: all measurements, and the truth as paths.
-    gates : bool
-        Draw around each measurement the region that contains its target with the gate's probability (a wedge for
-        a bearing). Two measurements can be one target if their gates overlap.
-    gate_probability : float
-        In (0, 1).
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
@@ -47,8 +38,6 @@ def plot_scene(
     -------
     Axes
     """
-    if gates and not 0.0 < gate_probability < 1.0:
-        raise InvalidInputError(f"gate_probability: expected a number between 0 and 1, got {gate_probability!r}")
     ax = axes_or_new(ax)
     chosen = [scene.scan(scan)] if scan is not None else [scene.scan(k) for k in range(scene.num_scans)]
     middle = float(scene.region[2].mean())
@@ -74,8 +63,6 @@ def plot_scene(
         size = 3.0 if scan is None else 7.0 - (s % 3)
         style: dict[str, Any] = {"markerfacecolor": "none"} if scan is not None else {"alpha": 0.5}
         ax.plot(*ends[:, :2].T, marker(s), color=colour(s), markersize=size, label=label, **style)
-    if gates:
-        _draw_gates(ax, scene, sensors, chosen, middle, gate_probability, unit.factor)
     draw_truth(ax, scene, chosen, unit.factor, paths=len(chosen) > 1)
     draw_sensors(ax, sensors, unit.factor)
     set_plan_view(ax, box_around(near, far), unit)
@@ -98,30 +85,6 @@ def draw_rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
     lines = np.full((len(ends), 3, 2), np.nan)
     lines[:, 0], lines[:, 1] = site[:2], ends[:, :2]
     ax.plot(*lines.reshape(-1, 2).T, **style)
-
-
-def _draw_gates(
-    ax: Any,
-    scene: Scene,
-    sensors: Sequence[Sensor],
-    scans: Sequence[Scan],
-    height: float,
-    probability: float,
-    factor: float,
-) -> None:
-    for s, sensor in enumerate(sensors):
-        z = np.concatenate([scan.measurements[s] for scan in scans])
-        style = {"color": colour(s), "linewidth": 0.8, "linestyle": "--"}
-        if _bears(sensor):
-            # one degree of freedom: the square root of the quantile is that of the normal distribution
-            from scipy.special import ndtri
-
-            half = float(ndtri(0.5 + 0.5 * probability) * np.sqrt(sensor.covariance[0, 0]))
-            for side in (-half, half):
-                draw_rays(ax, factor * sensor.position, factor * _ends(scene, sensor, z + side, height), **style)
-            continue
-        x, y = ellipses(positions_of(sensor, z, height, 0.0), position_covariances(sensor, z, height), probability)
-        ax.plot(factor * x, factor * y, **style)
 
 
 def draw_truth(ax: Any, scene: Scene, scans: Sequence[Scan], factor: float, *, paths: bool) -> None:

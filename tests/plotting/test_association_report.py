@@ -115,24 +115,6 @@ def _of_problem(problem):
     return gathered(associate_scans((problem,), options), options)
 
 
-def test_the_chance_that_a_tuple_is_drawn_is_the_ants_own(tmp_path):
-    scene = simulate("bearing-only", 0, targets=12, scans=2)
-    parameters = {"mode": "mmas", "iterations": 20, "refinement": "none"}
-    options = ScanOptions("aco", parameters=parameters, pheromone=True)
-    association = gathered(associate_scans((scene,), options), options)
-    write_association_report(tmp_path / "out.html", association, scene)
-    figure = figures_of(tmp_path / "out.html")["pheromone-0"]
-    for k, one in enumerate(association.scans):
-        history = one.pheromone
-        rows = [f"({', '.join(map(str, row))})" for row in history.tuples.tolist()]
-        for name, factor in (("pheromone", 1.0), ("visibility", 1.0), ("probability", 100.0)):
-            drawn = step_of(figure, k, name)
-            for label, values in zip(drawn["y"], drawn["z"], strict=True):
-                j = rows.index(label.removesuffix(" chosen"))
-                assert history.chosen[j] == label.endswith(" chosen")
-                assert values == pytest.approx((factor * getattr(history, name)[:, j]).tolist(), rel=6e-3)
-
-
 @pytest.mark.slow
 def test_a_hundred_scans_stay_below_nine_megabytes(tmp_path):
     scene = simulate("crowd", 0, targets=60, scans=100)

@@ -106,25 +106,12 @@ def test_solution(scene, association, ax):
     for wrong in (0.0, 1.0, -0.5, np.nan):
         with pytest.raises(assoc.InvalidInputError, match="probability: expected a number between 0 and 1"):
             plotting.plot_solution(scene, one, probability=wrong, ax=ax)
-        with pytest.raises(assoc.InvalidInputError, match="gate_probability: expected a number between 0 and 1"):
-            plotting.plot_scene(scene, 0, gates=True, gate_probability=wrong, ax=ax)
-    with pytest.raises(assoc.InvalidInputError, match="bins: expected a whole number >= 1, got 0"):
-        plotting.plot_gates(scene, association, bins=0, ax=ax)
     other = assoc.simulation.simulate("crowd", 1, targets=2, scans=scene.num_scans)
-    for draw in (lambda: plotting.plot_solution(other, one, ax=ax), lambda: plotting.plot_gates(other, [one], ax=ax)):
-        with pytest.raises(assoc.InvalidInputError, match="association: is not one of this scene"):
-            draw()
+    with pytest.raises(assoc.InvalidInputError, match="association: is not one of this scene"):
+        plotting.plot_solution(other, one, ax=ax)
 
 
-def test_gates_fill_evenly_where_the_model_is_right():
-    scene = simulate("three-radar", 5)
-    ax = plotting.plot_gates(scene, assoc.associate(scene, "greedy"), bins=10, ax=new_figure().subplots())
-    assert_units(ax)
-    counts = np.array([bar.get_height() for bar in ax.patches])
-    assert counts.sum() > 200 and stats.chisquare(counts).pvalue > 1e-4
-
-
-def test_tracks_and_metric(scene, ax):
+def test_tracks(scene, ax):
     rows = [
         {"track_id": 3 + t, "time": k, "x": p[t, 0], "y": p[t, 1]}
         for k, p in enumerate(scene.truth.positions)
@@ -139,8 +126,3 @@ def test_tracks_and_metric(scene, ax):
             plotting.plot_tracks(frame.assign(x=wrong), ax=ax)
     with pytest.raises(assoc.InvalidInputError, match="'time' is missing"):
         plotting.plot_tracks(frame.drop(columns="time"), ax=ax)
-    other = plotting.plot_metric([0, 1, 2], {"a": [1, 2, 3], "b": [3, 2, np.nan]}, name="GOSPA", unit="m")
-    assert_units(other)
-    assert other.get_ylabel() == "GOSPA (m)" and line(other, "a")[:, 1].tolist() == [1, 2, 3]
-    with pytest.raises(assoc.InvalidInputError, match="shape of times"):
-        plotting.plot_metric([0, 1], [1.0], name="GOSPA", unit="m", ax=ax)

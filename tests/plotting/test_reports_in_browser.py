@@ -21,7 +21,7 @@ from assoc.sweeps.sources import StudySource
 from tests.browser import DESKTOP, PHONE, complaints, in_time, requests, screenshot, show
 from tests.registration.common import biased_scene
 
-KINDS = ["scene", "problem", "ants", "tracks", "study", "biases"]
+KINDS = ["scene", "problem", "tracks", "study", "biases"]
 BUTTONS = {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
 CLICK_ALL = """
 const buttons = [...document.querySelectorAll('.modebar-btn')];
@@ -43,8 +43,6 @@ def pages(tmp_path_factory):
     problem = assoc.AssignmentProblem.from_dense(np.random.default_rng(0).normal(size=(4, 4, 4)), dummy=False)
     options = ScanOptions("exact")
     write_association_report(folder / "problem.html", gathered(associate_scans((problem,), options), options), problem)
-    options = ScanOptions("aco", parameters={"mode": "mmas", "iterations": 20, "refinement": "none"}, pheromone=True)
-    write_association_report(folder / "ants.html", gathered(associate_scans((scene,), options), options), scene)
     rows = association.to_frame().rename(columns={"target": "track_id"})
     write_tracking_report(folder / "tracks.html", rows[["track_id", "time", "x", "y", "z"]].dropna(), scene)
     settings = grid("aco", {"alpha": [1, 2], "rho": [0.3, 0.9]})

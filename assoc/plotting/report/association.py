@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from assoc.plotting.report.figures import (
     evenly,
     layout,
     line,
-    menu,
     plain_numbers,
     scatter,
     sliding,
@@ -33,7 +31,6 @@ from assoc.plotting.report.page import Part, cards, check_report, definitions, n
 from assoc.plotting.report.scene import scene_figure
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
-from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 _MOST_SOURCES = 12
 _LINES_OF_TRACE = 200
@@ -112,13 +109,6 @@ def _content(
             Part("Targets", _targets(scans, costs)),
             Part("Convergence", "", [_convergence(scans)] + ([_over_scans(scans)] if len(scans) > 1 else [])),
         ]
-    asked = [(_name(scan), scan.pheromone) for scan in scans if scan.pheromone is not None]
-    walked = [(name, history) for name, history in asked if len(history.cycles)]
-    if len(walked) < len(asked):
-        parts.append(Part("Without ants", note(f"In {len(asked) - len(walked)} of {len(asked)} scans no ant walked.")))
-    if walked:
-        about = "What the ants lay on a tuple, how they see it, and the chance that they draw it, cycle by cycle."
-        parts.append(Part("Pheromone", note(about), [pheromone_figure(walked)]))
     # scenes and problems show themselves in notebooks in the same way
     shown = [
         (f"<h3>{escape(file)}</h3>" if file else "") + f'<div class="scroll">{each[rows[0]]._repr_html_()}</div>'
@@ -272,45 +262,3 @@ def _over_scans(scans: Sequence[ScanAssociation]) -> Dicts:
         for i, (name, values) in enumerate(measures.items())
     ]  # fmt: skip
     return {"data": data, "layout": layout("row of the table of scans, from 0", "all scans")}
-
-
-_CYCLES = 60
-_TUPLES = 25
-_BUDGET = 900_000
-_KINDS = {"pheromone": "pheromone", "visibility": "visibility", "probability": "probability to be drawn, %"}
-
-
-def pheromone_figure(histories: Sequence[tuple[str, PheromoneHistory]]) -> Dicts:
-    """Heat maps over tuples and cycles, with a slider over the scans (their names, and what the ants did)."""
-    steps = [(name, _maps(history)) for name, history in histories]
-    bar = {"thickness": 12}
-    data: list[Dicts] = [
-        {"type": "heatmap", "name": kind, "visible": kind == "pheromone", "colorscale": "Cividis", "colorbar": bar,
-         "hovertemplate": "%{y}<br>cycle %{x}: %{z:.3g}<extra></extra>"}
-        for kind in _KINDS
-    ]  # fmt: skip
-    choices = [(text, [{"visible": [kind == one for one in _KINDS]}]) for kind, text in _KINDS.items()]
-    chosen = menu(choices, 0.0) | {"y": -0.16, "yanchor": "top", "direction": "up"}
-    shown = layout(
-        "cycle", "tuple", height="high", showlegend=False, updatemenus=[chosen],
-        yaxis={"type": "category", "autorange": "reversed"}, margin={"b": 80},
-    )  # fmt: skip
-    kept = [steps[i] for i in evenly(len(steps))]
-    return sliding({"data": data, "layout": shown}, within_budget(kept, _BUDGET))
-
-
-def _maps(history: PheromoneHistory) -> list[Dicts]:
-    top = history.top(_TUPLES)
-    count = len(history.cycles)
-    # evenly spaced, the first and the last among them
-    kept = np.unique(np.linspace(0, count - 1, min(count, _CYCLES)).round().astype(int)) if count else np.zeros(0, int)
-    rows = zip(top.tuples.tolist(), top.chosen.tolist(), strict=True)
-    names = [f"({', '.join(map(str, row))}){' chosen' if chosen else ''}" for row, chosen in rows]
-    x: list[Any] = top.cycles[kept].tolist()
-    values = (top.pheromone, top.visibility, 100.0 * top.probability)
-    return [{"x": x, "y": names, "z": _numbers(value[kept].T)} for value in values]
-
-
-def _numbers(values: Array) -> list[list[float | None]]:
-    """Numbers with three digits; None where no ant has walked."""
-    return [[float(f"{value:.3g}") if np.isfinite(value) else None for value in row] for row in values.tolist()]

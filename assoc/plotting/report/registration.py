@@ -14,7 +14,6 @@ from assoc._types import Array
 from assoc.plotting.colours import BLUE, GREY, ORANGE
 from assoc.plotting.report.figures import layout
 from assoc.plotting.report.page import Part, cards, check_report, note, settings_part, table, write_page
-from assoc.plotting.residuals import residual_columns
 from assoc.registration import Registration
 from assoc.registration.terms import label_of
 from assoc.sensors.base import ANGLES
@@ -46,7 +45,7 @@ def write_registration_report(
         The file cannot be written.
     """
     check_report()
-    shown = [component for component in _COMPONENTS if residual_columns(registration, component)]
+    shown = [component for component in _COMPONENTS if _columns(registration, component)]
     about = note(
         "Each measurement against the position that fits its tuple best. A box holds the middle half, its line is the "
         "median, its whiskers 95 %; the grey marks are the sensor's own noise, 95 %."
@@ -59,6 +58,15 @@ def write_registration_report(
         settings_part("", "assoc.register", words),
     ]
     write_page(path, f"Registration of {name}" if name else "Registration", lead, parts)
+
+
+def _columns(registration: Registration, component: str) -> list[tuple[int, int]]:
+    """Sensors that measure a component, and its index among theirs."""
+    return [
+        (s, sensor.components.index(component))
+        for s, sensor in enumerate(registration.sensors)
+        if component in sensor.components[: sensor.position_part.dim]
+    ]
 
 
 def _summary(registration: Registration) -> str:
@@ -87,7 +95,7 @@ def _biases(registration: Registration) -> str:
 
 def _boxes(registration: Registration, component: str) -> dict[str, Any]:
     scale, unit = (float(np.degrees(1.0)), "deg") if component in ANGLES else (1.0, "m")
-    columns = residual_columns(registration, component)
+    columns = _columns(registration, component)
     names = [escape(label_of(registration.sensors, s)) for s, _ in columns]
     data: list[dict[str, Any]] = []
     for when, colour in (("before", BLUE), ("after", ORANGE)):

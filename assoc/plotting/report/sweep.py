@@ -30,7 +30,6 @@ _MOST_CURVES = 60
 _MOST_MAPS = 10
 
 _NOTE_MAPS = "Means over all runs with these values; point at a cell for the 95 % interval, by the bootstrap."
-_NOTE_ALONE = "Mean of each setting with its 95 % interval, over one parameter."
 _NOTE_CURVES = (
     "Mean cost above the best known. A run counts with the best it has found by then. The settings of least mean "
     "excess come first."
@@ -94,8 +93,6 @@ def write_sweep_report(
     figures = [_map(*one, measures) for one in _pairs(frame)]
     if figures:
         parts.append(Part("Over two parameters", note(_NOTE_MAPS), figures))
-    if names:
-        parts.append(Part("Over one parameter", note(_NOTE_ALONE), [_alone(summary, names, titles, measures)]))
     curves = _curves(frame, load_traces(folder), summary, titles)
     parts += [Part("Convergence", note(_NOTE_CURVES), curves), about]
     write_page(path, name, lead, parts)
@@ -185,39 +182,6 @@ def _map(solver: str, part: pd.DataFrame, across: str, up: str, measures: Sequen
         f"{across} ({escape(solver)})", up, showlegend=False, updatemenus=[menu(choices)], margin={"t": 50},
         xaxis={"type": "category"}, yaxis={"type": "category"},
     )  # fmt: skip
-    return {"data": data, "layout": shown}
-
-
-def _alone(summary: pd.DataFrame, names: Sequence[str], titles: Sequence[str], measures: Sequence[str]) -> Dicts:
-    """Means of the settings over one parameter, with menus of measures and parameters."""
-    data: list[Dicts] = []
-    columns = {
-        name: [value if isinstance(value, (int, float)) else escape(_value(value)) or None for value in kept]
-        for name, kept in ((name, summary[name].astype(object).where(summary[name].notna(), None)) for name in names)
-    }
-    for measure in measures:
-        middle, low, high = (
-            FACTORS.get(measure, 1.0) * summary[f"{measure}{end}"].to_numpy(dtype=float)
-            for end in ("", "_low", "_high")
-        )
-        bars = {
-            "array": plain_numbers(high - middle, 6),
-            "arrayminus": plain_numbers(middle - low, 6),
-            "symmetric": False,
-        }
-        data.append(
-            scatter(LABELS[measure], x=columns[names[0]], y=plain_numbers(middle, 6), error_y=bars, visible=not data,
-                    text=[*map(escape, titles)], hovertemplate="%{text}<br>%{y}<extra></extra>", marker={"size": 8})
-        )  # fmt: skip
-    of: Choices = [
-        (LABELS[one], [{"visible": [other == one for other in measures]}, {"yaxis.title.text": LABELS[one]}])
-        for one in measures
-    ]
-    over: Choices = [
-        (f"over {name}", [{"x": [columns[name]] * len(data)}, {"xaxis.title.text": name}]) for name in names
-    ]
-    menus = [menu(of), *([menu(over, 0.55)] if len(names) > 1 else [])]
-    shown = layout(names[0], LABELS[measures[0]], showlegend=False, updatemenus=menus, margin={"t": 50})
     return {"data": data, "layout": shown}
 
 
