@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assoc.metrics.association_accuracy import AssociationAccuracy, association_accuracy
+from assoc._system.imports import lazy_names
 from assoc.metrics.ct_mt_it import CtMtIt, ct_mt_it
 from assoc.metrics.gospa import Gospa, gospa, gospa_over_time, mean_gospa
 from assoc.metrics.hota import Hota, hota
@@ -15,7 +15,6 @@ from assoc.metrics.summary import Summary, summarise
 from assoc.metrics.trajectories import Trajectories
 
 __all__ = [
-    "AssociationAccuracy",
     "CtMtIt",
     "Gospa",
     "Hota",
@@ -23,7 +22,6 @@ __all__ = [
     "Ospa",
     "Summary",
     "Trajectories",
-    "association_accuracy",
     "ct_mt_it",
     "gospa",
     "gospa_over_time",
@@ -41,3 +39,5 @@ __all__ = [
     "track_rmse",
     "tracks_of_one_identity",
 ]
+
+__getattr__, __dir__ = lazy_names(__name__, {})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,32 +19,6 @@ def clusters_of(problem: AssignmentProblem) -> list[NDArray[np.int64]]:
     sizes = problem.sizes.astype(np.int64)
     order, start = _clusters(problem.tuples, np.cumsum(sizes) - sizes, int(sizes.sum()))
     return [order[first:last] for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True)]
-
-
-def cluster_problems(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
-    """Independent clusters as separate problems, small ones first, and the rows of their tuples.
-
-    A single measurement in no other tuple needs no decision and is left out. Without dummies the measurements of the
-    smallest sensor connect all clusters.
-    """
-    if not problem.dummy:
-        yield problem, np.arange(problem.num_tuples)
-        return
-    clusters = clusters_of(problem)
-    if len(clusters) == 1 and problem.sizes.sum() > 1:
-        yield problem, clusters[0]
-        return
-    for which in sorted(clusters, key=len):
-        columns, sizes = zip(*(_numbered(column) for column in problem.tuples[which].T), strict=True)
-        if sum(sizes) > 1:
-            yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
-
-
-def _numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
-    """Renumber one sensor's measurements in a cluster from 1 (0 is the dummy); return the numbers and their count."""
-    used, number = np.unique(column, return_inverse=True)
-    alone = used[0] != 0
-    return number.reshape(-1) + int(alone), used.size - int(not alone)
 
 
 def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from assoc._system.imports import lazy_names
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
-from assoc.recordings.groupings import fixed_groups, groups_of_sizes, irregular_groups
 from assoc.recordings.radar import radar_of, with_heights
 from assoc.recordings.reading import read_plots
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.recordings.rotation import estimate_rotation
 from assoc.recordings.several import scene_of_radars
-from assoc.recordings.windows import Window, clustering_time_window
+from assoc.recordings.windows import Window, clustering_time_window, irregular_groups
 from assoc.recordings.writing import write_plots, write_tracks
 
 __all__ = [
@@ -19,9 +19,7 @@ __all__ = [
     "Window",
     "clustering_time_window",
     "estimate_rotation",
-    "fixed_groups",
     "garbled_altitudes",
-    "groups_of_sizes",
     "irregular_groups",
     "radar_of",
     "read_plots",
@@ -30,3 +28,5 @@ __all__ = [
     "write_plots",
     "write_tracks",
 ]
+
+__getattr__, __dir__ = lazy_names(__name__, {})

@@ -24,6 +24,7 @@ LONG_GAP = 20.0
 """Rotations without a plot after which the antenna's phase is taken anew."""
 
 MOST_TURNS = 1e12
+MOST_GROUPS = 10_000_000
 # turns that set the antenna's phase at first
 _SETTLED = 5
 
@@ -260,3 +261,43 @@ def _quietest(counts: Array) -> float:
     weights = np.exp(-0.5 * (width / 4.0) ** 2)
     smooth = np.real(np.fft.ifft(np.fft.fft(counts.astype(float)) * np.fft.fft(weights)))
     return (float(np.argmin(np.round(smooth, 9))) + 0.5) * 2 * math.pi / cells
+
+
+@explains_wrong_types
+def irregular_groups(
+    recording: Recording, rng: np.random.Generator, mean: float = 6.2, shape: float = 2.0
+) -> list[Window]:
+    """Group plots by intervals of irregular length, as the paper's data come without a window.
+
+    The paper has 183 groups for 119 rotations, some shorter and some longer than one, and does not explain
+    their lengths. Here they are gamma-distributed.
+
+    Parameters
+    ----------
+    recording : Recording
+    rng : numpy.random.Generator
+    mean : float, default 6.2
+        Of the lengths, seconds.
+    shape : float, default 2
+        Of the gamma distribution; with 2 about a fifth of the groups are longer than 9.5 s.
+
+    Returns
+    -------
+    list of Window
+        Without empty ones.
+    """
+    if not 0 < mean < math.inf or not 0 < shape < math.inf:
+        raise InvalidInputError(f"mean, shape: expected numbers > 0, got {mean!r}, {shape!r}")
+    if not len(recording):
+        return []
+    start, end = float(recording.times[0]), float(recording.times[-1])
+    edges: list[float] = []
+    reached = start
+    while reached <= end:
+        # drawn in blocks; gaps of hours take as many groups as they last
+        lengths = np.cumsum(rng.gamma(shape, mean / shape, 256))
+        edges.extend((reached + lengths).tolist())
+        reached = edges[-1]
+        if len(edges) > MOST_GROUPS:
+            raise InvalidInputError(f"mean, shape: {mean:g}, {shape:g} make more than {MOST_GROUPS} groups")
+    return windows_of(recording, np.searchsorted(np.array(edges), recording.times, side="right"))

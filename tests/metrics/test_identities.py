@@ -13,7 +13,6 @@ import assoc
 from assoc.errors import InvalidInputError
 from assoc.metrics import (
     Trajectories,
-    association_accuracy,
     ct_mt_it,
     identity,
     identity_after_each,
@@ -142,20 +141,6 @@ def test_plots_in_parts_count_as_all_at_once():
     whole = ct_mt_it(windows, sources, tracks, confirmed)
     np.testing.assert_array_equal(rates.result().per_window, whole.per_window)
     assert kept.result() == tracks_of_one_identity(sources, tracks, confirmed)
-
-
-@settings(max_examples=60)
-@given(st.lists(st.tuples(st.integers(-1, 2), st.integers(-1, 2), st.integers(0, 1)), max_size=10))
-def test_association_accuracy_counts_pairs(rows):
-    sources, labels, instants = np.array(rows, dtype=int).reshape(-1, 3).T
-    found = association_accuracy(sources, labels, instants)
-    together = right = real = 0
-    for (s, g, k), (t, h, m) in itertools.combinations(rows, 2):
-        if k == m:
-            grouped, same = g == h and g >= 0, s == t and s >= 0
-            together, real, right = together + grouped, real + same, right + (grouped and same)
-    for value, part, whole in ((found.pair_precision, right, together), (found.pair_recall, right, real)):
-        assert math.isnan(value) if not whole else value == pytest.approx(part / whole)
 
 
 def test_rmse():

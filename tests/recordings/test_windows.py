@@ -9,8 +9,6 @@ from assoc.errors import InvalidInputError
 from assoc.recordings import (
     clustering_time_window,
     estimate_rotation,
-    fixed_groups,
-    groups_of_sizes,
     irregular_groups,
     read_plots,
 )
@@ -74,7 +72,7 @@ def test_the_rotation_is_found(turn):
     assert estimate_rotation(circling(turn=turn, turns=60)) == pytest.approx(turn, rel=1e-3)
 
 
-def test_groupings_without_a_window(tmp_path):
+def test_groups_without_a_window():
     recording = circling(turns=400)
     groups = irregular_groups(recording, np.random.default_rng(3))
     assert np.concatenate([g.rows for g in groups]).tolist() == list(range(len(recording)))
@@ -84,14 +82,5 @@ def test_groupings_without_a_window(tmp_path):
     assert any(len(np.unique(recording.sources[g.rows])) < len(g) for g in groups)
     again = irregular_groups(recording, np.random.default_rng(3))
     assert [g.rows.tolist() for g in again] == [g.rows.tolist() for g in groups]
-    lengths = np.diff([g.times[0] for g in fixed_groups(recording, 6.2)])
-    assert lengths.mean() == pytest.approx(6.2, rel=0.01)
-    sizes = groups_of_sizes(table(tmp_path), [10, 6, 4])
-    assert [len(g) for g in sizes] == [10, 6, 4]
-    for call, message in (
-        (lambda: groups_of_sizes(recording, [1, 2]), "sizes: expected whole numbers"),
-        (lambda: fixed_groups(recording, 0.0), "seconds: expected"),
-        (lambda: irregular_groups(recording, np.random.default_rng(0), mean=-1.0), "mean, shape"),
-    ):
-        with pytest.raises(InvalidInputError, match=message):
-            call()
+    with pytest.raises(InvalidInputError, match="mean, shape"):
+        irregular_groups(recording, np.random.default_rng(0), mean=-1.0)

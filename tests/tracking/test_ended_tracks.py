@@ -8,7 +8,8 @@ import pytest
 
 from assoc import track
 from assoc.errors import LimitExceededError
-from assoc.recordings import fixed_groups, radar_of, write_plots
+from assoc.recordings import radar_of, write_plots
+from assoc.recordings.windows import windows_of
 from assoc.simulation import simulate_recording
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
@@ -134,7 +135,8 @@ def test_a_track_that_may_return_has_not_ended():
     radar = radar_of(recording, range_noise=300.0, azimuth_noise=2e-3)
     tracker = TRACKERS["mht"]([radar], make_filter("ekf", [radar], None, 0))
     listed, seen, ended, left = set(), set(), set(), set()
-    for followed in plots.follow(tracker, fixed_groups(recording, 3.0)):
+    groups = windows_of(recording, ((recording.times - recording.times[0]) / 3.0).astype(np.int64))
+    for followed in plots.follow(tracker, groups):
         before, listed = listed, {*followed.listed(False)[0].track_id.tolist()}
         assert not listed & ended
         left |= before - listed
