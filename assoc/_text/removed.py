@@ -35,6 +35,8 @@ REMOVED: dict[str, str] = {
     "associate(gate_loss)": _LOSS,
     "--lines": "use --json, or --csv for a row a scan",
     "--slice": _ONE_PROCESS,
+    "assoc.integrations.motile": "assoc.link follows particles, also those that divide or merge, with a proved optimum",
+    "assoc.filters.FunctionMotion": "write a class of assoc.filters.Motion",
     "assoc.metrics.association_accuracy": "see Association.summary, or hota and identity of tracks",
     "assoc.metrics.AssociationAccuracy": "see Association.summary, or hota and identity of tracks",
     "assoc.recordings.fixed_groups": "use irregular_groups, or clustering_time_window with a rotation",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from assoc._system.imports import lazy_names
 from assoc.filters.base import Expected, Filter, History, Update
 from assoc.filters.consistency import bounds, nees
 from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
@@ -18,7 +19,6 @@ from assoc.filters.motion.models import (
     ConstantAcceleration,
     ConstantVelocity,
     CoordinatedTurn,
-    FunctionMotion,
     LinearMotion,
     Motion,
     Padded,
@@ -42,7 +42,6 @@ __all__ = [
     "Filter",
     "FixedLagSmoother",
     "FunctionMeasurement",
-    "FunctionMotion",
     "FuzzyAdaptiveEKF",
     "FuzzyRules",
     "FuzzyVariable",
@@ -71,3 +70,5 @@ __all__ = [
     "transition_from_sojourns",
     "tuned_data",
 ]
+
+__getattr__, __dir__ = lazy_names(__name__, {})

@@ -11,7 +11,6 @@ from assoc.filters import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     FunctionMeasurement,
-    FunctionMotion,
     FuzzyAdaptiveEKF,
     Gaussian,
     InteractingMultipleModel,
@@ -19,10 +18,12 @@ from assoc.filters import (
     LinearMeasurement,
     LinearMotion,
     ModifiedEKF,
+    Motion,
     UnscentedKalmanFilter,
     bounds,
     paper_rules,
 )
+from assoc.filters.motion.models import differences
 from assoc.sensors.codes import CODES
 from assoc.sensors.kernels.dispatch import linearise, measure, wrap
 from tests.filters.common import BEARING, MOTION, RADAR, SENSORS, kalman_update, random_state
@@ -94,6 +95,22 @@ def test_a_batch_is_its_targets_one_by_one():
     assert len(Gaussian.concatenate([state, state[:2]])) == 9
 
 
+class OwnMotion(Motion):
+    """A user's model, of which nothing is known but what it does."""
+
+    def __init__(self, F, Q):
+        self.dim, self.position, self.F, self.Q = 6, (0, 1, 2), F, Q
+
+    def propagate(self, states, dt):
+        return states @ self.F.T
+
+    def jacobian(self, states, dt):
+        return differences(lambda x: self.propagate(x, dt), states)
+
+    def noise(self, states, dt):
+        return self.Q[None]
+
+
 @pytest.mark.slow
 def test_users_models_are_as_good_as_ours():
     rng = np.random.default_rng(3)
@@ -101,7 +118,7 @@ def test_users_models_are_as_good_as_ours():
     z = RADAR.measure(state.mean[:, :3]) + 1e-3
     own_sensor = FunctionMeasurement(lambda x: RADAR.measure(x[:, :3]), RADAR.covariance, residual=RADAR.residual)
     F, Q = (one[0] for one in MOTION.matrices(1.0))
-    own_motion = FunctionMotion(lambda x, dt: x @ F.T, Q, 6)
+    own_motion = OwnMotion(F, Q)
     for kind in (ExtendedKalmanFilter, UnscentedKalmanFilter):
         ours, users = kind(MOTION), kind(own_motion)
         a, b = ours.predict(state, 1.0), users.predict(state, 1.0)

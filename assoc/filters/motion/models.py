@@ -335,61 +335,6 @@ class ForwardDifference(Motion):
         return self.covariance
 
 
-class FunctionMotion(Motion):
-    """A user's own motion model.
-
-    Parameters
-    ----------
-    function : callable (states (m, n), dt) -> (m, n)
-        Moves many states at once.
-    noise : array_like (n, n) or callable (states, dt) -> (n, n) or (m, n, n)
-        Process noise covariance of a step.
-    dim : int
-    jacobian : callable (states, dt) -> (m, n, n), optional
-        Without it central differences are taken.
-    position : tuple of int
-        As in `Motion`.
-    """
-
-    def __init__(
-        self,
-        function: Callable[[Array, float], Array],
-        noise: Array | Callable[[Array, float], Array],
-        dim: int,
-        *,
-        jacobian: Callable[[Array, float], Array] | None = None,
-        position: tuple[int, ...] = (0, 1, 2),
-    ) -> None:
-        self.dim, self.position = dim, position
-        self._function, self._jacobian = function, jacobian
-        self._noise = noise if callable(noise) else finite(noise, "noise", 2, 3)
-
-    def propagate(self, states: Array, dt: float) -> Array:
-        """Move states (m, n) on by dt seconds, without noise."""
-        moved = finite(self._function(states, dt), "the motion function's result", 2)
-        if moved.shape != states.shape:
-            raise InvalidInputError(f"the motion function's result must have shape {states.shape}, got {moved.shape}")
-        return moved
-
-    def jacobian(self, states: Array, dt: float) -> Array:
-        """Derivatives of `propagate` at states (m, n): (m, n, n)."""
-        if self._jacobian is not None:
-            slopes = finite(self._jacobian(states, dt), "the motion function's jacobian", 3)
-            return self._of_each(slopes, states, "the motion function's jacobian")
-        return differences(lambda x: self.propagate(x, dt), states)
-
-    def noise(self, states: Array, dt: float) -> Array:
-        """Process noise covariance, (1, n, n) or (m, n, n)."""
-        Q = finite(self._noise(states, dt) if callable(self._noise) else self._noise, "noise", 2, 3)
-        return self._of_each(Q[None] if Q.ndim == 2 else Q, states, "noise")
-
-    def _of_each(self, matrices: Array, states: Array, what: str) -> Array:
-        if matrices.shape[1:] != (self.dim, self.dim) or len(matrices) not in (1, len(states)):
-            wanted = (len(states), self.dim, self.dim)
-            raise InvalidInputError(f"{what} must have shape {wanted}, got {matrices.shape}")
-        return matrices
-
-
 def differences(
     function: Callable[[Array], Array], states: Array, minus: Callable[[Array, Array], Array] = np.subtract
 ) -> Array:

@@ -107,7 +107,7 @@ def _content(
         parts += [
             Part("Scans", _scans(scans, files)),
             Part("Targets", _targets(scans, costs)),
-            Part("Convergence", "", [_convergence(scans)] + ([_over_scans(scans)] if len(scans) > 1 else [])),
+            Part("Convergence", "", [_convergence(scans)]),
         ]
     # scenes and problems show themselves in notebooks in the same way
     shown = [
@@ -239,26 +239,3 @@ def _trace(scan: ScanAssociation) -> list[Dicts]:
     rows = np.array([[1e3 * one.seconds, one.cost, one.lower_bound] for one in kept], dtype=float).reshape(-1, 3)
     at = {"x": [one.iteration for one in kept], "customdata": plain_numbers(rows[:, 0], 3)}
     return [{**at, "y": plain_numbers(rows[:, column], 6)} for column in (1, 2)]
-
-
-def _over_scans(scans: Sequence[ScanAssociation]) -> Dicts:
-    """Figures of all scans, one of them at a time; a press in the legend shows another."""
-    measures: dict[str, list[float]] = {
-        "cost": [scan.solution.cost for scan in scans],
-        "lower bound": [scan.solution.lower_bound for scan in scans],
-        "gap": [math.nan if (gap := _closed_gap(scan)) is None else gap for scan in scans],
-        "time in the solver, ms": [1e3 * scan.solution.runtime for scan in scans],
-        "targets": [len(scan.targets) for scan in scans],
-        "false alarms": [scan.false_alarms for scan in scans],
-    }
-    if any(scan.true_tuples for scan in scans):
-        measures["correct, %"] = [
-            100.0 * (scan.correct_tuples or 0) / scan.true_tuples if scan.true_tuples else math.nan for scan in scans
-        ]
-    where = [_name(scan) for scan in scans]
-    data = [
-        scatter(name, "lines", y=plain_numbers(values, 4), text=where, line=line(i), hovertemplate="%{text}<br>%{y}",
-                visible=True if i < 2 else "legendonly")
-        for i, (name, values) in enumerate(measures.items())
-    ]  # fmt: skip
-    return {"data": data, "layout": layout("row of the table of scans, from 0", "all scans")}
