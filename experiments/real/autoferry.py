@@ -19,12 +19,12 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.metrics import Trajectories, gospa, identity, ospa2
-from assoc.recordings.autoferry import read_autoferry
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, Initiation, LifeCycle, MovingTargets, Tracker
 from assoc.tracking.filter_choice import two_speeds
 from experiments.common.claims import GOAL, Claim
 from experiments.common.command import make_parser, run
+from experiments.real.ferry_files import read_autoferry
 
 CUTOFF, NEAR = 50.0, 25.0
 SETS = {"radar and lidar": ("lidar", "radar"), "all sensors": ("lidar", "radar", "infrared", "colour")}

@@ -4,11 +4,9 @@ import json
 import math
 
 import numpy as np
-import pytest
 
-from assoc import InvalidInputError
-from assoc.recordings.autoferry import read_autoferry
 from assoc.sensors import BearingSensor
+from experiments.real.ferry_files import read_autoferry
 
 
 def frame(time, sensor, measurement, own=(10.0, 20.0)):
@@ -57,21 +55,3 @@ def test_frames_become_scans_of_sensors_on_the_ferry(tmp_path):
     assert isinstance(standing, BearingSensor)
     np.testing.assert_allclose(standing.position, [21.0, 11.0, 0.0])
     np.testing.assert_allclose(scene.truth.positions[0], [[20.0, 110.0, 0.0], [50.0, 0.0, 0.0]])
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("nothing", "is not JSON"),
-        ({"a": 1}, "expected a list of frames, got dict"),
-        ([], "holds no frames"),
-        ([{**FRAMES[0], "measurement": [1.0, 2.0, 3.0]}], "frame 0: expected time, sensorID"),
-        ([FRAMES[1], {"time": 3.0}], "frame 1: expected time, sensorID"),
-        ([{**FRAMES[1], "ownshipPosition": [math.inf, 0.0]}], "frame 0: .*finite"),
-    ],
-)
-def test_bad_files_name_the_frame(tmp_path, content, message):
-    path = tmp_path / "scenario1_detections.json"
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
-    with pytest.raises(InvalidInputError, match=f"scenario1_detections.json: .*{message}"):
-        read_autoferry(path)

@@ -18,10 +18,7 @@ from typing import Any
 import numpy as np
 
 from assoc._files.reading import read_bytes
-from assoc._parameters import positive
-from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
-from assoc.errors import InvalidInputError
 from assoc.scene.own_times import FULL_TURN
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
@@ -40,7 +37,6 @@ Reach: metres; the radar sees farther, but what is more than 300 m away does not
 _HEIGHT = 1.0
 
 
-@explains_wrong_types
 def read_autoferry(
     detections: str | os.PathLike[str],
     truth: str | os.PathLike[str] | None = None,
@@ -64,22 +60,10 @@ def read_autoferry(
         Seconds from one frame of a sensor to its next that is taken: errors and misses of frames in quick succession
         are the same ones over and over, and a tracker takes them for new evidence.
 
-    Raises
-    ------
-    InvalidInputError
-        A file is not of this form; the message names the file and the frame.
     """
     given = sensors if isinstance(sensors, Mapping) else {name: {} for name in sensors}
-    for name in given:
-        if name not in SENSORS:
-            raise InvalidInputError(f"sensors: unknown name {name!r}; known: {', '.join(SENSORS)}")
-    positive(interval, "interval", zero=True)
-    frames = [_frame(detections, k, frame) for k, frame in enumerate(_listed(detections))]
-    boats = None if truth is None else _listed(truth)
-    if boats is not None and len(boats) != len(frames):
-        raise InvalidInputError(f"{truth}: has {len(boats)} frames, the detections {len(frames)}")
-    if not frames:
-        raise InvalidInputError(f"{detections}: holds no frames")
+    frames = [_frame(frame) for frame in json.loads(read_bytes(detections))]
+    boats = None if truth is None else json.loads(read_bytes(truth))
     order = sorted(range(len(frames)), key=lambda k: frames[k][0])
     start, poses = frames[order[0]][0], {frames[k][0]: frames[k][2] for k in order}
     platform = Platform(np.array([*poses]) - start, np.array([*poses.values()]))
@@ -98,9 +82,9 @@ def read_autoferry(
         scans.append([found if r == s else np.zeros((0, sensor.dim)) for r, sensor in enumerate(placed)])
         sectors.append([[-math.pi, math.pi if r == s else -math.pi] for r in range(len(placed))])
         if boats is not None:
-            there = [_boat(truth, k, boat) for boat in boats[k]]
-            ids.append(np.array([i for i, _ in there], dtype=np.int64))
-            places.append(np.array([position for _, position in there]).reshape(-1, 3))
+            ids.append(np.array([boat["targetID"] for boat in boats[k]], dtype=np.int64))
+            there = [[boat["position"][1], boat["position"][0], 0.0] for boat in boats[k]]
+            places.append(np.array(there).reshape(-1, 3))
     spots = platform.positions[:, :2]
     reach = max([float(sensor.field_of_view.max()) for sensor in placed if sensor.dim == 2], default=500.0)
     region = np.vstack(
@@ -112,43 +96,16 @@ def read_autoferry(
     )  # fmt: skip
 
 
-def _listed(path: Any) -> list[Any]:
-    try:
-        found = json.loads(read_bytes(path))
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{path}: is not JSON ({error})") from None
-    if not isinstance(found, list):
-        raise InvalidInputError(f"{path}: expected a list of frames, got {type(found).__name__}")
-    return found
-
-
-def _frame(path: Any, k: int, frame: Any) -> tuple[float, int, Array, Array]:
+def _frame(frame: Mapping[str, Any]) -> tuple[float, int, Array, Array]:
     """Time, number of the sensor, place of the ferry (3,), and measurements (n, d) of a frame."""
-    try:
-        time, code = float(frame["time"]), int(frame["sensorID"])
-        north, east = (float(x) for x in frame["ownshipPosition"])
-        values = np.array([] if frame["measurement"] is None else frame["measurement"], dtype=np.float64)
-        if code in (1, 2):
-            # rows are north and east; a single detection is a flat pair
-            z = values.reshape(2, -1).T[:, ::-1]
-        else:
-            z = np.mod(1.5 * math.pi - values.reshape(-1, 1), FULL_TURN) - math.pi
-        if not (math.isfinite(time) and np.isfinite(z).all() and math.isfinite(north + east)):
-            raise ValueError("numbers must be finite")
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        what = "time, sensorID, ownshipPosition (north, east) and measurement"
-        raise InvalidInputError(f"{path}: frame {k}: expected {what} ({type(error).__name__}: {error})") from None
-    return time, code, np.array([east, north, 0.0]), np.ascontiguousarray(z)
-
-
-def _boat(path: Any, k: int, boat: Any) -> tuple[int, list[float]]:
-    try:
-        north, east = (float(x) for x in boat["position"][:2])
-        return int(boat["targetID"]), [east, north, 0.0]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInputError(
-            f"{path}: frame {k}: expected targetID and position ({type(error).__name__}: {error})"
-        ) from None
+    north, east = frame["ownshipPosition"]
+    values = np.array([] if frame["measurement"] is None else frame["measurement"], dtype=np.float64)
+    if frame["sensorID"] in (1, 2):
+        # rows are north and east; a single detection is a flat pair
+        z = values.reshape(2, -1).T[:, ::-1]
+    else:
+        z = np.mod(1.5 * math.pi - values.reshape(-1, 1), FULL_TURN) - math.pi
+    return float(frame["time"]), int(frame["sensorID"]), np.array([east, north, 0.0]), np.ascontiguousarray(z)
 
 
 def _sensor(name: str, changes: Mapping[str, Any], platform: Platform) -> Sensor:
