@@ -96,6 +96,11 @@ def inner_njit(function: Callable[..., Any], *, lean: bool = False) -> Any:
     return kernel
 
 
+def draws(generator: np.random.Generator) -> np.random.Generator:
+    """The generator as kernels may be given it: where they are given numpy's own, a signal may crash the process."""
+    return generator if private is None or isinstance(generator, private.Draws) else private.Draws(generator)
+
+
 def is_kept(kernel: Any) -> bool:
     """Whether compiled code of a kernel, for any types, is in this process, on disk, or shipped with the package."""
     return bool(_CONFIG.DISABLE_JIT or private is None or private.is_kept(kernel))

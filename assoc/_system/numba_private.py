@@ -9,6 +9,7 @@ same results.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import os
 import tempfile
@@ -17,7 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import caching, codegen, compiler, options, registry, types
+import numpy as np
+from numba.core import caching, cgutils, codegen, compiler, extending, options, registry, types
+from numba.core.typing.typeof import typeof_impl
+from numba.np.random.generator_core import NumPyRandomGeneratorTypeModel
 
 from assoc._system import temporary
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
@@ -30,6 +34,7 @@ _CONFIG: Any = numba.config
 # numba 0.60 has it with an underscore
 _IN_TREE: Any = getattr(caching, "InTreeCacheLocator", None) or _CACHING._InTreeCacheLocator
 _TYPES: Any = types
+_EXTENDING: Any = extending
 
 COMPLETE = all(
     hasattr(owner, name)
@@ -44,6 +49,7 @@ COMPLETE = all(
         _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
         " enable_object_caching",
         _COMPILER.Compiler: "compile_extra",
+        types: "NumPyRandomGeneratorType NumPyRandomBitGeneratorType npy_rng",
     }.items()
     for name in names.split()
 )
@@ -269,3 +275,47 @@ def _called_with_common_types(kernel: Any) -> Callable[..., Any]:
         return call_template(tuple(map(_common, args)), {name: _common(kind) for name, kind in dict(kws).items()})
 
     return template
+
+
+class Draws(np.random.Generator):
+    """A generator as kernels take it, of the same stream as another.
+
+    For numba's own way to take one it calls Python. An exception of a signal handler there (Ctrl-C) ends the process by
+    a segmentation fault, as numba goes on with what was not returned. Here all that can raise is done before the call.
+    """
+
+    def __init__(self, generator: np.random.Generator) -> None:
+        super().__init__(generator.bit_generator)
+        here: Any = generator.bit_generator.ctypes
+        pointers = {name: ctypes.cast(getattr(here, name), ctypes.c_void_p).value for name in _FUNCTIONS}
+        self.addresses = (here.state_address, here.state.value, *pointers.values())
+
+
+_FUNCTIONS = ("next_uint64", "next_uint32", "next_double")
+
+
+class _DrawsType(_TYPES.NumPyRandomGeneratorType):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__("assoc.Draws")
+        self.name = "assoc.Draws"
+
+
+_DRAWS = _DrawsType()
+typeof_impl.register(Draws)(lambda value, context: _DRAWS)
+
+
+@_EXTENDING.unbox(_DrawsType)
+def _taken(kind: Any, given: Any, c: Any) -> Any:
+    """The addresses, as numba's own struct of a generator; no reference is counted: the caller holds one."""
+    generator = cgutils.create_struct_proxy(kind)(c.context, c.builder)
+    bits = cgutils.create_struct_proxy(_TYPES.NumPyRandomBitGeneratorType("bit_generator"))(c.context, c.builder)
+    addresses = c.pyapi.object_getattr_string(given, "addresses")
+    for place, name in enumerate(("state_address", "state", *(f"fnptr_{name}" for name in _FUNCTIONS))):
+        setattr(bits, name, c.unbox(_TYPES.uintp, c.pyapi.tuple_getitem(addresses, place)).value)
+    c.pyapi.decref(addresses)
+    bits.parent = generator.parent = given
+    generator.bit_generator = bits._getvalue()
+    return _EXTENDING.NativeValue(generator._getvalue())
+
+
+_EXTENDING.register_model(_DrawsType)(NumPyRandomGeneratorTypeModel)

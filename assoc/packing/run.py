@@ -154,7 +154,10 @@ class Run:
     def rng(self) -> np.random.Generator:
         """The only source of randomness; created on first use, which on easy problems is never."""
         if self._rng is None:
-            self._rng = np.random.default_rng(self.seed)
+            # numba is loaded where something is solved
+            from assoc._system.compiled import draws
+
+            self._rng = draws(np.random.default_rng(self.seed))
         return self._rng
 
     def part(self, seed: np.random.Generator | int, time_limit: float | None) -> Run:

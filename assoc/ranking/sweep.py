@@ -59,7 +59,7 @@ class Work(NamedTuple):
     """The vertices that are near, and some that are closed; the last entry is their number, (V + 1,)."""
 
 
-@njit
+@inner_njit
 def new_work(vertices: int, edges: int) -> Work:
     """Allocate buffers for graphs of this size."""
     return Work(

@@ -80,7 +80,8 @@ class Problem:
             for j, term in enumerate(self.terms)
             if term.sensor == owner
         ]
-        sums = normal_equations(sensors, tuples, term_arrays([term for _, term in each], self.sensors), limits)
+        terms = term_arrays([term for _, term in each], self.sensors)
+        sums = NormalEquations(*normal_equations(sensors, tuples, terms, limits))
         fold = np.eye(len(self.terms))[[j for j, _ in each]]
         return sums._replace(
             information=fold.T @ sums.information @ fold,

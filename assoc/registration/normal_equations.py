@@ -125,8 +125,10 @@ def _weigh_bias(W: Array, H: Array, d: int, column: Array, left: Array, WB: Arra
 
 
 @njit
-def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, limits: Array) -> NormalEquations:
-    """Sum up the information of tuples on the n biases in ``terms``.
+def normal_equations(
+    sensors: SensorArrays, tuples: Tuples, terms: TermArrays, limits: Array
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Sum up the information of tuples on the n biases in ``terms``: the fields of `NormalEquations`.
 
     ``limits`` (3 S + 1,) are, by degrees of freedom, chi-square values up to which a tuple counts fully; above, its
     weight is limit / chi-square, so that outliers count no more than a tuple at the limit.
@@ -183,4 +185,4 @@ def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, l
                         value += WB[j, i] * columns[k, i]
                 information[j, k] += share * value
                 scatter[j, k] += share * share * pull[j] * pull[k]
-    return NormalEquations(information, gradient, scatter, chi, freedom, left)
+    return information, gradient, scatter, chi, freedom, left

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assoc._system.compiled import draws
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.bounds.priced import Priced
@@ -41,7 +42,7 @@ def _searched(problem, steps, size, rng):
 
 @few_or_all("count", 30, 300)
 def test_whole_problem_is_solved(count):
-    rng = np.random.default_rng(0)
+    rng = draws(np.random.default_rng(0))
     for problem in small_problems(count, seed=4):
         try:
             expected = brute_force(problem)
@@ -52,7 +53,7 @@ def test_whole_problem_is_solved(count):
 
 
 def test_small_clusters_never_lie():
-    rng = np.random.default_rng(1)
+    rng = draws(np.random.default_rng(1))
     for number in range(60):
         problem = gated_problem(rng, (5, 6, 4), 0.3, ("mixed", "ties")[number % 2])
         found = _searched(problem, 30, 6, rng)

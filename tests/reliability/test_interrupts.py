@@ -1,9 +1,14 @@
 """Ctrl-C in the middle of a solve: it ends soon, in the library by KeyboardInterrupt, and what was there stays."""
 
+import importlib
 import json
+import pkgutil
+import typing
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+import assoc
 from tests.running import printed, process
 
 LIBRARY = """
@@ -74,3 +79,52 @@ def test_in_the_library():
     assert done.returncode == 0, done.stderr
     # what is not interrupted comes back at its time limit
     assert json.loads(done.stdout) == dict.fromkeys(names, True)
+
+
+def records(kind):
+    if isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        yield kind.__name__
+    for inner in typing.get_args(kind):
+        yield from records(inner)
+
+
+def test_no_kernel_returns_a_record_to_python():
+    """numba goes on where Python raised instead of giving a record's class: that ends the process."""
+    returned = set()
+    for module in pkgutil.walk_packages(assoc.__path__, "assoc."):
+        if module.name.endswith("__main__"):
+            continue
+        for kernel in vars(importlib.import_module(module.name)).values():
+            if isinstance(kernel, Dispatcher) and not kernel.targetoptions.get("no_cpython_wrapper"):
+                kinds = typing.get_type_hints(kernel.py_func)
+                returned |= {f"{kernel.py_func.__qualname__} returns {name}" for name in records(kinds["return"])}
+    assert returned == set()
+
+
+DRAWN = """
+import ctypes, sys, assoc
+from tests.reliability.big import ghosts
+
+problem, cast = ghosts(12, 900), ctypes.cast
+none = {"refinement": "none"}
+ways = [("aco", {}), ("aco", none), ("aco", none | {"mode": "paper"}), ("genetic", none), ("tabu", none),
+        ("lagrangian", {})]
+
+
+def interrupted(found, kind):
+    # numpy casts to functions; Draws asks before any kernel is called
+    if kind is ctypes.c_void_p and sys._getframe(1).f_code.co_filename.find("numba_private") < 0:
+        raise KeyboardInterrupt
+    return cast(found, kind)
+
+
+for number in range(2):
+    for name, options in ways:
+        assoc.assign(problem, name, iterations=5, **options)
+    ctypes.cast = interrupted
+"""
+
+
+def test_while_a_kernel_takes_a_generator():
+    # numba asks Python's ctypes for addresses; a signal that comes there ended the process
+    assert printed("-c", DRAWN, ASSOC_INTERPRET=0) == ""

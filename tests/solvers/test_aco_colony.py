@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc._system.compiled import draws
 from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
@@ -40,7 +41,7 @@ def test_walks(name, alpha, beta):
         scale = temperature(one, np.inf) * (0.3, 1.0, 10.0)[seed]
         trail = Trail(tau, slack_tau, alpha, beta, scale)
         owner, least = walk(
-            search_arrays(one.packing), one.costs, trail, 12, False, np.random.default_rng(seed), np.inf
+            search_arrays(one.packing), one.costs, trail, 12, False, draws(np.random.default_rng(seed)), np.inf
         )
         covers = reference_walk(one, tau, slack_tau, alpha, beta, scale, 12, np.random.default_rng(seed))
         best = min(covers, key=lambda columns: weight(one.packing, columns))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc._system.compiled import draws
 from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.solvers.tabu.moves import TabuSearch, _moves, _Rules
 from assoc.solvers.tabu.parameters import TabuParameters
@@ -105,7 +106,9 @@ def test_move_by_move(name, tenure):
         expected = Reference(one, columns_of(one.best), until.copy())
         owner, best = one.best.copy(), one.best.copy()
         rules = _Rules(1, 60, tenure, forced)
-        clock = _moves(search_arrays(one.packing), owner, best, until, rules, np.random.default_rng(seed), np.inf)
+        clock = _moves(
+            search_arrays(one.packing), owner, best, until, rules, draws(np.random.default_rng(seed)), np.inf
+        )
         found = expected.run(60, tenure, forced, np.random.default_rng(seed))
         assert columns_of(owner) == sorted(expected.columns)
         np.testing.assert_array_equal(owner, cover_of(one.packing, expected.columns))
@@ -208,7 +211,13 @@ def moved(one, start, until, tenure, moves=1):
     owner = cover_of(one.packing, start)
     best = owner.copy()
     _moves(
-        search_arrays(one.packing), owner, best, until, _Rules(1, moves, tenure, -1), np.random.default_rng(0), np.inf
+        search_arrays(one.packing),
+        owner,
+        best,
+        until,
+        _Rules(1, moves, tenure, -1),
+        draws(np.random.default_rng(0)),
+        np.inf,
     )
     return columns_of(owner), columns_of(best)
 
