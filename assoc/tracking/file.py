@@ -60,7 +60,7 @@ def save(path: str | os.PathLike[str], settings: TrackerSettings, state: Tracker
 
 def file_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
     """The arrays that `save` writes."""
-    return {"settings": np.array(json.dumps(settings_as_text(settings))), **_arrays(settings, state)}
+    return {"settings": np.array(json.dumps(settings_as_text(settings))), **state_arrays(settings, state)}
 
 
 def restore(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> TrackerState:
@@ -88,7 +88,7 @@ def restore(path: str | os.PathLike[str], settings: TrackerSettings, state: Trac
         raise InvalidInputError(f"{path}: {error}") from None
 
 
-def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
+def state_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
     """A state as arrays by name."""
     found = {
         "time": np.array(math.nan if state.time is None else state.time),
@@ -116,7 +116,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         found |= {f"echoes.{name}": np.array(value) for name, value in state.echoes._asdict().items()}
     if settings.starter is not None and state.starter is not None:
         inner, unseen = state.starter
-        found |= {f"nursery.{name}": value for name, value in _arrays(settings.starter, inner).items()}
+        found |= {f"nursery.{name}": value for name, value in state_arrays(settings.starter, inner).items()}
         found |= {"unseen_ids": unseen.ids, "unseen": unseen.misses}
     return found
 

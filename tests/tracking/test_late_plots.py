@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assoc import filters
-from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.errors import AssocWarning, InvalidInputError, LimitExceededError
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LatePlots
@@ -158,3 +158,18 @@ def test_confirmed_tracks_keep_their_ids_where_tentative_ones_turn_out_to_be_oth
         for i in before.keys() - after.keys():
             near = [np.linalg.norm(before[i][:3] - after[j][:3]) for j in after.keys() - before.keys()]
             assert min(near, default=np.inf) > 60.0
+
+
+def test_memory_of_past_scans_is_limited(scene):
+    """The oldest are forgotten, with one warning, and what would come late to them is refused."""
+    plain, late = (LatePlots(TRACKERS["mht"].for_scene(scene), memory=memory) for memory in (1e9, 60e3))
+    with pytest.warns(AssocWarning, match="raise memory or lower horizon") as said:
+        stepped(late, scene, 0, 12, times=True)
+    stepped(plain, scene, 0, 12, times=True)
+    assert len(said) == 1 and len(plain.past) == 12 and 0 < len(late.past) < 12
+    assert states(late.tracks).keys() == states(plain.tracks).keys()
+    assert sum(sum(a.nbytes for a in past.before.tracks.arrays().values()) for past in late.past) <= 60e3
+    one, nothing = scene.measurements[0][0][:1], [np.zeros((0, 3))] * 2
+    times = [np.array([late.scans[0] - 3.0]), *[np.zeros(0)] * 2]
+    steps = [tracker.step(late.time + 1.0, [one, *nothing], times, np.zeros((3, 2))) for tracker in (late, plain)]
+    assert [(step.late, step.refused) for step in steps] == [(0, 1), (1, 0)]

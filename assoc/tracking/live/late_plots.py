@@ -16,10 +16,12 @@ import numpy as np
 
 from assoc._parameters import positive
 from assoc._system.imports import removed_attribute
+from assoc._system.memory import in_words
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
 from assoc.scene.own_times import checked_times
+from assoc.tracking.file import state_arrays
 from assoc.tracking.records.identity_evidence import checked_identities, no_identities
 from assoc.tracking.records.track import Decision, Step, Track
 from assoc.tracking.records.track_batch import ID, PARENT, TrackBatch
@@ -30,6 +32,8 @@ from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0
 """Default limit on how late a measurement may be, seconds."""
+MEMORY = 1e9
+"""Default limit on the memory of the scans that are kept, bytes."""
 
 # the names of dead tracks are removed when there are this many names; next time at twice the number left, and so on
 _MANY = 1_000
@@ -45,6 +49,8 @@ class _Past(NamedTuple):
     sectors: Array | None
     identities: Sequence[Array] | None
     assigned: tuple[Array, ...]
+    bytes: int
+    """Memory of the state and the measurements."""
 
     def by_sensor(self) -> Iterator[tuple[Array, Array, Array]]:
         """Times, values and identities of each sensor's measurements."""
@@ -58,7 +64,8 @@ class _Past(NamedTuple):
             known = identities or no_identities(self.measurements)
             identities = _appended(known, s, np.zeros((len(z), 2), dtype=np.int64) if codes is None else codes)
         measurements, stamps = _appended(self.measurements, s, z), _appended(stamps, s, times)
-        return self._replace(measurements=measurements, times=stamps, identities=identities)
+        more = self.bytes + z.nbytes + times.nbytes
+        return self._replace(measurements=measurements, times=stamps, identities=identities, bytes=more)
 
 
 def _appended(arrays: Sequence[Array], s: int, more: Array) -> list[Array]:
@@ -88,6 +95,9 @@ class LatePlots:
         Seconds: measurements of scans that ended longer ago are refused, and counted.
     first_id : int
         Smallest id of new tracks.
+    memory : float
+        Bytes for the scans that are kept, and the tracker's state before each. Where they would take more the oldest
+        are forgotten before the horizon, with an AssocWarning the first time. A step that goes back takes this twice.
 
     Attributes
     ----------
@@ -97,10 +107,18 @@ class LatePlots:
         Id of the next new track.
     """
 
-    def __init__(self, tracker: Tracker, horizon: float = HORIZON, *, first_id: int = 1, many: int = _MANY) -> None:
+    def __init__(
+        self,
+        tracker: Tracker,
+        horizon: float = HORIZON,
+        *,
+        first_id: int = 1,
+        memory: float = MEMORY,
+        many: int = _MANY,
+    ) -> None:
         if not isinstance(tracker, Tracker):
             raise InvalidInputError(f"tracker must be a tracker of assoc.tracking, got {type(tracker).__name__}")
-        self.tracker, self.horizon = tracker, positive(horizon, "horizon")
+        self.tracker, self.horizon, self.memory = tracker, positive(horizon, "horizon"), positive(memory, "memory")
         self.late = self.refused = 0
         self.past: list[_Past] = []
         """The scans that may still be revised, the oldest first."""
@@ -110,6 +128,7 @@ class LatePlots:
         self._decided: dict[int, tuple[int, Decision]] = {}
         """By scan: the scan whose step decided it, and the decision."""
         self._many = self._most = many
+        self._warned = False
 
     @property
     def time(self) -> float | None:
@@ -254,7 +273,7 @@ class LatePlots:
         votes: Counter[tuple[int, int]] = Counter()
         steps = []
         for k, past in enumerate(self.past[first:], start=first):
-            self.past[k] = past._replace(before=tracker.state)
+            self.past[k] = past._replace(before=tracker.state, bytes=self._bytes(tracker.state, past.measurements))
             step = tracker.step(past.time, past.measurements, past.times, past.sectors, past.identities)
             steps.append(step)
             for new, old in zip(step.assigned, past.assigned, strict=True):
@@ -278,10 +297,14 @@ class LatePlots:
         before = self.tracker.state
         step = self.tracker.step(time, measurements, times, sectors, codes)
         assigned = self._named(step.assigned)
-        self.past.append(_Past(before, step.time, measurements, times, sectors, codes, assigned))
+        taken = self._bytes(before, measurements)
+        self.past.append(_Past(before, step.time, measurements, times, sectors, codes, assigned, taken))
         self._decide(step)
         ended = np.array(sorted(self._name(i) for i in step.ended.tolist()), dtype=np.int64)
         return replace(step, assigned=assigned, ended=ended)
+
+    def _bytes(self, state: TrackerState, measurements: Sequence[Array]) -> int:
+        return sum(array.nbytes for array in (*state_arrays(self.tracker.settings, state).values(), *measurements))
 
     def _decide(self, step: Step) -> None:
         for decision in step.final:
@@ -291,6 +314,7 @@ class LatePlots:
         """Forget scans beyond the horizon, and the names of dead tracks."""
         self.late, self.refused = self.late + late, self.refused + refused
         self.past = [past for past in self.past if past.time >= step.time - self.horizon]
+        self._forget_beyond_memory()
         open_scans = step.scan - len(self.past)
         # decisions made by a scan that is still kept may change when it is processed again
         done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
@@ -300,6 +324,19 @@ class LatePlots:
             self.names = {inner: outer for inner, outer in self.names.items() if inner in living}
             self._most = self._many + 2 * len(self.names)
         return replace(step, final=final, late=late, refused=refused)
+
+    def _forget_beyond_memory(self) -> None:
+        """Forget the oldest scans where all together take more memory than they may, and say so once."""
+        taken = np.cumsum([past.bytes for past in reversed(self.past)])
+        if (fitting := int(np.searchsorted(taken, self.memory, side="right"))) == len(self.past):
+            return
+        self.past = self.past[len(self.past) - fitting :]
+        if not self._warned:
+            self._warned = True
+            warn(
+                f"{in_words(self.memory)} hold the states of the last {fitting} scans, less than {self.horizon:g} s: "
+                "measurements of earlier scans are refused; raise memory or lower horizon"
+            )
 
     def flush(self) -> tuple[Decision, ...]:
         """Decide the scans that are not final yet, oldest first; for the end of a recording."""
