@@ -1,8 +1,9 @@
 """Every way to an answer on the same random problems, against exact arithmetic and against each other.
 
-    python -m tests.reliability.differential --count 5000 --seed 1 [--ways exact,aco] [--processes 2]
+    python -m tests.reliability.differential --count 5000 --seed 1 [--ways exact,aco] [--each 1] [--processes 2]
 
-prints the faults found (none, one hopes), each with the seed and number that make it again.
+prints the faults found (none, one hopes), each with the seed and number that make it again. With ``--each`` a problem
+is answered in so many ways only, each in its turn: more problems, and the state that one way leaves is met by another.
 """
 
 import argparse
@@ -42,6 +43,8 @@ Way = Callable[[AssignmentProblem], list[Solution]]
 
 
 _RANKS = 4
+_END = 200
+"""Rankings of problems with fewer solutions are asked for to the end."""
 _SLOW = 5.0  # seconds; problems of this size take milliseconds, but first calls compile
 _FIRST_CALLS = 20
 _PROGRESS = 60.0  # seconds between two lines that say how far one is
@@ -163,6 +166,7 @@ WAYS: dict[str, Way] = {
     "milp cp_sat": _by("milp", backend="cp_sat"),
     "milp highs": _by("milp", backend="highs"),
     "kbest": lambda problem: kbest(problem, _RANKS),
+    "ranking": lambda problem: kbest(problem, _END),
     "file": _through_a_file,
     "tensor": _through_a_tensor,
     **{f"{solver} from a start": _from_a_start(solver) for solver in ("exact", "aco", "tabu", "lagrangian", "milp")},
@@ -172,7 +176,9 @@ WAYS: dict[str, Way] = {
 }
 LISTED = {"marginals": (WIDEST, 1.0), "marginals sampled": (0, 0.05)}
 """Ways to probabilities: measurements open in sums, and how long chains are."""
-PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start", "after a liar")
+RANKED = {"kbest": _RANKS, "ranking": _END}
+"""Ways to rankings: how many solutions are asked for."""
+PROVING = ("exact", "milp cp_sat", "kbest", "ranking", "file", "tensor", "exact from a start", "after a liar")
 """Ways that promise the optimum on problems of this size."""
 
 
@@ -216,7 +222,7 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
     # bounds of later places hold for what is not before them
     for place, (answer, own) in enumerate(zip(answers, truth, strict=False)):
         yield from (f"{text} (place {place})" for text in _faults_of(problem, own, answer))
-    if name == "kbest" and len(answers) != len(truth):
+    if name in RANKED and len(answers) != len(truth):
         yield f"lists {len(answers)} solutions of {len(truth)}"
     first, optimum = answers[0], truth[0]
     if name in PROVING:
@@ -272,7 +278,7 @@ def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) 
     if answer.lower_bound > -math.inf:
         over = Fraction(answer.lower_bound) - optimum
         # a cost is the nearest float to the exact sum: half a unit in the last place may lie above it
-        if over > magnitude(problem, optimum) / 10**17 + abs(optimum) / 2**53:
+        if over > abs(optimum) / 2**53 and over > magnitude(problem, optimum) / 10**17 + abs(optimum) / 2**53:
             yield f"has a bound {float(over):.3g} above the optimum {float(optimum)!r}"
     if answer.status == "optimal":
         excess = cost - optimum
@@ -280,12 +286,20 @@ def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) 
             yield f"says optimal, {float(excess):.3g} above the optimum {float(optimum):.6g}"
 
 
+def true_ranks(case: Case, names: list[str]) -> list[Fraction] | None:
+    """Costs of as many of the best solutions as some of the ways ask for; None where there are none."""
+    try:
+        return exact_ranks(case.problem, max(RANKED.get(name, 1) for name in names))
+    except InfeasibleError:
+        return None
+
+
 def judge(case: Case, names: list[str]) -> list[str]:
     """All faults on one case, as lines."""
-    try:
-        ranks: list[Fraction] | None = exact_ranks(case.problem, _RANKS)
-    except InfeasibleError:
-        ranks = None
+    return _judged(case, names, true_ranks(case, names))
+
+
+def _judged(case: Case, names: list[str], ranks: list[Fraction] | None) -> list[str]:
     truth = None
     if ranks is not None and not LISTED.keys().isdisjoint(names):
         truth = exact_marginals(case.problem)
@@ -294,7 +308,7 @@ def judge(case: Case, names: list[str]) -> list[str]:
         if name in LISTED:
             found = probability_faults(case.problem, truth, *LISTED[name])
         else:
-            found = faults(case.problem, ranks, name, WAYS[name])
+            found = faults(case.problem, ranks and ranks[: RANKED.get(name, 1)], name, WAYS[name])
         lines += [f"{name} {text}" for text in found]
     return lines
 
@@ -303,23 +317,32 @@ def judge(case: Case, names: list[str]) -> list[str]:
 class Judge:
     """Judges cases by their numbers; one for each process, so that it can count them.
 
-    Answers the structure and temper of the case, and the faults.
+    Answers the structure and temper of the case, the faults, and what was compared: answers by their ways.
     """
 
     seed: int
     names: list[str]
+    each: int = 0
     done: int = 0
 
-    def __call__(self, number: int) -> tuple[str, str, list[str]]:
+    def __call__(self, number: int) -> tuple[str, str, list[str], Counter[str]]:
         """Draw a case and judge it."""
         case = draw(self.seed, number)
         before = time.process_time()
-        lines = judge(case, self.names)
+        each = self.each or len(self.names)
+        names = [self.names[(number * each + turn) % len(self.names)] for turn in range(each)]
+        ranks = true_ranks(case, names)
+        lines = _judged(case, names, ranks)
         seconds = time.process_time() - before
         self.done += 1
         if seconds > _SLOW and self.done > _FIRST_CALLS:
             lines.append(f"all ways together take {seconds:.1f} s")
-        return case.structure, case.temper, lines
+        compared = Counter(dict.fromkeys(names, 1), answers=each)
+        if ranks is not None and "ranking" in names:
+            compared.update({"rankings to the end": len(ranks) < _END, "solutions ranked": len(ranks)})
+        if ranks is not None and not LISTED.keys().isdisjoint(names):
+            compared["probabilities"] = case.problem.num_tuples
+        return case.structure, case.temper, lines, compared
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -329,15 +352,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=int, default=0)
     parser.add_argument("--ways", default=",".join([*WAYS, *LISTED]))
+    parser.add_argument("--each", type=int, default=0, help="ways a problem, in turn (default: all)")
     parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
     parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args(arguments)
     names = chosen.ways.split(",")
     kinds: Counter[str] = Counter()
+    compared: Counter[str] = Counter()
     numbers = range(chosen.start, chosen.start + chosen.count)
     started = said = time.perf_counter()
-    judged = process_map(Judge(chosen.seed, names), numbers, chosen.processes)
-    for number, (structure, temper, lines) in zip(numbers, judged, strict=True):
+    judged = process_map(Judge(chosen.seed, names, chosen.each), numbers, chosen.processes)
+    for number, (structure, temper, lines, counts) in zip(numbers, judged, strict=True):
+        compared.update(counts)
         for line in lines:
             kind = f"[{temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
             kinds[kind] += 1
@@ -346,11 +372,8 @@ def main(arguments: list[str] | None = None) -> int:
         if time.perf_counter() - said > _PROGRESS:
             said = time.perf_counter()
             done, faulty = number + 1 - chosen.start, sum(kinds.values())
-            print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults", flush=True)
-    print(
-        f"{chosen.count} problems, {chosen.count * len(names)} answers, {time.perf_counter() - started:.0f} s:"
-        f" {sum(kinds.values())} faults"
-    )
+            print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults, {compared}", flush=True)
+    print(f"{chosen.count} problems, {time.perf_counter() - started:.0f} s: {sum(kinds.values())} faults, {compared}")
     for kind, count in kinds.most_common():
         print(f"{count:6d} {kind}")
     return 1 if kinds else 0

@@ -222,6 +222,46 @@ def _nine_sensors_axial(rng: np.random.Generator) -> Structure:
     return np.unique(np.concatenate([tuples, 3 - tuples]), axis=0), sizes, False
 
 
+def _long_lists(rng: np.random.Generator) -> Structure:
+    """Draw two to five lists of together at most 12, one much longer than the others, few or all tuples."""
+    sensors = int(rng.integers(2, 6))
+    sizes = rng.integers(0, 3, sensors)
+    sizes[0] = rng.integers(0, 13 - sizes[1:].sum())
+    every = _grid(rng.permutation(sizes), 0)
+    kept = every[every.any(axis=1) & (rng.random(len(every)) < rng.choice([0.02, 0.1, 0.4]))]
+    return kept, every.max(axis=0), True
+
+
+def _nested(rng: np.random.Generator) -> Structure:
+    """Draw tuples each of which is the one before without a measurement, down to single ones."""
+    sensors = int(rng.integers(2, 6))
+    chains = rng.integers(1, 4, (int(rng.integers(1, 5)), sensors))
+    rows = []
+    for chain in chains:
+        for s in rng.permutation(sensors):
+            rows.append(chain.copy())
+            chain[s] = 0
+    return np.unique(rows, axis=0), chains.max(axis=0, initial=0) + 3, True
+
+
+def _forced(rng: np.random.Generator) -> Structure:
+    """Draw an axial problem with one cover and some tuples more, of which none, or all but one, may fit anywhere."""
+    sensors, size = int(rng.integers(2, 6)), int(rng.integers(1, 5))
+    only = np.stack([rng.permutation(size) + 1 for _ in range(sensors)], axis=1)
+    more = rng.integers(1, size + 1, (int(rng.integers(0, 5)), sensors))
+    # measurements that are in one tuple only force it
+    more[:, 0] = np.minimum(more[:, 0], max(size - 2, 1))
+    return np.unique(np.concatenate([only, more]), axis=0), np.full(sensors, size), False
+
+
+def _pairs_only(rng: np.random.Generator) -> Structure:
+    """Draw pairs between three to five lists: odd cycles of all lengths, half of each tuple in the linear program."""
+    sizes = rng.integers(1, 4, int(rng.integers(3, 6)))
+    pairs = _grid(sizes, 0)
+    pairs = pairs[np.count_nonzero(pairs, axis=1) == 2]
+    return pairs[rng.random(len(pairs)) < rng.choice([0.2, 0.6])], sizes, True
+
+
 STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "gated": _gated,
     "listed singletons": _with_listed_singletons,
@@ -243,6 +283,10 @@ STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "many parts": _many_parts,
     "9 to 14 sensors": _nine_sensors_and_more,
     "9 to 14 sensors, axial": _nine_sensors_axial,
+    "long lists": _long_lists,
+    "nested": _nested,
+    "forced": _forced,
+    "pairs only": _pairs_only,
 }
 
 
@@ -347,6 +391,37 @@ def _denormal(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
     return rng.integers(-9, 10, len(tuples)) * 5e-324 * float(rng.choice([1.0, 1e5, 1e15]))
 
 
+def _thirds(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Each measurement a third, most tuples as dear as theirs together, less or more by a unit in the last place."""
+    sums = np.count_nonzero(tuples, axis=1) / 3.0 * float(rng.choice([1.0, -1.0]))
+    return sums + rng.integers(-1, 2, len(tuples)) * np.spacing(sums)
+
+
+def _beside_nothing(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.choice([-1e-12, 1e-12, 0.0, 0.5, -0.5, 1.0], len(tuples))
+
+
+def _huge_and_small(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Costs of 1e15 and of about 1 in one problem."""
+    size = float(rng.choice([1e15, 1e16, 1e20])) * rng.choice([1.0, -1.0], len(tuples))
+    return np.where(rng.random(len(tuples)) < rng.choice([0.1, 0.5, 0.9]), size, 0.0) + rng.normal(
+        0.0, 1.0, len(tuples)
+    )
+
+
+def _powers_of_two(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Powers of two: all sums differ, and are exact as long as they have 53 digits."""
+    signs = rng.choice([1.0, -1.0], len(tuples)) if rng.random() < 0.5 else -1.0
+    return np.asarray(signs * 2.0 ** rng.permutation(len(tuples)).clip(max=900))
+
+
+def _mixed(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Costs of three tempers in one problem."""
+    names = rng.choice([name for name in TEMPERS if name != "mixed"], 3)
+    kinds = np.stack([TEMPERS[name](rng, tuples, sizes) for name in names])
+    return kinds[rng.integers(0, 3, len(tuples)), np.arange(len(tuples))]
+
+
 TEMPERS: dict[str, Temper] = {
     "normal": _normal,
     "positive": _positive,
@@ -372,4 +447,9 @@ TEMPERS: dict[str, Temper] = {
     "big M": _big_m,
     "1 ulp": _units_in_the_last_place,
     "denormal": _denormal,
+    "thirds": _thirds,
+    "beside nothing": _beside_nothing,
+    "huge and small": _huge_and_small,
+    "powers of two": _powers_of_two,
+    "mixed": _mixed,
 }

@@ -2,13 +2,21 @@
 
 import contextlib
 import io
+import json
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from assoc.errors import AssocError
+
+KINDS = ("multi-sensor", "mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic", "static")
+"""Trackers whose saved states are spoiled."""
+_TRACKERS: dict[int, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,205 @@ def _study(folder: Path) -> list[Path]:
     return [folder / "study"]
 
 
+def _states(folder: Path) -> list[Path]:
+    """Saved trackers, which learn, of every kind; the first letters of a name are the kind."""
+    paths = []
+    for number, kind in enumerate(KINDS):
+        tracker, scene = _tracker(number)
+        for k in range(2):
+            tracker.step(float(scene.times[k]), scene.scan(k).measurements)
+        paths.append(folder / f"{kind}.npz")
+        tracker.save(paths[-1])
+    return paths
+
+
+def _tracker(number: int) -> tuple[Any, Any]:
+    from assoc.simulation import simulate
+    from assoc.tracking import TRACKERS
+
+    if number not in _TRACKERS:
+        scene = simulate("three-radar", 1, scans=3)
+        _TRACKERS[number] = TRACKERS[KINDS[number]].for_scene(scene, adapt=True, registration="online"), scene
+    return _TRACKERS[number]
+
+
+def _live(folder: Path) -> list[Path]:
+    """The lines of a scene's plots, and the state of a tracker that took them."""
+    tracker, scene, _ = _live_tracker()
+    lines = []
+    for k in range(scene.num_scans):
+        for sensor, z in zip(scene.sensors, scene.scan(k).measurements, strict=True):
+            for row in np.asarray(z).tolist():
+                json_line = json.dumps({"sensor": sensor.name, "time": float(scene.times[k]), "values": row})
+                lines += [json_line, ",".join([sensor.name, str(scene.times[k]), *map(str, row)])]
+                tracker.take(sensor.name, float(scene.times[k]), row)
+    (folder / "plots.jsonl").write_text("\n".join(lines) + "\n")
+    tracker.save(folder / "live.npz")
+    return [folder / "plots.jsonl"]
+
+
+def _live_tracker() -> tuple[Any, Any, list[str]]:
+    from assoc.simulation import simulate
+    from assoc.tracking import TRACKERS
+    from assoc.tracking.live.live_tracker import LiveTracker
+
+    scene, said = simulate("three-radar", 1, scans=3), list[str]()
+    made = LiveTracker(scene, lambda: TRACKERS["multi-sensor"].for_scene(scene, adapt=True), tell=said.append)
+    return made, scene, said
+
+
+def _live_state(folder: Path) -> list[Path]:
+    _live(folder)
+    return [folder / "live.npz"]
+
+
+def _problem_texts(folder: Path) -> list[Path]:
+    return _proofs(folder, "problem")
+
+
+def _proofs(folder: Path, which: str = "proof") -> list[Path]:
+    """Proofs, and the problems that they are of."""
+    from assoc.solvers.assign import assign
+    from tests.oracles import small_problems
+
+    paths = []
+    for number, problem in enumerate(small_problems(4, seed=3, dummy=True)):
+        paths.append(folder / f"{which}{number}{'.txt' if which == 'problem' else '.json'}")
+        problem.save(folder / f"problem{number}.txt")
+        assign(problem, proof=folder / f"proof{number}.json")
+    return paths
+
+
+def _track_tables(folder: Path) -> list[Path]:
+    rows = ["track_id,time,x,y,z,vx,vy,vz,confirmed,sigma_x,sigma_y,sigma_z,existence"]
+    rows += [f"{i},{t}.0,{100 * t + 9000 * i},{50 * i},4000,100,0,0,True,60,60,90,0.9" for t in range(0, 30, 5)
+             for i in (1, 2)]  # fmt: skip
+    (folder / "tracks.csv").write_text("\n".join(rows) + "\n")
+    return [folder / "tracks.csv"]
+
+
+def _system_tracks(folder: Path) -> list[Path]:
+    import pandas as pd
+
+    from assoc.integrations.asterix import write_tracks
+
+    found = pd.read_csv(_track_tables(folder)[0])
+    write_tracks(folder / "tracks.ast", found.drop(columns="existence"), (25, 7))
+    return [folder / "tracks.ast"]
+
+
+def _positions(folder: Path) -> list[Path]:
+    rows = ["BaseDateTime,MMSI,LAT,LON,SOG,COG"]
+    rows += [f"2024-01-01T00:{t:02d}:00,{211000000 + i},{54 + 0.01 * t},{10.0 + 0.1 * i},12.0,90.0" for t in range(20)
+             for i in (1, 2)]  # fmt: skip
+    (folder / "ais.csv").write_text("\n".join(rows) + "\n")
+    return [folder / "ais.csv"]
+
+
+def _ferry(folder: Path) -> list[Path]:
+    from tests.recordings.test_autoferry import FRAMES
+
+    (folder / "scenario1_detections.json").write_text(json.dumps(FRAMES))
+    return [folder / "scenario1_detections.json"]
+
+
+def _radars(folder: Path) -> list[Path]:
+    from tests.programs.test_radars import described
+
+    return [Path(described(folder))]
+
+
+def _parquet(folder: Path) -> list[Path]:
+    _radars(folder)
+    return [folder / "south.parquet"]
+
+
+def _use_state(path: Path) -> None:
+    # the case's name says nothing: each kind refuses what is not its own
+    for number in range(len(KINDS)):
+        tracker, scene = _tracker(number)
+        with contextlib.suppress(AssocError):
+            tracker.restore(path)
+            tracker.step(float(scene.times[2]), scene.scan(2).measurements)
+            assert np.isfinite([track.mean for track in tracker.tracks]).all()
+
+
+def _use_live_state(path: Path) -> None:
+    tracker, _, _ = _live_tracker()
+    tracker.restore(path)
+    tracker.finish()
+
+
+def _use_lines(path: Path) -> None:
+    from assoc._cli.track.line_form import LineForm
+    from assoc._cli.track.plot_lines import Plot, parse_line
+
+    tracker, scene, said = _live_tracker()
+    form = LineForm(scene)
+    for line in path.read_text(errors="replace").split("\n"):
+        try:
+            plot = parse_line(line, scene, form)
+        except AssocError as error:
+            assert "\n" not in str(error)
+            continue
+        if isinstance(plot, Plot):
+            tracker.take(*plot[:3])
+    tracker.finish()
+    assert not [line for line in said if "\n" in line]
+
+
+def _checked(problem: Path, proof: Path) -> None:
+    from assoc.check import main
+
+    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
+        code = main([str(problem), str(proof)])
+    if code and said.getvalue().count("\n") != 1:
+        raise AssertionError(f"exit code {code}: {said.getvalue()[-200:]!r}")
+
+
+def _use_problem_text(path: Path) -> None:
+    _checked(path, path)
+    _use_problem(path)
+
+
+def _use_proof(path: Path) -> None:
+    for problem in sorted((path.parent.parent / "proof.json").glob("*.txt")):
+        _checked(problem, path)
+
+
+def _use_track_table(path: Path) -> None:
+    from assoc.tracking.fusion import fuse_tables
+
+    fuse_tables([path, path])
+
+
+def _use_system_tracks(path: Path) -> None:
+    from assoc.integrations.asterix import read_tracks
+
+    read_tracks(path)
+
+
+def _use_positions(path: Path) -> None:
+    from assoc.recordings.flights.positions import read_positions
+
+    read_positions(str(path))
+
+
+def _use_ferry(path: Path) -> None:
+    from assoc.recordings.autoferry import read_autoferry
+
+    read_autoferry(path)
+
+
+def _use_radars(path: Path) -> None:
+    from assoc._cli.track.radars_file import read_radars
+
+    for name in ("north.csv", "south.parquet"):
+        with contextlib.suppress(FileExistsError):
+            (path.parent / name).symlink_to(path.parent.parent / "radars.toml" / name)
+    read_radars(str(path))
+
+
 def _use_scene(path: Path) -> None:
     from assoc.association import associate
     from assoc.scene import Scene
@@ -177,4 +384,15 @@ ROOMS = [
     Room("solve.toml", "text", _solver_config, _use_solver_config),
     Room("design.toml", "text", _design, _use_design),
     Room("study", "sqlite", _study, _use_study),
+    Room("state.npz", "npz", _states, _use_state),
+    Room("live.npz", "npz", _live_state, _use_live_state),
+    Room("plots.jsonl", "text", _live, _use_lines),
+    Room("problem.txt", "text", _problem_texts, _use_problem_text),
+    Room("proof.json", "text", _proofs, _use_proof),
+    Room("track table", "text", _track_tables, _use_track_table),
+    Room("tracks.ast", "bytes", _system_tracks, _use_system_tracks),
+    Room("ais.csv", "text", _positions, _use_positions),
+    Room("ferry.json", "text", _ferry, _use_ferry),
+    Room("radars.toml", "text", _radars, _use_radars),
+    Room("plots.parquet", "bytes", _parquet, _use_plots),
 ]

@@ -1,14 +1,44 @@
-"""Mixed problems and steps in one process: a little of endurance.py, which also runs with checked indices."""
+"""Mixed problems and steps in one process: a little of endurance.py; and does its watch see what it watches for?"""
 
-from tests.reliability.endurance import guarded, run
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tests.reliability import endurance
+from tests.reliability.endurance import Watch, guarded, run
 
 
 def test_mixed_problems_and_steps():
-    solved, stepped, faults = run(1, range(30), 16)
-    assert (solved, dict(faults)) == (30, {}) and stepped >= 16
+    counts, faults, _ = run(1, range(30), 16)
+    assert (counts["problems"], dict(faults)) == (30, {}) and counts["steps"] >= 16
 
 
 def test_faults_are_seen():
-    found = type(run(1, range(0), 0)[2])()
+    found = Counter()
     guarded(lambda: [][1], "a kernel", found)
     assert ["IndexError" in kind for kind in found] == [True]
+
+
+def held(words, **seen):
+    """Whether a claim holds of a watch of a hundred looks that saw this."""
+    watch = Watch(1)
+    for name in ("resident", "objects", "pace"):
+        setattr(watch, name, [seen.get(name, lambda place: 1.0)(place) for place in range(100)])
+    (claim,) = [claim for claim in watch.claims("x") if words in claim.quantity]
+    return claim.holds
+
+
+def test_what_grows_is_seen():
+    assert held("time of a step") and held("resident memory") and held("Python's objects")
+    assert held("time of a step", pace=lambda place: 1.0 + place / 400) is False
+    assert held("resident memory", resident=lambda place: 100.0 + 0.1 * place) is False
+    assert held("Python's objects", objects=lambda place: 100 * place) is False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(endurance.LONG))
+def test_a_short_run_of_each_tracker(kind):
+    sound = {claim.quantity: claim for claim in endurance.follow(kind, 40, np.random.default_rng(1), looks=10)}
+    assert sound[f"{kind}: least eigenvalue of a correlation matrix"].holds
+    assert 0.2 < sound[f"{kind}: distance to the next track, second half / first"].ours < 5.0
