@@ -93,8 +93,9 @@ def test_columns_by_name(tmp_path):
     [
         (b"\x00\xff\xfe\x00\x01", "is not a CSV file|no column"),
         (b"time,id,lat,lon,altitude\n", "no row has"),
-        (b"time,id,lat,lon,altitude\n0,a,here,3,4\n", "line 2, column 'lat': expected a number, got 'here'"),
-        (b"time,id,lat,lon,altitude\n0,b,99,3,4\n", "line 2, column 'lat': expected at most 90"),
+        (b"time,id,lat,lon,altitude\n0,a,here,3,4\n", "no row has a time, an identity and a position that can be"),
+        (b"time,id,lat,lon,altitude\n0,b,99,3,4\n", "no row has a time, an identity and a position that can be"),
+        (b"time,id,lat,lon,altitude,heading\n0,a,3,3\n", "no row has"),
         (b"time,id,lat,lon\n0,a,3,3\n", "no column altitude or geoaltitude or baroaltitude"),
     ],
 )

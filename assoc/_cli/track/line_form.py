@@ -11,7 +11,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.columns import COLUMNS, UNITS, choose, code, number, plain_name, seconds
-from assoc.recordings.flights.positions import ENDINGS, NAMES
+from assoc.recordings.flights.positions import NAMES
+from assoc.recordings.flights.table import ENDINGS
 from assoc.recordings.on_earth import USUAL_ALTITUDE, Bias, azimuths_in_plane
 from assoc.scene.geodesy import east_north_up, geodetic
 from assoc.sensors import PositionSensor, Radar2D

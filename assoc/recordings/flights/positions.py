@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assoc._files.reading import kind_of, open_input
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.recordings.columns import plain_name
+from assoc.recordings.flights.table import columns_of, numbers_of, read_table, require, seconds_of
 from assoc.recordings.recording import Recording
 from assoc.recordings.several import NO_HEIGHT, heights_above
 from assoc.scene.geodesy import Origin, east_north_up, geodetic
@@ -34,8 +33,6 @@ NAMES = {
 }
 """Usual names of columns by meaning; one of a position on the earth and x, y in metres is needed."""
 ALTITUDES = {"m": 1.0, "ft": 0.3048, "fl": 30.48}
-ENDINGS = ("", "_deg", "_degrees")
-"""What names of latitudes and longitudes may end in."""
 _SHIP = 10**8
 _DETECTION, _FALSE = 0.95, 0.01
 _BOX = 5_000.0
@@ -128,8 +125,6 @@ def read_positions(
     InvalidInputError
         The file or a column is missing, or no row is left.
     """
-    import pandas as pd
-
     given = dict(columns or {})
     for meaning in given:
         if meaning not in NAMES:
@@ -137,30 +132,16 @@ def read_positions(
     unit = dict(units or {}).get("altitude", "m")
     if {*(units or {})} - {"altitude"} or unit not in ALTITUDES:
         raise InvalidInputError(f"units: expected altitude = one of {', '.join(ALTITUDES)}, got {dict(units or {})}")
-    try:
-        if kind_of(path) == "parquet":
-            table = pd.read_parquet(path)
-        else:
-            with open_input(path) as file:
-                table = pd.read_csv(file, dtype=str, keep_default_na=False, sep=None, engine="python")
-    except InvalidInputError:
-        raise
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except ValueError as error:
-        raise InvalidInputError(
-            f"{path}: is not a table ({str(error).splitlines()[0] if str(error) else ''})"
-        ) from None
-    chosen = _chosen(path, [str(name) for name in table.columns], given)
+    table, chosen = read_table(path, lambda header: _chosen(path, header, given), ("id", "mode3"))
     numbers = {
-        meaning: pd.to_numeric(table[chosen[meaning]], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+        meaning: numbers_of(table[chosen[meaning]])
         for meaning in ("latitude", "longitude", "x", "y", "altitude")
         if meaning in chosen
     }
     on_earth, count = "latitude" in chosen, len(table)
     first, second = (numbers[name] for name in (("latitude", "longitude") if on_earth else ("x", "y")))
     altitude = ALTITUDES[unit] * numbers.get("altitude", np.full(count, np.nan))
-    times = _seconds(table[chosen["time"]])
+    times = seconds_of(table[chosen["time"]])
     # AIS says 91 and 181 where it does not know
     good = np.isfinite(first) & np.isfinite(second) & np.isfinite(times)
     if on_earth:
@@ -184,37 +165,9 @@ def read_positions(
 
 
 def _chosen(path: str, header: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
-    """The column of each meaning that the file has."""
-    plain = [plain_name(name) for name in header]
-    found = {}
-    for meaning, usual in NAMES.items():
-        wanted = (
-            [plain_name(given[meaning])] if meaning in given else [plain_name(n + e) for n in usual for e in ENDINGS]
-        )
-        name = next((name for name in wanted if name in plain), None)
-        if name is not None:
-            found[meaning] = header[plain.index(name)]
-        elif meaning in given:
-            raise InvalidInputError(
-                f"{path}: no column {given[meaning]!r} for the {meaning}; it has: {', '.join(header)}"
-            )
-    for needed in ("time", "latitude" if "x" not in found else "y", "longitude" if "x" not in found else "y"):
-        if needed not in found:
-            raise InvalidInputError(f"{path}: no column {' or '.join(NAMES[needed])} for the {needed}; it has: "
-                                    f"{', '.join(header[:12])}")  # fmt: skip
-    return found
-
-
-def _seconds(column: pd.Series) -> Array:
-    """Seconds as they are, dates as seconds since 1970-01-01 UTC; NaN where it is neither."""
-    import pandas as pd
-
-    if column.dtype.kind != "M":
-        numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
-        if np.isfinite(numbers).any():
-            return np.asarray(numbers)
-    moments = pd.to_datetime(column, format=None if column.dtype.kind == "M" else "ISO8601", utc=True, errors="coerce")
-    found: Array = ((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)).to_numpy(dtype=np.float64)
+    """The column of each meaning that the file has: a time, and a position on the earth or x and y."""
+    found = columns_of(path, header, NAMES, given)
+    require(path, header, found, NAMES, "time", *(("x", "y") if "x" in found else ("latitude", "longitude")))
     return found
 
 
@@ -222,7 +175,7 @@ def _codes(table: pd.DataFrame, chosen: Mapping[str, str]) -> Array:
     """Mode 3/A codes, written with octal digits; 0 where there is none."""
     if "mode3" not in chosen:
         return np.zeros(len(table), dtype=np.int64)
-    texts = table[chosen["mode3"]].astype(str).str.strip().str.replace(r"\.0$", "", regex=True)
+    texts = table[chosen["mode3"]].astype("string").fillna("").str.strip().str.replace(r"\.0$", "", regex=True)
     return np.array([int(text, 8) if text and len(text) <= 4 and {*text} <= {*"01234567"} else 0 for text in texts])
 
 
@@ -232,7 +185,7 @@ def _addresses(names: pd.Series | None, count: int) -> Array:
 
     if names is None:
         return np.zeros(count, dtype=np.int64)
-    codes, known = pd.factorize(names.astype(str).str.strip().str.replace(r"\.0$", "", regex=True))
+    codes, known = pd.factorize(names.astype("string").fillna("").str.strip().str.replace(r"\.0$", "", regex=True))
     numbers = []
     for number, name in enumerate(known, 1):
         is_ship = name.isdigit() and len(name) == 9 and int(name) >= _SHIP
