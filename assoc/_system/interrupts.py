@@ -52,33 +52,14 @@ class interruptible(ContextDecorator):  # noqa: N801 - read like those of contex
             raise cause from None
 
 
-class StopSignal:
-    """Stops work in another thread, at once or as soon as the work can be stopped."""
-
-    def __init__(self) -> None:
-        self.sent = False
-        self._stop: Callable[[], object] | None = None
-
-    def connect(self, stop: Callable[[], object]) -> None:
-        """Set the function that stops the work, before the work starts."""
-        self._stop = stop
-        if self.sent:
-            stop()
-
-    def send(self) -> None:
-        """Stop the work, at once or as soon as it is connected."""
-        self.sent = True
-        if self._stop is not None:
-            self._stop()
-
-
-def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSignal | None = None) -> Answer | None:
+def in_time(
+    work: Callable[[], Answer], seconds: float, name: str, stop: threading.Event | None = None
+) -> Answer | None:
     """Return the result of the work, or None if it takes longer than ``seconds``; its exceptions are raised here.
 
     With infinite time the work still runs in a thread, so that Ctrl-C takes effect while a library works.
-    The work must let other threads run, and goes on until it ends by itself after it is abandoned. With a `stop`
-    signal it is asked to end, and gets some seconds to do so when Python ends: CP-SAT would otherwise abort the whole
-    process (SIGABRT, whatever the program's exit code).
+    The work must let other threads run, and goes on until it ends by itself after it is abandoned. A `stop` is set
+    then, and work that looks at it gets some seconds to end before Python does.
     """
     answer: Future[Answer] = Future()
 
@@ -119,7 +100,7 @@ def uninterrupted(work: Callable[[], Answer]) -> Answer:
     """
     if threading.current_thread() is not threading.main_thread():
         return work()
-    stop = StopSignal()
+    stop = threading.Event()
 
     def run_until_stopped() -> Answer:
         _of_thread.stop = stop
@@ -131,17 +112,17 @@ def uninterrupted(work: Callable[[], Answer]) -> Answer:
 def end_if_abandoned() -> None:
     """End the work of this thread if nobody waits for it any more."""
     stop = getattr(_of_thread, "stop", None)
-    if stop is not None and stop.sent:
+    if stop is not None and stop.is_set():
         raise KeyboardInterrupt
 
 
 _left: list[threading.Thread] = []
 
 
-def _abandon(stop: StopSignal | None, thread: threading.Thread) -> None:
+def _abandon(stop: threading.Event | None, thread: threading.Thread) -> None:
     """Stop the work of a thread, if it can be stopped, and let it end before Python does."""
     if stop is not None:
-        stop.send()
+        stop.set()
         if not _left:
             # before what was registered earlier
             atexit.register(_join_at_exit)

@@ -163,7 +163,6 @@ WAYS: dict[str, Way] = {
     "lagrangian": _by("lagrangian"),
     "lagrangian cold": _by("lagrangian", warm_start=False, polish=False),
     "milp scip": _by("milp"),
-    "milp cp_sat": _by("milp", backend="cp_sat"),
     "milp highs": _by("milp", backend="highs"),
     "kbest": lambda problem: kbest(problem, _RANKS),
     "ranking": lambda problem: kbest(problem, _END),
@@ -178,7 +177,7 @@ LISTED = {"marginals": (WIDEST, 1.0), "marginals sampled": (0, 0.05)}
 """Ways to probabilities: measurements open in sums, and how long chains are."""
 RANKED = {"kbest": _RANKS, "ranking": _END}
 """Ways to rankings: how many solutions are asked for."""
-PROVING = ("exact", "milp cp_sat", "kbest", "ranking", "file", "tensor", "exact from a start", "after a liar")
+PROVING = ("exact", "kbest", "ranking", "file", "tensor", "exact from a start", "after a liar")
 """Ways that promise the optimum on problems of this size."""
 
 

@@ -34,7 +34,6 @@ WAYS: dict[str, Way] = {
     "tabu": lambda problem, limit: assign(problem, "tabu", time_limit=limit, **ENDLESS),
     "lagrangian": lambda problem, limit: assign(problem, "lagrangian", time_limit=limit),
     "milp scip": lambda problem, limit: assign(problem, "milp", time_limit=limit),
-    "milp cp_sat": lambda problem, limit: assign(problem, "milp", backend="cp_sat", time_limit=limit),
     "milp highs": lambda problem, limit: assign(problem, "milp", backend="highs", time_limit=limit),
     "kbest": lambda problem, limit: kbest(problem, 10, time_limit=limit),
     "marginals": lambda problem, limit: marginals(problem, time_limit=limit),

@@ -99,7 +99,6 @@ def test_refused_before_memory_is_taken(case: str) -> None:
     [
         ("aco", {"mode": "paper", "ants": 100_000}, r"ants = 100000 on \d+ measurements"),
         ("genetic", {"population": 100_000}, r"population = 100000 on \d+ measurements"),
-        ("milp", {"backend": "cp_sat", "workers": 1024}, r"cp_sat on \d+ tuples with workers = 1024"),
         ("milp", {"backend": "highs", "time_limit": 1.0}, r"backend highs on \d+ tuples"),
     ],
 )  # fmt: skip

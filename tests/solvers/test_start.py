@@ -18,7 +18,6 @@ WAYS = [
     ("tabu", {"iterations": 1}),
     ("lagrangian", {"iterations": 1, "polish": False}),
     ("milp", {"backend": "scip"}),
-    ("milp", {"backend": "cp_sat"}),
     ("milp", {"backend": "highs"}),
 ]
 

@@ -22,7 +22,7 @@ class Answer(NamedTuple):
     infeasible: bool
     """Whether there is no solution."""
     nodes: int
-    """Nodes of the search (branches of CP-SAT)."""
+    """Nodes of the search."""
 
 
 def solution_or_none(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np.int64] | None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 from assoc._parameters import Parameters
 
-BACKENDS = ("scip", "cp_sat", "highs")
+BACKENDS = ("scip", "highs")
 
 
 # bytes for each tuple of three sensors, measured on 1e5 tuples (docs/reliability.md)
-_MODEL = {"scip": 7_000.0, "cp_sat": 6_000.0, "highs": 2_300.0}
+_MODEL = {"scip": 7_000.0, "highs": 2_300.0}
 
 
 @dataclass(frozen=True)
@@ -19,29 +19,23 @@ class MilpParameters(Parameters):
 
     Attributes
     ----------
-    backend : {"scip", "cp_sat", "highs"}
+    backend : {"scip", "highs"}
         Backend of OR-Tools.
     workers : int
-        Threads of scip and cp_sat; with more than one the answer may be another of the same cost.
-        HiGHS ignores it and chooses its own number.
+        Threads of scip; with more than one the answer may be another of the same cost. HiGHS ignores it and chooses
+        its own number.
     """
 
-    backend: str = field(default="scip", metadata={"help": "scip, cp_sat or highs"})
-    workers: int = field(default=1, metadata={"help": "threads of scip, cp_sat; with 1 runs repeat exactly"})
+    backend: str = field(default="scip", metadata={"help": "scip or highs"})
+    workers: int = field(default=1, metadata={"help": "threads of scip; with 1 runs repeat exactly"})
 
     def __post_init__(self) -> None:
         self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
         self._whole("workers", most=1024)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """Memory of the backend's model; each worker adds a stack and a copy of the model."""
+        """Memory of the backend's model."""
         if num_columns == 0:
             return None
-        workers = self.workers if self.backend == "cp_sat" else 1
-        needed = _MODEL[self.backend] * num_columns * (1.0 + 0.5 * (workers - 1)) + 10e6 * (workers - 1)
-        several = f" with workers = {workers}" if workers > 1 else ""
-        return (
-            needed,
-            f"milp: backend {self.backend} on {num_columns} tuples{several}",
-            "take fewer workers" if workers > 1 else "take solver exact, which needs less",
-        )
+        what = f"milp: backend {self.backend} on {num_columns} tuples"
+        return _MODEL[self.backend] * num_columns, what, "take solver exact, which needs less"

@@ -1,14 +1,9 @@
 """Mixed-integer programming by OR-Tools: general exact solvers with the interface of the others.
 
 The model is the packing itself: x_j in {0, 1} for each column, for each row sum x_j <= 1, or = 1 where the
-row has no slack. The backends are
-
-- ``scip`` and ``highs``: float costs, scaled by a power of two (exact) so that the largest is of order 100;
-  relative gap, dual feasibility and integrality tolerances 1e-9, all set explicitly. What these tolerances can add up
-  to is subtracted from the backend's bound.
-- ``cp_sat``: integer costs round(2^k w). k is the largest with sum |2^k w| < 2^57, but no larger than
-  needed to keep the rounding of a whole solution below 1e-7 (or 1e-7 max |w|, if smaller). The largest
-  rounding that occurred, times the columns a solution can have, is subtracted from its bound.
+row has no slack. The backends, ``scip`` and ``highs``, take float costs, scaled by a power of two (exact) so that the
+largest is of order 100; relative gap, dual feasibility and integrality tolerances are 1e-9, all set explicitly. What
+these tolerances can add up to is subtracted from the backend's bound.
 
 At the time limit the better of the backend's solution and a greedy one, improved by insertion, is returned, with the
 better of the backend's bound and the dual bound. A backend that has not returned by then is abandoned in its thread.
@@ -21,23 +16,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.interrupts import StopSignal, in_time
+from assoc._system.interrupts import in_time
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.cover import Cover
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run, infeasible
 from assoc.solvers.milp.answer import Answer
-from assoc.solvers.milp.cp_sat import solve_by_cp_sat
 from assoc.solvers.milp.math_opt import solve_by_math_opt
 from assoc.solvers.milp.parameters import MilpParameters
 
-# least seconds that building a model takes for each entry of its matrix (measured: 1.3e-6 and 2.8e-6)
-_ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
+# least seconds that building a model takes for each entry of its matrix (measured: 1.3e-6)
+_ENTRY = 3e-6
 
 
 def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
-    """Solve by branch and cut; one iteration is one node (or branch of CP-SAT).
+    """Solve by branch and cut; one iteration is one node.
 
     Raises
     ------
@@ -71,28 +65,19 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     return Outcome(columns, answer.nodes, bound, duals)
 
 
-def _solve(
-    packing: Packing, parameters: MilpParameters, seconds: float, run: Run, stop: StopSignal | None = None
-) -> Answer:
-    if parameters.backend == "cp_sat":
-        return solve_by_cp_sat(packing, parameters, seconds, run.start, stop)
-    return solve_by_math_opt(packing, parameters, seconds, run.start)
-
-
 def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> Answer:
     """Solve in the remaining time, or give up; Ctrl-C is handled meanwhile.
 
     Backends check the time only between their own steps, and not before the first: on a large problem they may be late
-    by many seconds. So the backend works in a thread, which is abandoned at the time limit (CP-SAT is asked to stop).
-    A model that would take longer to build than the time left is not built.
+    by many seconds. So the backend works in a thread, which is abandoned at the time limit. A model that
+    would take longer to build than the time left is not built.
     """
-    entry = _ENTRY_CP_SAT if parameters.backend == "cp_sat" else _ENTRY_MATH_OPT
     answer = None
-    if run.remaining() >= entry * packing.row_cols.size:
+    if run.remaining() >= _ENTRY * packing.row_cols.size:
         # with MathOpt's interrupter SCIP 9 prints warnings on stderr: use its time limit instead
-        stop = StopSignal() if parameters.backend == "cp_sat" else None
-        seconds = run.remaining()
-        answer = in_time(lambda: _solve(packing, parameters, 0.98 * run.remaining(), run, stop), seconds, "milp", stop)
+        answer = in_time(
+            lambda: solve_by_math_opt(packing, parameters, 0.98 * run.remaining(), run.start), run.remaining(), "milp"
+        )
     # a backend with no more to say has used up the share of the time that it was given
     if answer is None or (run.time_limit is not None and not (answer.proven or answer.infeasible)):
         run.stopped_by = run.stopped_by or "time_limit"
