@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from assoc._types import Array
@@ -10,6 +12,9 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
+
+# of an ellipse
+_CORNERS = 49
 
 
 def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
@@ -57,6 +62,16 @@ def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array
     return np.where(np.isfinite(leave), np.maximum(leave, 0.0), 0.0)
 
 
-def measures_height(sensor: Sensor) -> bool:
-    """Whether the sensor measures heights."""
-    return sensor.dim >= 3
+def ellipses(centres: Array, covariances: Array, probability: float) -> tuple[Array, Array]:
+    """Ellipses that contain normal distributions with a probability, as one line x, y (n * 50,) with NaN between them.
+
+    Of centres (n, 2 or more) and covariances (n, 2 or more, 2 or more) the first two count.
+    """
+    values, vectors = np.linalg.eigh(covariances[:, :2, :2])
+    # the chi-square distribution of two degrees of freedom has a closed form
+    reach = np.sqrt(np.maximum(values, 0.0) * -2.0 * math.log1p(-probability))
+    angle = np.linspace(0.0, 2.0 * math.pi, _CORNERS)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    outline = centres[:, :2, None] + np.einsum("nij,nj,jk->nik", vectors, reach, circle)
+    gaps = np.concatenate([outline, np.full((len(centres), 2, 1), np.nan)], axis=2)
+    return gaps[:, 0].ravel(), gaps[:, 1].ravel()

@@ -12,8 +12,7 @@ from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
-from assoc.plotting.ellipses import ellipses
-from assoc.plotting.measured import distances_to_border, positions_of, scan_of
+from assoc.plotting.measured import distances_to_border, ellipses, positions_of, scan_of
 from assoc.plotting.scene import draw_rays, draw_sensors, draw_truth
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor

@@ -17,8 +17,8 @@ from assoc._types import Array, Floats, Ints
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
-from assoc.ranking.clusters import distinct
 from assoc.ranking.columns import AllColumns, price_all_columns
+from assoc.ranking.distinct import distinct
 from assoc.ranking.sampler import estimates
 from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
 from assoc.ranking.sweep import Graph

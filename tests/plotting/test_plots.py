@@ -10,8 +10,7 @@ from scipy import stats
 
 import assoc
 from assoc import plotting
-from assoc.plotting.ellipses import ellipses
-from assoc.plotting.measured import distances_to_border, positions_of
+from assoc.plotting.measured import distances_to_border, ellipses, positions_of
 from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assoc.plotting.heat_map import LABELS
 from assoc.plotting.report import write_sweep_report
+from assoc.plotting.study_figures import LABELS
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid, load
 from assoc.sweeps.sources import StudySource

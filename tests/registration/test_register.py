@@ -14,7 +14,7 @@ from assoc.recordings.several import NO_HEIGHT
 from assoc.registration import RegistrationParameters, Term, register, with_biases
 from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
-from assoc.registration.observability import describe
+from assoc.registration.result import describe
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
 from assoc.simulation.radars import on_circle
 from assoc.simulation.turning import Path, observe_in_turns

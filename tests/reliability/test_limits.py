@@ -17,7 +17,7 @@ from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
-from assoc.ranking.clusters import clusters_of, distinct
+from assoc.ranking.distinct import distinct
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
@@ -129,15 +129,11 @@ def test_sorting_as_numpy_does():
                 assert np.array_equal(order_of(some), np.argsort(some, kind="stable"))
 
 
-def test_clusters_and_distinct_tuples():
+def test_distinct_tuples():
     # more than one number of 64 bits can tell apart
     wide = np.random.default_rng(2).integers(1, 50_000, (9, 6))
     many = [AssignmentProblem(wide[[0, 0, *range(9)]], np.zeros(11), [50_000] * 6, dummy=False)]
     for problem in [*small_problems(60, seed=71), ghosts(60, 3000), ghosts(60, 9000), *many]:
-        expected = problem.components()
-        found = clusters_of(problem)
-        assert len(found) == len(expected)
-        assert all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
         tuples, place = distinct(problem.tuples)
         assert np.array_equal(tuples, np.unique(problem.tuples, axis=0))
         assert np.array_equal(tuples[place], problem.tuples)

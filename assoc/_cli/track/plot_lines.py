@@ -231,7 +231,7 @@ class Lines:
         Bytes that may wait, here and in the system.
     """
 
-    def __init__(self, port: int | None, *, waiting: int = 64_000_000) -> None:
+    def __init__(self, port: int | None, *, waiting: int = _WAITING) -> None:
         self._dropped = 0
         self._waiting = _Waiting(waiting)
         self._socket = None

@@ -12,7 +12,7 @@ from assoc._types import Array
 from assoc.association.scan import ScanAssociation
 from assoc.plotting.axes import Unit, box_around, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour
-from assoc.plotting.ellipses import ellipses
+from assoc.plotting.measured import ellipses
 from assoc.plotting.report.figures import (
     BUDGET,
     FAINT,

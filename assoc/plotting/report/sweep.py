@@ -13,10 +13,9 @@ import numpy as np
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape
 from assoc.plotting.colours import SERIES
-from assoc.plotting.heat_map import LABELS, cells
 from assoc.plotting.report.figures import FAINT, Choices, Dicts, layout, line, menu, plain_numbers, scatter
 from assoc.plotting.report.page import Part, cards, check_report, definitions, note, settings_part, table, write_page
-from assoc.plotting.study_figures import setting_title
+from assoc.plotting.study_figures import LABELS, cells, setting_title
 from assoc.sweeps.frame import RESULTS, load, load_traces, mean_excess, with_excess
 from assoc.sweeps.store import Store
 from assoc.sweeps.summary import FACTORS, measured, summarize, varied

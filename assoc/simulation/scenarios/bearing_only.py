@@ -10,9 +10,8 @@ from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.sensors.bearing import BearingSensor
-from assoc.simulation.memory import MOST, require_scene_memory
+from assoc.simulation.memory import MOST, option, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.option import option
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
 from assoc.simulation.scenarios.crowd import horizontal_velocities
 

@@ -13,9 +13,8 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
-from assoc.simulation.memory import MOST, require_scene_memory
+from assoc.simulation.memory import MOST, option, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.option import option
 from assoc.simulation.radars import MARGIN, on_circle, radars_over
 
 REFERENCE_TARGETS = 100

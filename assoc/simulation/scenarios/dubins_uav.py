@@ -17,9 +17,8 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
-from assoc.simulation.memory import require_scene_memory
+from assoc.simulation.memory import option, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.option import option
 from assoc.simulation.radars import on_circle, radars_over
 
 _TRIES = 200

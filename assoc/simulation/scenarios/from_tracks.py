@@ -22,9 +22,8 @@ from assoc.scene.geodesy import east_north_up
 from assoc.scene.scene import Scene
 from assoc.simulation.flights import STEP
 from assoc.simulation.interpolation import along, frame_velocities, resample
-from assoc.simulation.memory import MOST, require_scene_memory
+from assoc.simulation.memory import MOST, option, require_scene_memory
 from assoc.simulation.observation import observe, velocities_from
-from assoc.simulation.option import option
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 from assoc.simulation.turning import Path, observe_in_turns, parse_turns

@@ -24,7 +24,7 @@ from assoc.recordings.recording import UNDECODED, Recording
 from assoc.scene.geodesy import east_north_up, geodetic
 from assoc.simulation.antenna import bearings_in_steps, dwells, in_steps, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
-from assoc.simulation.option import option
+from assoc.simulation.memory import option
 
 if TYPE_CHECKING:
     from assoc.metrics.trajectories import Trajectories

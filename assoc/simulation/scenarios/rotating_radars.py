@@ -9,8 +9,7 @@ import numpy as np
 from assoc._parameters import Parameters
 from assoc.scene.scene import Scene
 from assoc.simulation.flights import random_flight
-from assoc.simulation.memory import MOST, require_scene_memory
-from assoc.simulation.option import option
+from assoc.simulation.memory import MOST, option, require_scene_memory
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 from assoc.simulation.turning import Path, observe_in_turns, parse_turns

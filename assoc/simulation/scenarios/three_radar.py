@@ -17,9 +17,8 @@ import numpy as np
 from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.simulation.memory import MOST, require_scene_memory
+from assoc.simulation.memory import MOST, option, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.option import option
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 

@@ -1,4 +1,4 @@
-"""Independent clusters of tuples, and sorting of distinct tuples: for problems of a million tuples."""
+"""Sorting of distinct tuples, for problems of a million tuples."""
 
 from __future__ import annotations
 
@@ -10,15 +10,6 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Ints
 from assoc.packing.kernels.sorting import ascending_whole
-from assoc.packing.packing import find
-from assoc.problem import AssignmentProblem
-
-
-def clusters_of(problem: AssignmentProblem) -> list[NDArray[np.int64]]:
-    """Return ``problem.components()``: rows of each cluster's tuples, ascending; clusters by their first tuple."""
-    sizes = problem.sizes.astype(np.int64)
-    order, start = _clusters(problem.tuples, np.cumsum(sizes) - sizes, int(sizes.sum()))
-    return [order[first:last] for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True)]
 
 
 def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
@@ -75,43 +66,3 @@ def _indices(tuples: Ints, order: Ints) -> Any:
             count += 1
         index[j] = count
     return new, index
-
-
-@njit
-def _clusters(tuples: Ints, offsets: Ints, total: int) -> Any:
-    """Rows of tuples by cluster, and where each cluster begins."""
-    num, num_sensors = tuples.shape
-    parent = np.arange(total).astype(np.int32)
-    for j in range(num):
-        first = -1
-        for s in range(num_sensors):
-            if tuples[j, s] > 0:
-                root = find(parent, offsets[s] + tuples[j, s] - 1)
-                if first < 0:
-                    first = root
-                elif root != first:
-                    parent[max(root, first)] = min(root, first)
-                    first = min(root, first)
-    label = np.full(total, -1, np.int64)
-    cluster = np.empty(num, np.int64)
-    count = 0
-    for j in range(num):
-        for s in range(num_sensors):
-            if tuples[j, s] > 0:
-                root = find(parent, offsets[s] + tuples[j, s] - 1)
-                if label[root] < 0:
-                    label[root] = count
-                    count += 1
-                cluster[j] = label[root]
-                break
-    start = np.zeros(count + 1, np.int64)
-    for j in range(num):
-        start[cluster[j] + 1] += 1
-    for c in range(count):
-        start[c + 1] += start[c]
-    index = start[:-1].copy()
-    order = np.empty(num, np.int64)
-    for j in range(num):
-        order[index[cluster[j]]] = j
-        index[cluster[j]] += 1
-    return order, start
