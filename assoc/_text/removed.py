@@ -34,6 +34,7 @@ REMOVED: dict[str, str] = {
     "associate(gate_loss)": _LOSS,
     "--lines": "use --json, or --csv for a row a scan",
     "--slice": _ONE_PROCESS,
+    "assoc.metrics.rmse": "numpy.sqrt(((truth - estimates) ** 2).sum(axis=1).mean())",
     "assoc.recordings.autoferry": "experiments/real/ferry_files.py reads these files",
     "assoc.integrations.motile": "assoc.link follows particles, also those that divide or merge, with a proved optimum",
     "assoc.filters.FunctionMotion": "write a class of assoc.filters.Motion",

@@ -10,8 +10,7 @@ from assoc.metrics.identity import Identity, identity, label_switches
 from assoc.metrics.ospa import Ospa, ospa, ospa_over_time
 from assoc.metrics.ospa2 import ospa2
 from assoc.metrics.plot_identity import identity_after_each, plot_identity_switches, tracks_of_one_identity
-from assoc.metrics.rmse import rmse, track_rmse
-from assoc.metrics.summary import Summary, summarise
+from assoc.metrics.summary import Summary, summarise, track_rmse
 from assoc.metrics.trajectories import Trajectories
 
 __all__ = [
@@ -34,7 +33,6 @@ __all__ = [
     "ospa2",
     "ospa_over_time",
     "plot_identity_switches",
-    "rmse",
     "summarise",
     "track_rmse",
     "tracks_of_one_identity",

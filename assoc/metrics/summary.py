@@ -1,4 +1,4 @@
-"""The metrics of tracks against a truth in one go."""
+"""The metrics of tracks against a truth in one go, and errors of positions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc.metrics.gospa import gospa_over_time, mean_gospa
 from assoc.metrics.identity import Identity, identity
-from assoc.metrics.ospa import ospa_over_time
+from assoc.metrics.ospa import distances, ospa_over_time
 from assoc.metrics.ospa2 import ospa2
-from assoc.metrics.rmse import track_rmse
-from assoc.metrics.trajectories import Trajectories
+from assoc.metrics.trajectories import Trajectories, epochs
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,8 @@ def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summa
     _, values = gospa_over_time(truth, tracks, cutoff)
     parts = mean_gospa(values)
     means = []
-    for _, distances in (ospa_over_time(truth, tracks, cutoff), ospa2(truth, tracks, cutoff)):
-        means.append(float(np.mean([value.distance for value in distances])) if distances else 0.0)
+    for _, of_instants in (ospa_over_time(truth, tracks, cutoff), ospa2(truth, tracks, cutoff)):
+        means.append(float(np.mean([value.distance for value in of_instants])) if of_instants else 0.0)
     return Summary(
         gospa=parts["distance"],
         gospa_localisation=parts["localisation"],
@@ -72,3 +71,29 @@ def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summa
         rmse=track_rmse(truth, tracks, cutoff)[0],
         identity=identity(truth, tracks, cutoff),
     )
+
+
+@explains_wrong_types
+def track_rmse(truth: Trajectories, tracks: Trajectories, cutoff: float) -> tuple[float, dict[int, float]]:
+    """Root mean square position error of tracks that are closer than a cutoff to their target.
+
+    Targets and tracks are paired at each instant as GOSPA of order 2 pairs them.
+
+    Returns
+    -------
+    overall : float
+        Metres; NaN if nothing was paired.
+    by_target : dict of int to float
+        For each target that was ever paired.
+    """
+    squared: dict[int, list[float]] = {}
+    _, values = gospa_over_time(truth, tracks, cutoff)
+    for (_, rows, columns), pairing in zip(epochs(truth, tracks), values, strict=True):
+        between = distances(truth.positions[rows], tracks.positions[columns])
+        i = np.searchsorted(truth.ids[rows], pairing.pairs[:, 0])
+        j = np.searchsorted(tracks.ids[columns], pairing.pairs[:, 1])
+        for target, distance in zip(pairing.pairs[:, 0].tolist(), between[i, j].tolist(), strict=True):
+            squared.setdefault(target, []).append(distance**2)
+    every = [value for values in squared.values() for value in values]
+    by_target = {target: float(np.sqrt(np.mean(values))) for target, values in sorted(squared.items())}
+    return float(np.sqrt(np.mean(every))) if every else float("nan"), by_target

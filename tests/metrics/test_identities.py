@@ -18,7 +18,6 @@ from assoc.metrics import (
     identity_after_each,
     label_switches,
     plot_identity_switches,
-    rmse,
     summarise,
     track_rmse,
     tracks_of_one_identity,
@@ -144,9 +143,6 @@ def test_plots_in_parts_count_as_all_at_once():
 
 
 def test_rmse():
-    assert rmse([[0, 0], [0, 0]], [[3, 4], [0, 0]]) == pytest.approx(12.5**0.5)
-    with pytest.raises(InvalidInputError, match="expected as many"):
-        rmse([[0, 0]], [[0, 0], [1, 1]])
     truth = along_lines([(0, 0, 0, 4), (1, 1, 0, 4)])
     tracks = Trajectories(truth.times, truth.ids + 3, truth.positions + [0, 30.0, 0])
     overall, by_target = track_rmse(truth, tracks, 100.0)

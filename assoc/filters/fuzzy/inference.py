@@ -166,11 +166,6 @@ class FuzzyRules:
         corners = self.input.corners
         return float(corners[:, 1].min()), float(corners[:, 2].max())
 
-    @property
-    def memberships(self) -> Array:
-        """Output sets over the grid, (O, U)."""
-        return self._tables[0]
-
     def __call__(self, inputs: Array) -> Array:
         """Infer the output for each input, (B,).
 
