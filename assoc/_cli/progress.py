@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from assoc._system.compile_time import announcement, is_compiling
 from assoc._system.interrupts import end_is_asked
 
 if TYPE_CHECKING:
     from assoc.sweeps.study import Counts
 
 Item = TypeVar("Item")
-
-# seconds of compiling without a message
-_SOON = 0.5
 
 
 class ProgressBar:
@@ -28,7 +23,6 @@ class ProgressBar:
         self.done = 0
         """Number of items that are done."""
         self._progress: Any = None
-        self._said = contextlib.ExitStack()
         self._started = time.perf_counter()
         if shown and sys.stderr.isatty():
             # imported here: slow, and only needed on a terminal
@@ -40,17 +34,8 @@ class ProgressBar:
                 TextColumn,
                 TimeRemainingColumn,
             )
-            from rich.text import Text
 
-            class WithNote(Progress):
-                """Says below the bar why the first scans take so long."""
-
-                def get_renderables(self) -> Any:
-                    yield self.make_tasks_table(self.tasks)
-                    if is_compiling(_SOON):
-                        yield Text("compiling, once after installation", overflow="ellipsis", no_wrap=True)
-
-            self._progress = WithNote(
+            self._progress = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
                 MofNCompleteColumn(),
@@ -83,7 +68,6 @@ class ProgressBar:
 
     def close(self) -> None:
         """Remove the bar."""
-        self._said.close()
         if self._progress is not None:
             self._progress.stop()
 
@@ -91,7 +75,6 @@ class ProgressBar:
         self._started = time.perf_counter()
         if self._progress is not None:
             self._progress.start()
-            self._said.enter_context(announcement.silenced())
         return self
 
     def __exit__(self, *exception: object) -> None:

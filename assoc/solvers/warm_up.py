@@ -7,14 +7,12 @@ never use branch and bound, so the first hard one would wait for half a minute.
 from __future__ import annotations
 
 import contextlib
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
-from assoc._system.compile_time import announcement
 from assoc._system.compiled import wait_for_kernels
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
@@ -54,39 +52,15 @@ def warm_up(solvers: Iterable[str] | None = None) -> None:
     branching = [name for name in names if name in _BRANCHING]
     if branching:
         compile_all_branching_ahead()
-    with compiled_only(), announcement.silenced(), _Line() as say:
-        for name in names:
-            if name not in branching:
-                say(name)
-                prepare([name])
+    with compiled_only():
+        prepare(name for name in names if name not in branching)
         if branching:
-            say(", ".join(branching))
             _begin_searches(branching)
-        for name in branching:
-            # the first branch and bound waits for the other process
-            say(name)
-            prepare([name])
+        # the first branch and bound waits for the other process
+        prepare(branching)
         wait_for_kernels()
         # only large problems use this sort, and their time limits are the hardest to keep
         ascending(np.zeros(10_000))
-
-
-class _Line:
-    """One line on a terminal that names the solver being prepared."""
-
-    def __enter__(self) -> Callable[[str], None]:
-        self._shown = sys.stderr is not None and sys.stderr.isatty()
-        return self._say
-
-    def _say(self, name: str) -> None:
-        if self._shown:
-            print(f"\r\033[Kassoc: preparing {name} (slow only once after installation)", end="", file=sys.stderr)
-            sys.stderr.flush()
-
-    def __exit__(self, *exception: object) -> None:
-        if self._shown:
-            print("\r\033[K", end="", file=sys.stderr)
-            sys.stderr.flush()
 
 
 def _begin_searches(names: list[str]) -> None:
