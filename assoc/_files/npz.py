@@ -45,10 +45,8 @@ def save_npz(
     format_name: str,
     version: int,
     arrays: Mapping[str, Array | str | int],
-    *,
-    packed: bool = True,
 ) -> None:
-    """Write arrays as an npz, compressed if `packed`, with its format name and version; see `load_npz`."""
+    """Write arrays as a compressed npz, with its format name and version; see `load_npz`."""
     content = {name: np.asarray(value) for name, value in arrays.items()}
     for name, value in content.items():
         if value.dtype.hasobject:
@@ -57,7 +55,7 @@ def save_npz(
 
     def write(file: IO[bytes]) -> None:
         # data that compress beyond what readers accept are stored uncompressed
-        for method in (*([zipfile.ZIP_DEFLATED] if packed else []), zipfile.ZIP_STORED):
+        for method in (zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED):
             file.seek(0)
             file.truncate()
             # as numpy.savez, which leaves its archive open on a full disk and warns of that later

@@ -204,16 +204,15 @@ def check_regular(path: FilePath) -> None:
             raise InvalidInputError(f"{path}: is a link, a pipe or a folder, expected a file")
 
 
-def open_regular(path: FilePath, mode: str = "rb") -> IO[bytes]:
+def open_regular(path: FilePath) -> IO[bytes]:
     """Open a file in a folder that others may write to: follows no link, and waits for no pipe or device.
 
-    Mode "ab" is not buffered, and creates the file. Raises OSError as `open` does, InvalidInputError for what is no
-    file.
+    Raises OSError as `open` does, InvalidInputError for what is no file.
     """
 
     def opener(name: str, flags: int) -> int:
         check_regular(name)
         # check again: it may have been replaced meanwhile
-        return os.open(name, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
+        return os.open(name, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
 
-    return open(path, mode, buffering=0 if mode == "ab" else -1, opener=opener)
+    return open(path, "rb", opener=opener)

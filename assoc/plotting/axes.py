@@ -15,11 +15,11 @@ _OUTLIERS = 3.0
 _WIDE, _TALL = 1.5, 1.1
 
 
-def axes_or_new(ax: Any, size: tuple[float, float] = (7.0, 5.0)) -> Any:
+def axes_or_new(ax: Any) -> Any:
     """Return the axes given, or those of a new figure."""
     if ax is not None:
         return ax
-    return load_extra("matplotlib.pyplot", "plot").subplots(figsize=size, layout="constrained")[1]
+    return load_extra("matplotlib.pyplot", "plot").subplots(figsize=(7.0, 5.0), layout="constrained")[1]
 
 
 class Unit(NamedTuple):

@@ -15,12 +15,8 @@ from assoc._system.imports import load_extra
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.plotting.colours import DASHES, colour
-from assoc.sweeps.bootstrap import mean_interval, weighted_mean
 from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
-from assoc.sweeps.summary import FACTORS, by_problem, measured, numbers, summarize, varied
-
-if TYPE_CHECKING:
-    import pandas as pd
+from assoc.sweeps.summary import FACTORS, by_problem, mean_interval, measured, numbers, summarize, varied, weighted_mean
 
 if TYPE_CHECKING:
     import pandas as pd

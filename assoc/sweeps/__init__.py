@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 from assoc._system.imports import lazy_names
 
 if TYPE_CHECKING:
-    from assoc.sweeps.design import grid
+    from assoc.sweeps.design import Setting, grid
     from assoc.sweeps.frame import load, load_traces
-    from assoc.sweeps.setting import Setting
     from assoc.sweeps.study import Study
     from assoc.sweeps.summary import compare, summarize
     from assoc.sweeps.tuning import tune
@@ -32,7 +31,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "Setting": "setting",
+        "Setting": "design",
         "Study": "study",
         "compare": "summary",
         "grid": "design",

@@ -16,7 +16,7 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.sweeps.setting import Setting
+from assoc.sweeps.design import Setting
 from assoc.sweeps.sources import study_sources
 from assoc.sweeps.store import COLUMNS, KEPT, Manifest, RunKey, Store
 from assoc.sweeps.worker import Job, RunNumbers, code_digest, run_batch

@@ -20,9 +20,8 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
-from assoc.sweeps.design import Range, Space
+from assoc.sweeps.design import Range, Setting, Space
 from assoc.sweeps.frame import load
-from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import study_sources
 from assoc.sweeps.store import REPORT, Store
 from assoc.sweeps.study import Counts, Study

@@ -15,7 +15,7 @@ import numpy as np
 from assoc._system.compiled import loaded, with_foreign_kernels
 from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.sweeps.setting import Setting
+from assoc.sweeps.design import Setting
 from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import Manifest
 

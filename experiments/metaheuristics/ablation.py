@@ -17,7 +17,7 @@ import numpy as np
 
 import assoc
 from assoc._types import Floats
-from assoc.sweeps.bootstrap import mean_interval
+from assoc.sweeps.summary import mean_interval
 from experiments.common.claims import Claim
 from experiments.common.command import above_zero, main, whole
 from experiments.metaheuristics import parts

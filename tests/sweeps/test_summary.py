@@ -7,9 +7,8 @@ from scipy import stats
 
 from assoc.problem import AssignmentProblem
 from assoc.sweeps import grid, load, summarize
-from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.study import Study
-from assoc.sweeps.summary import paired
+from assoc.sweeps.summary import mean_interval, paired
 
 
 def test_one_problem_many_repeats_is_the_ordinary_bootstrap():

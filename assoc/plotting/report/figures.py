@@ -152,10 +152,10 @@ def sliding(
     return {"data": data, "layout": given, "frames": frames}
 
 
-def menu(choices: Choices, x: float = 0.0) -> Dicts:
+def menu(choices: Choices) -> Dicts:
     """Menu whose choices (text, changes of traces and layout) are plotly's `update`."""
     return {
-        "x": x, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"b": 2},
+        "x": 0.0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"b": 2},
         "buttons": [{"method": "update", "label": escape(text), "args": list(args)} for text, args in choices],
     }  # fmt: skip
 

@@ -137,7 +137,7 @@ def gather(frame: pd.DataFrame, mode: str) -> Measured:
 
 
 def _interval(values: Any) -> tuple[float, float]:
-    from assoc.sweeps.bootstrap import mean_interval
+    from assoc.sweeps.summary import mean_interval
 
     return mean_interval(values)
 
@@ -168,7 +168,7 @@ def claims(measured: dict[str, Measured], cut_off: int = 0) -> list[Claim]:
 
 
 def _conclusions(runs: Measured, mode: str, paper: Any) -> list[Claim]:
-    from assoc.sweeps.bootstrap import RESAMPLES, draws
+    from assoc.sweeps.summary import RESAMPLES, draws
 
     settings = list(PAPER)
     greater = np.array([alpha > beta for alpha, beta, _ in settings])
