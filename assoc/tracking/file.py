@@ -19,7 +19,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.tracking.records.biases import Biases
-from assoc.tracking.records.clutter import ClutterMap
+from assoc.tracking.records.clutter import ONE_SAYS, ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.echoes import Echoes
 from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
@@ -218,8 +218,8 @@ def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> Clut
         good = clocks.shape == (count,) and (np.diff(clocks) >= 0).all() and (clocks <= saved["clock"][s]).all()
         saved.require(good, f"clocks.{s}", f"{count} turns that do not descend")
         votes = saved[f"votes.{s}"]
-        good = votes.shape == (count,) and bool((np.abs(votes) <= 1.0).all())
-        saved.require(good, f"votes.{s}", f"{count} numbers from -1 to 1")
+        good = votes.shape == (count,) and bool((np.abs(votes) <= ONE_SAYS).all())
+        saved.require(good, f"votes.{s}", f"{count} numbers from {-ONE_SAYS:.3g} to {ONE_SAYS:.3g}")
     return model.restored(saved)
 
 

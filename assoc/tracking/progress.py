@@ -13,6 +13,7 @@ from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
+from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.track import Step
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.records.unresolved import Shared
@@ -93,6 +94,8 @@ class Progress(NamedTuple):
     """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
     crowds: tuple[Array, ...] = ()
     """Logarithms of the densities there, whether they are in use or not."""
+    clutter: ClutterMap | None = None
+    """The map of false alarms as it is after the scan."""
     shared: Shared | None = None
     """Tracks that may be unresolved in this scan; see `assoc.tracking.stages.unresolved`."""
     association: Association | None = None

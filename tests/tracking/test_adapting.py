@@ -247,6 +247,20 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     assert sum(track.reported for track in tracker.tracks) >= 11
 
 
+def test_targets_that_fly_together_are_confirmed_as_without_the_map():
+    """What may be a place in the first turns is none unless it predicts surely better than tracks do."""
+    for seed in range(4):
+        sensor, plots = group(seed, 120.0, 60.0, 50.0)
+        shown = []
+        for adapt in (True, False):
+            options = {"adapt": adapt, "initiation": Initiation(speed=120.0)}
+            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), **options)
+            for k, z in enumerate(plots[:4]):
+                tracker.step(float(k), [z])
+            shown.append(sum(track.reported for track in tracker.tracks))
+        assert shown[0] == shown[1] > 6
+
+
 @pytest.mark.parametrize("bias", [0.0, 1.0])
 def test_estimates_are_used_while_they_predict_better(bias):
     """Right declarations are hardly ever left; wrong ones are."""

@@ -16,11 +16,12 @@ from assoc.filters.imm import InteractingMultipleModel, Mixture
 from assoc.filters.measurement import periods_of
 from assoc.registration.correction import corrected_measurements
 from assoc.scene.own_times import FULL_TURN
+from assoc.scene.scan import Scan
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, Shown, shown_by
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.biases import CLOCK
-from assoc.tracking.records.clutter import YOUNG
+from assoc.tracking.records.clutter import ONE_SAYS, YOUNG
 from assoc.tracking.records.estimates import ALARMS, NOISE, declared_values
 from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.track_batch import TrackBatch
@@ -68,8 +69,23 @@ def use_estimates(progress: Progress) -> Progress:
 
 
 def remember_tracks(progress: Progress) -> Progress:
-    """Stage: keep the tracks that association begins with."""
-    return progress._replace(before=progress.settings.method.current(progress.state))
+    """Stage: keep the tracks that association begins with; the map goes on with what they and places predicted."""
+    tracks, clutter = progress.settings.method.current(progress.state), progress.state.clutter
+    assert clutter is not None
+    progress = progress._replace(before=tracks)
+    tracks = _late(progress, tracks[tracks.confirmed | (tracks.hits >= 2)])
+    scan = progress.scan
+    if progress.shared is not None and progress.shared.measured is not None:
+        scan = progress.shared.measured
+    votes = _votes(progress, scan, tracks, densities_at(progress, tracks, clutter)[1] > 0.0)
+    return progress._replace(clutter=clutter.after(progress.work.settings.sensors, scan, _turns(progress), votes))
+
+
+def _late(progress: Progress, tracks: TrackBatch) -> TrackBatch:
+    """These tracks, predicted to the scan."""
+    if progress.timed is None or not len(tracks):
+        return tracks
+    return tracks.moved(predict_each(progress.settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
 
 
 def learn(progress: Progress) -> Progress:
@@ -77,15 +93,10 @@ def learn(progress: Progress) -> Progress:
     state, step, settings = progress.state, progress.step, progress.settings
     estimates, tracks = state.estimates, progress.before
     assert estimates is not None and step is not None and tracks is not None
-    tracks = tracks[tracks.confirmed | (tracks.hits >= 2)]
-    late = tracks
-    if progress.timed is not None and len(tracks):
-        late = tracks.moved(predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed)))
-    assert state.clutter is not None
-    used, there = (found > 0.0 for found in densities_at(progress, late, state.clutter))
-    votes = _votes(progress, late, there)
-    sure = np.flatnonzero(tracks.confirmed)
-    tracks, late, used = tracks[sure], late[sure], used[sure]
+    assert state.clutter is not None and progress.clutter is not None
+    tracks = tracks[tracks.confirmed]
+    late, clutter = _late(progress, tracks), progress.clutter
+    used = densities_at(progress, late, state.clutter)[0] > 0.0
     dwelled = dwells(progress, late.states)
     rows = _rows(progress, tracks.track_id)
     if len(tracks):
@@ -117,7 +128,6 @@ def learn(progress: Progress) -> Progress:
         estimates = estimates.gained(shown.noise, shown.manoeuvres).weighed(shown.matrix, shown.right)
         if state.biases is not None:
             progress = progress.with_state(biases=state.biases.after(declared, *shown.biases))
-    clutter = state.clutter.after(declared, progress.scan, turns, votes)
     grown = np.flatnonzero((state.clutter.clock < YOUNG) & (clutter.clock >= YOUNG))
     if len(grown) and not state.tracks.confirmed.all():
         # what tracks gained before a place was sure, they gained too easily
@@ -127,10 +137,10 @@ def learn(progress: Progress) -> Progress:
     return progress.with_state(estimates=estimates.forgotten(turns).settled(declared), clutter=clutter)
 
 
-def _votes(progress: Progress, tracks: TrackBatch, there: Array) -> list[Array]:
+def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> list[Array]:
     """How much better places predicted each measurement than predicted tracks did, (n_s,) for each sensor.
 
-    Differences of log likelihoods, from -1 to 1; 0 outside of places, and in the first turns, before tracks could. Both
+    Differences of log likelihoods, limited; 0 outside of places, and in the first turns, before tracks could. Both
     are intensities of Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
     """
     settings, clutter = progress.settings, progress.state.clutter
@@ -140,7 +150,7 @@ def _votes(progress: Progress, tracks: TrackBatch, there: Array) -> list[Array]:
         rows = np.flatnonzero(found)
         if clutter.clock[s] < YOUNG - 1.0 or not len(rows):
             continue
-        dense, z = np.zeros(len(rows)), progress.scan.measurements[s][rows]
+        dense, z = np.zeros(len(rows)), scan.measurements[s][rows]
         if len(tracks):
             expected = settings.filter.expected(tracks.states, sensor)
             gate = gate_of(sensor, settings.gate_probability)
@@ -151,7 +161,7 @@ def _votes(progress: Progress, tracks: TrackBatch, there: Array) -> list[Array]:
             density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
             np.add.at(dense, near, density * np.exp(-0.5 * square) / size)
         more = (sensor.detection_probability * there[:, s].sum() - len(rows)) / len(rows)
-        votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -1.0, 1.0)
+        votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -ONE_SAYS, ONE_SAYS)
     return votes
 
 

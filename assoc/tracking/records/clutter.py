@@ -4,7 +4,8 @@ The last plots of each sensor are kept. Of those near a measurement, the nearest
 only the others show clutter, and the density follows from the distance within which there are six of them, in units of
 the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
-And tracks must not have predicted its plots better: where targets stand or circle, each is near its own track.
+And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), both by what
+came before: where targets stand or circle, each is near its own track.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from scipy.spatial import cKDTree
 from assoc._types import Array
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
+from assoc.tracking.records.prequential import NEEDED
 
 _TURNS, _PLOTS = 10.0, 2000
 """Plots are kept for so many turns, and at most so many of a sensor."""
@@ -35,6 +37,8 @@ _NEEDED = [
 ]
 YOUNG = float(math.ceil(-math.log2(1.0 - _SURE)) - 1)
 """With fewer turns before no place is sure: what is dense may be targets that fly together."""
+ONE_SAYS = 0.5 * NEEDED
+"""Largest vote: no measurement alone shows that a place predicts better than tracks, it may be of a new target."""
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 
@@ -49,7 +53,7 @@ class ClutterMap(NamedTuple):
     clock: Array
     """Turns of each sensor so far, (S,)."""
     votes: tuple[Array, ...]
-    """By how much the place predicted each plot better than the tracks did, from -1 to 1; (n_s,) each."""
+    """Evidence of each plot that its place predicted it better than the tracks did; (n_s,) each."""
 
     @staticmethod
     def empty(sensors: Sequence[Sensor]) -> ClutterMap:
@@ -82,14 +86,13 @@ class ClutterMap(NamedTuple):
         """
         found = []
         for s, sensor in enumerate(sensors):
-            here = _places(sensor, scan.measurements[s])
-            at = here if elsewhere is None else _places(sensor, elsewhere[s])
+            at = _places(sensor, scan.measurements[s] if elsewhere is None else elsewhere[s])
             if scan.sectors is not None and scan.sectors[s, 0] == scan.sectors[s, 1]:
                 # what reports by itself, and does not look, returns no clutter of a place
                 found.append((np.zeros(len(at)), np.zeros(len(at))))
             else:
                 known = self.places[s], self.clocks[s], self.votes[s]
-                found.append(_densities(sensor, at, here, *known, float(self.clock[s])))
+                found.append(_densities(sensor, at, *known, float(self.clock[s])))
         used, every = zip(*found, strict=True)
         return used, every
 
@@ -126,14 +129,13 @@ def _places(sensor: Sensor, measured: Array) -> Array:
 
 
 def _densities(
-    sensor: Sensor, at: Array, here: Array, places: Array, clocks: Array, votes: Array, now: float
+    sensor: Sensor, at: Array, places: Array, clocks: Array, votes: Array, now: float
 ) -> tuple[Array, Array]:
-    """See `ClutterMap.used_and_found`: of these places ``at``, with the plots ``here``."""
+    """See `ClutterMap.used_and_found`: of these places ``at``."""
     n, part = len(at), sensor.position_part
     result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
     before = int(min(round(now), _TURNS))
-    age = np.append(np.rint(now - clocks), np.zeros(len(here)))
-    places, votes, turns = np.concatenate([places, here]), np.append(votes, np.zeros(len(here))), before + 1
+    age, turns = np.rint(now - clocks), max(before, 1)
     if len(places) <= _OTHERS or not n:
         return result, result
     units, d = _units(sensor), part.dim
@@ -168,5 +170,5 @@ def _densities(
     size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
     ratio = (last + 1) / (size * usual)
     result[dense] = np.where(ratio > least, np.log(np.maximum(ratio, 1.0)), 0.0)
-    used[dense] = (votes[near].mean(axis=1) > 0.0) & (before >= YOUNG)
+    used[dense] = (votes[near].sum(axis=1) > NEEDED) & (before >= YOUNG)
     return np.where(used, result, 0.0), result

@@ -18,11 +18,13 @@ from assoc._types import Array
 
 # share of right declarations that are ever replaced
 _BY_CHANCE = 0.01
+NEEDED = -math.log(_BY_CHANCE)
+"""Evidence from which on an estimate is used."""
 
 
 def trusted(evidence: Array, before: Array) -> Array:
     """Which estimates are to be used, by the logarithms of the ratios and by whether they were used before; bool."""
-    return np.asarray((evidence > -math.log(_BY_CHANCE)) | (before & (evidence > 0.0)))
+    return np.asarray((evidence > NEEDED) | (before & (evidence > 0.0)))
 
 
 def mean_evidence(evidence: Array) -> Array:

@@ -126,12 +126,13 @@ def false_alarms_at(progress: Progress, tracks: TrackBatch) -> Array | float:
 
     At what may yet turn out to be a place, all that a track has gained so far may be as much too much.
     """
-    alarms, life, clutter = false_alarms(progress), progress.settings.life_cycle, progress.state.clutter
+    alarms, life, clutter = false_alarms(progress), progress.settings.life_cycle, progress.clutter
     new = np.flatnonzero(~tracks.confirmed & life.confirms(tracks.score, tracks.detections, alarms))
-    if clutter is None or not len(new) or not any(crowd.any() for crowd in progress.crowds):
+    before = progress.state.clutter
+    if before is None or clutter is None or not len(new):
         return alarms
     used, found = densities_at(progress, tracks[new], clutter)
-    doubtful = (found * (clutter.clock < YOUNG)).sum(axis=1) * tracks.hits[new]
+    doubtful = np.where(clutter.clock < YOUNG, found, used) @ (before.clock < YOUNG) * tracks.hits[new]
     usual = life.false_tracks_per_hour / float(life.false_share(alarms)) if math.isinf(alarms) else alarms
     at = np.full(len(tracks), usual)
     at[new] *= np.exp(np.minimum(np.maximum(used.max(axis=1), doubtful), _SURELY_FALSE))
@@ -140,7 +141,9 @@ def false_alarms_at(progress: Progress, tracks: TrackBatch) -> Array | float:
 
 def densities_at(progress: Progress, tracks: TrackBatch, clutter: ClutterMap) -> Array:
     """Logarithms of the densities where each sensor expects tracks: in use, and all, see `ClutterMap`; (2, T, S)."""
-    crowded = [bool(crowd.any()) for crowd in progress.crowds]
+    assert progress.state.clutter is not None
+    young = progress.state.clutter.clock < YOUNG
+    crowded = [bool(own) or bool(crowd.any()) for own, crowd in zip(young, progress.crowds, strict=True)]
     found = np.zeros((2, len(tracks), len(crowded)))
     if any(crowded) and len(tracks):
         expected = [
