@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import component_bounds, hard_pass, reduced_costs
 from assoc.packing.bounds.priced import TOLERANCE, Priced
-from assoc.packing.cover import chosen_columns, is_complete, weight_of
+from assoc.packing.cover import best_of_both, chosen_columns, is_complete, weight_of
 from assoc.packing.packing import Packing
 from assoc.packing.run import infeasible
 
 Owner = NDArray[np.int32]
+
+# rows from which a cover that is worse as a whole may be better in places
+_LARGE = 150
 
 
 @dataclass(slots=True)
@@ -74,7 +77,12 @@ class Component(Priced):
         return weight_of(self.packing, owner)
 
     def offer(self, owner: Owner, weight: float) -> bool:
-        """Keep a cover if it is complete and better than the best; return whether it was."""
+        """Keep a complete cover if it is better than the best, or what is better of it (large ones); return whether."""
+        if self.best is not None and self.packing.num_rows >= _LARGE and self.is_complete(owner):
+            packing, rows = self.packing, self.packing.num_rows
+            both, owner = owner, self.best.copy()
+            parent, gain = np.empty(rows, dtype=np.int32), np.empty(rows)
+            weight = best_of_both(packing.arrays.cols, packing.arrays.weights, 0, rows, owner, both, parent, gain)
         if weight < self.weight - self.tolerance and self.is_complete(owner):
             # recomputed: moves accumulate rounding errors, and bounds of whole-numbered weights are rounded up to it
             self.best, self.weight = owner.copy(), self.weight_of(owner)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Ints
-from assoc.packing.kernels.columns import choose_all
+from assoc._types import Floats, Ints
+from assoc.packing.kernels.columns import choose_all, first_row
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
-from assoc.packing.packing import Packing
+from assoc.packing.packing import Packing, find
 from assoc.packing.run import Run
 
 # seconds to complete a cover when time is over
@@ -118,3 +118,42 @@ def chosen_columns(cols: Ints, owner: Ints) -> Any:
             result[count] = j
             count += 1
     return result
+
+
+@njit
+def best_of_both(
+    cols: NDArray[np.int32],
+    weights: Floats,
+    top: int,
+    end: int,
+    owner: NDArray[np.int32],
+    other: NDArray[np.int32],
+    parent: NDArray[np.int32],
+    gain: Floats,
+) -> float:
+    """Take over from another complete cover of a component where that is lighter; returns the weight then.
+
+    Where two covers differ, the columns of both form groups that share no row: each can be exchanged alone.
+    """
+    for r in range(top, end):
+        parent[r] = r
+        gain[r] = 0.0
+    for r in range(top, end):
+        for j in (owner[r], other[r]):
+            if j >= 0:
+                first, second = find(parent, r), find(parent, first_row(cols, j))
+                parent[max(first, second)] = min(first, second)
+    for r in range(top, end):
+        root = find(parent, r)
+        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
+            gain[root] += weights[owner[r]]
+        if other[r] >= 0 and first_row(cols, other[r]) == r:
+            gain[root] -= weights[other[r]]
+    total = 0.0
+    for r in range(top, end):
+        root = find(parent, r)
+        if gain[root] > 0.0:
+            owner[r] = other[r]
+        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
+            total += weights[owner[r]]
+    return total

@@ -18,6 +18,8 @@ from assoc.packing.run import Run
 
 # cluster searches between two checks of the gap and of the clock
 _AT_ONCE = 10
+# share of the gap that a round of exact sub-steps must gain for the next
+_GAIN = 0.01
 # share of the time left in which the first linear program of dives must be solved, or there are no dives
 _FOR_PROGRAM = 0.25
 
@@ -112,17 +114,20 @@ class LocalSearch:
         self.component.offer(owner, weight)
         return weight
 
-    def refine(self) -> None:
-        """Improve the best cover by exact sub-steps: ``clusters`` for every 30 rows."""
+    def refine(self, rounds: int = 1) -> None:
+        """Improve the best cover by exact sub-steps: rounds of ``clusters`` for every 30 rows, while they gain."""
         component = self.component
-        left = self.clusters * max(1, component.packing.num_rows // 30)
-        while component.best is not None and self.full and left > 0:
-            if component.closed or self.run.should_stop():
+        for _ in range(rounds):
+            left, before = self.clusters * max(1, component.packing.num_rows // 30), component.weight
+            while component.best is not None and self.full and left > 0:
+                if component.closed or self.run.should_stop():
+                    return
+                self.search_clusters(component.best, component.weight, min(left, _AT_ONCE))
+                # recomputed: rounding errors would add up to a false improvement
+                component.weight = component.weight_of(component.best)
+                left -= _AT_ONCE
+            if before - component.weight <= _GAIN * (component.weight - component.bound):
                 return
-            self.search_clusters(component.best, component.weight, min(left, _AT_ONCE))
-            # recomputed: rounding errors would add up to a false improvement
-            component.weight = component.weight_of(component.best)
-            left -= _AT_ONCE
 
     @property
     def escapes(self) -> bool:

@@ -14,6 +14,9 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
+# rounds of exact sub-steps on the first cover, at most
+_ROUNDS = 10
+
 
 class IncumbentSearch:
     """Improves the incumbent of `exact`: tabu search and breeding in turns, as they get stuck in different places."""
@@ -25,9 +28,10 @@ class IncumbentSearch:
 
     def iterate(self) -> None:
         """Do one iteration of the next one, and exact sub-steps on the incumbent."""
-        self._searchers[self._iterations % 2].iterate(self._search)
+        if self._iterations:
+            self._searchers[0 if self._iterations % 4 else 1].iterate(self._search)
+        self._search.refine(1 if self._iterations else _ROUNDS)
         self._iterations += 1
-        self._search.refine()
 
 
 EXACT_METHODS = Methods(

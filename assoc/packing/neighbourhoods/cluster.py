@@ -33,7 +33,7 @@ from assoc.packing.packing import Packing, PackingArrays
 _CAPACITY = 4000
 _REACH = 3.0
 # rows of a cluster: about twenty targets of three sensors are solved in a millisecond or less
-_START, _LEAST, _MOST = 45, 24, 75
+_START, _LEAST, _MOST = 45, 24, 600
 # nodes of the depth-first search for one cluster
 _NODES = 1000
 # share of clusters in which another choice of the same weight is taken too
@@ -84,9 +84,9 @@ class ClusterSearch:
         """Improve a complete cover of this weight in place by some clusters; return its new weight."""
         change, unfinished = self.search(packing.arrays, owner, rng, tries, deadline)
         if unfinished > _TOO_LARGE:
-            self.size = max(self.size - 6, min(_LEAST, self._most))
+            self.size = max(self.size * 7 // 8, min(_LEAST, self._most))
         elif change == 0.0:
-            self.size = min(self.size + 1, self._most)
+            self.size = min(self.size + 1 + self.size // 24, self._most)
         return weight + change
 
     def search(

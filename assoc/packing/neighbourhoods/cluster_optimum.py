@@ -17,6 +17,8 @@ from assoc._types import Floats, Ints
 from assoc.packing.bounds.priced import ReducedCosts
 from assoc.packing.packing import PackingArrays
 
+# columns listed that take as long as a node
+_LISTED = 50
 _LEVELS = 4
 _SWEEPS = 8
 
@@ -258,7 +260,7 @@ def depth_first(
 
     ``lists[0]`` has the number of columns, and these in order of cost. A choice equal to the present one is skipped;
     after any other only those better than the present by ``step`` count. Returns the cost (``inf``: none), the number
-    of columns in ``best``, and the nodes used (more than the limit: not searched to the end).
+    of columns in ``best``, and the nodes used, long lists counted as more (above the limit: not searched to the end).
     """
     budget, present, step, node_limit = limits
     depths = num + 1
@@ -289,7 +291,7 @@ def depth_first(
                     budget = min(found, present) - step
                 at[depth] = lists[depth, 0] + 1
             else:
-                nodes += 1
+                nodes += 1 + lists[depth, 0] // _LISTED
                 if nodes > node_limit:
                     break
                 branch_row[depth], worst = _to_branch_on(lists[depth], members, cost, covered, sensor, buffers)

@@ -31,11 +31,11 @@ from assoc.packing.bounds.dual_ascent import (
 )
 from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.component import Component, split_components
-from assoc.packing.cover import Cover
+from assoc.packing.cover import Cover, best_of_both
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
-from assoc.packing.packing import Packing, PackingArrays, assembled, find
+from assoc.packing.packing import Packing, PackingArrays, assembled
 from assoc.packing.run import Run
 
 # passes at one temperature; the last temperatures get more, because few columns are left by then
@@ -353,45 +353,6 @@ def _cover_weights(packing: PackingArrays, owner: NDArray[np.int32]) -> Floats:
             if j >= 0 and first_row(cols, j) == r:
                 result[c] += weights[j]
     return result
-
-
-@inner_njit
-def best_of_both(
-    cols: NDArray[np.int32],
-    weights: Floats,
-    top: int,
-    end: int,
-    owner: NDArray[np.int32],
-    other: NDArray[np.int32],
-    parent: NDArray[np.int32],
-    gain: Floats,
-) -> float:
-    """Take over from another complete cover of a component where that is lighter; returns the weight then.
-
-    Where two covers differ, the columns of both form groups that share no row: each can be exchanged alone.
-    """
-    for r in range(top, end):
-        parent[r] = r
-        gain[r] = 0.0
-    for r in range(top, end):
-        for j in (owner[r], other[r]):
-            if j >= 0:
-                first, second = find(parent, r), find(parent, first_row(cols, j))
-                parent[max(first, second)] = min(first, second)
-    for r in range(top, end):
-        root = find(parent, r)
-        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
-            gain[root] += weights[owner[r]]
-        if other[r] >= 0 and first_row(cols, other[r]) == r:
-            gain[root] -= weights[other[r]]
-    total = 0.0
-    for r in range(top, end):
-        root = find(parent, r)
-        if gain[root] > 0.0:
-            owner[r] = other[r]
-        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
-            total += weights[owner[r]]
-    return total
 
 
 @inner_njit

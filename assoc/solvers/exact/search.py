@@ -26,6 +26,9 @@ from assoc.solvers.exact.regions import close_by_regions
 # incumbent, and they join it only after `_ALONE` turns (about a second), for users who stop a long search
 _LARGE = 150
 _ALONE = 100
+# share of the gap that iterations of the improver gain at least before regions and the linear program are tried, and
+# how many in a row may gain less
+_LITTLE, _QUIET = 0.002, 5
 # turns of branching between iterations of the improver
 _TURNS = 3
 # columns up to which a component is branched on before anything else, and for how many nodes
@@ -74,6 +77,9 @@ class _Task:
     all: _Searches
     branching: Branching | None = None
     improver: Improver | None = None
+    # whether regions and the linear program were tried, and iterations in a row of the improver that gained little
+    bounded: bool = False
+    quiet: int = 0
     # turns of branching: since the last iteration of the improver, and in all
     turns: int = 0
     age: int = 0
@@ -87,6 +93,8 @@ class _Task:
         if not self.all.run.should_stop() and self.all.nodes_left > 0:
             if self._improves:
                 self._search_better()
+                return False
+            if self._awaits_bound:
                 return False
             if self.branching is None:
                 self.branching = Branching(component, self.all.run, BranchAndBound)
@@ -104,12 +112,14 @@ class _Task:
 
     def split(self) -> list[_Task]:
         """Tasks for the parts of the component: in one search the nodes of independent parts would multiply."""
+        if self._awaits_bound:
+            return [_Task(part, self.all, bounded=True) for part in _by_regions(self.component, self.all)]
         # branching should start with as few columns as the incumbent allows
         share = 0.9 if self.branching is None and not self._improves else 2 / 3
         parts = split_component(self.component, share) or ()
         for part in parts:
             _match(part)
-        return [_Task(part, self.all) for part in parts]
+        return [_Task(part, self.all, bounded=self.bounded) for part in parts]
 
     def branch_shortly(self) -> bool:
         """Branch at once; returns whether that closed it: small components mostly close before a better bound would."""
@@ -127,15 +137,21 @@ class _Task:
         return branching.search.done
 
     @property
+    def _awaits_bound(self) -> bool:
+        """Whether regions and the linear program of a large component come next."""
+        return not (self.bounded or self._improves) and _is_large(self.component, self.all.run)
+
+    @property
     def _improves(self) -> bool:
         """Whether to improve the incumbent before any branching."""
         component, patience = self.component, self.all.patience
         # small components are branched on at once, and without incumbent there is nothing to improve
         packing = component.packing
-        large = self.branching is None and component.best is not None and packing.num_rows >= _LARGE
-        large = large and self.all.run.methods.improver is not None
-        large = large and packing.num_columns > _THIN * packing.num_rows
-        return large and component.stalled * 60 < patience * component.packing.num_rows
+        if self.branching is not None or not _is_large(component, self.all.run):
+            return False
+        if not self.bounded:
+            return self.quiet < _QUIET
+        return packing.num_columns > _THIN * packing.num_rows and component.stalled * 60 < patience * packing.num_rows
 
     def _join(self) -> None:
         """Give the improver half the time while they improve the incumbent, then less and less."""
@@ -156,6 +172,8 @@ class _Task:
             self.improver = make(component, self.all.run)
         before = component.weight
         self.improver.iterate()
+        little = before - component.weight <= _LITTLE * (component.weight - component.lower_bound)
+        self.quiet = self.quiet + 1 if little else 0
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
 
 
@@ -182,7 +200,10 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
         if task.branch_shortly():
             done.append(task)
         else:
-            left.extend(_Task(part, searches) for part in _bound_better(task.component, searches))
+            left.extend(
+                _Task(part, searches, bounded=not _is_large(part, run))
+                for part in _bound_better(task.component, searches)
+            )
     tasks = done + left
     searches.record(tasks)
     searches.take(tasks)
@@ -233,15 +254,25 @@ def _bound_better(component: Component, searches: _Searches) -> list[Component]:
         if searches.good_enough(component):
             return [component]
     component.adopt_if_better(dual_bound(component.packing, run=run))
-    if not component.closed and not run.should_stop():
-        packing = component.packing
-        useful = None
-        if packing.num_rows >= _LARGE and not packing.is_axial and component.best is not None:
-            useful = close_by_regions(component, partial(_search_shortly, searches))
-        parts = None if component.closed else split_component(component, useful=useful)
-        if parts:
-            return [smaller for part in parts for smaller in _with_program(part, searches)]
-    return _with_program(component, searches)
+    # a large one first gets a better cover, in turns: that leaves so few columns that the rest is quick
+    deferred = _is_large(component, run) and not searches.may_keep_gap(component)
+    return [component] if deferred else _by_regions(component, searches)
+
+
+def _is_large(component: Component, run: Run) -> bool:
+    """Whether a component has a cover that is worth improving before anything else."""
+    return component.packing.num_rows >= _LARGE and component.best is not None and run.methods.improver is not None
+
+
+def _by_regions(component: Component, searches: _Searches) -> list[Component]:
+    """Search the places that cause a large component's gap; the components that are left."""
+    useful = None
+    if component.closed or searches.run.should_stop():
+        return [component]
+    if component.packing.num_rows >= _LARGE and component.best is not None and not component.packing.is_axial:
+        useful = close_by_regions(component, partial(_search_shortly, searches))
+    parts = (None if component.closed else split_component(component, useful=useful)) or [component]
+    return [smaller for part in parts for smaller in _with_program(part, searches)]
 
 
 def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
