@@ -35,6 +35,7 @@ _CONFIG: Any = numba.config
 _IN_TREE: Any = getattr(caching, "InTreeCacheLocator", None) or _CACHING._InTreeCacheLocator
 _TYPES: Any = types
 _EXTENDING: Any = extending
+_CGUTILS: Any = cgutils
 
 COMPLETE = all(
     hasattr(owner, name)
@@ -304,11 +305,11 @@ _DRAWS = _DrawsType()
 typeof_impl.register(Draws)(lambda value, context: _DRAWS)
 
 
-@_EXTENDING.unbox(_DrawsType)
+@_EXTENDING.unbox(_DrawsType)  # type: ignore[untyped-decorator]
 def _taken(kind: Any, given: Any, c: Any) -> Any:
     """The addresses, as numba's own struct of a generator; no reference is counted: the caller holds one."""
-    generator = cgutils.create_struct_proxy(kind)(c.context, c.builder)
-    bits = cgutils.create_struct_proxy(_TYPES.NumPyRandomBitGeneratorType("bit_generator"))(c.context, c.builder)
+    generator = _CGUTILS.create_struct_proxy(kind)(c.context, c.builder)
+    bits = _CGUTILS.create_struct_proxy(_TYPES.NumPyRandomBitGeneratorType("bit_generator"))(c.context, c.builder)
     addresses = c.pyapi.object_getattr_string(given, "addresses")
     for place, name in enumerate(("state_address", "state", *(f"fnptr_{name}" for name in _FUNCTIONS))):
         setattr(bits, name, c.unbox(_TYPES.uintp, c.pyapi.tuple_getitem(addresses, place)).value)
