@@ -236,4 +236,7 @@ program = partial(
 
 
 if __name__ == "__main__":
-    raise SystemExit(program())
+    # by its name, for other processes look for what they run there
+    from experiments.trackers import unseen
+
+    raise SystemExit(unseen.program())
