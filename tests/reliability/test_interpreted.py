@@ -5,9 +5,12 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 import assoc
+from assoc._system.compiled import compiled_only, lean_inner_njit, njit
 from assoc.simulation import simulate
 from tests.running import printed
 from tests.sizes import sample
@@ -139,3 +142,20 @@ def test_lean_kernels_make_and_return_no_arrays():
     calls = [ast.unparse(one.func) for node in lean for one in ast.walk(node) if isinstance(one, ast.Call)]
     assert not other & {*calls, *(node.name for node in lean)}
     assert not [call for call in calls if call.startswith("np.")]
+
+
+@lean_inner_njit
+def _copied(x: np.ndarray) -> float:
+    y = x + 1.0
+    return y[0]
+
+
+@njit
+def _copies(x: np.ndarray) -> float:
+    return _copied(x)
+
+
+def test_lean_kernels_that_make_an_array_are_not_compiled():
+    # so what they hold are their callers' arrays, and views of them, which live as long as the call
+    with pytest.raises(TypingError, match="NRT required but not enabled"), compiled_only():
+        _copies(np.zeros(3))
