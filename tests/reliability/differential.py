@@ -38,6 +38,7 @@ from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.solvers.greedy.solve import solve as greedy_solve
 from tests.reliability.exact import exact_cost, exact_marginals, exact_ranks
 from tests.reliability.problems import Case, draw
+from tests.reliability.results import add_ends, report
 
 Way = Callable[[AssignmentProblem], list[Solution]]
 
@@ -354,6 +355,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--each", type=int, default=0, help="ways a problem, in turn (default: all)")
     parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
     parser.add_argument("--processes", type=int, default=1)
+    add_ends(parser)
     chosen = parser.parse_args(arguments)
     names = chosen.ways.split(",")
     kinds: Counter[str] = Counter()
@@ -362,20 +364,19 @@ def main(arguments: list[str] | None = None) -> int:
     started = said = time.perf_counter()
     judged = process_map(Judge(chosen.seed, names, chosen.each), numbers, chosen.processes)
     for number, (structure, temper, lines, counts) in zip(numbers, judged, strict=True):
-        compared.update(counts)
+        compared.update(counts, problems=1)
         for line in lines:
             kind = f"[{temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
             kinds[kind] += 1
             if kinds[kind] <= chosen.show:
                 print(f"seed {chosen.seed} number {number} ({structure}, {temper}): {line}", flush=True)
+        if time.perf_counter() - started > 60.0 * chosen.minutes:
+            break
         if time.perf_counter() - said > _PROGRESS:
             said = time.perf_counter()
             done, faulty = number + 1 - chosen.start, sum(kinds.values())
             print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults, {compared}", flush=True)
-    print(f"{chosen.count} problems, {time.perf_counter() - started:.0f} s: {sum(kinds.values())} faults, {compared}")
-    for kind, count in kinds.most_common():
-        print(f"{count:6d} {kind}")
-    return 1 if kinds else 0
+    return report("differential", chosen.publish, compared, kinds)
 
 
 if __name__ == "__main__":

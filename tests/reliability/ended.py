@@ -25,7 +25,7 @@ import pandas as pd
 
 from assoc.simulation import simulate
 from tests.listening import listens
-from tests.reliability.results import report
+from tests.reliability.results import add_ends, report
 
 WORDS = {
     "solve": "scene.npz --solver aco --mode paper --json o.json",
@@ -83,7 +83,7 @@ def try_signal(rng: np.random.Generator, name: str, seconds: float) -> str | Non
     return f"{name}: left {left}" if left else None
 
 
-def signals(rng: np.random.Generator, count: int, faults: Counter[str], counts: Counter[str]) -> None:
+def signals(rng: np.random.Generator, count: int, faults: Counter[str], counts: Counter[str], end: float) -> None:
     """End programs, in turn, by signals."""
     simulate("three-radar", 2, scans=6).save("scene.npz")
     simulate("rotating-radars", 5, aircraft=3, duration=20.0, false_alarms=1.0).save("radars.npz")
@@ -97,6 +97,8 @@ def signals(rng: np.random.Generator, count: int, faults: Counter[str], counts: 
         usual[name] = time.perf_counter() - started
         assert code == 0, said
     for k in range(count):
+        if time.monotonic() > end:
+            break
         clear()
         name = [*WORDS][k % len(WORDS)]
         fault = try_signal(rng, name, usual[name])
@@ -112,7 +114,7 @@ def clear() -> None:
         Path(path).unlink(missing_ok=True)
 
 
-def restarts(rng: np.random.Generator, count: int, faults: Counter[str], counts: Counter[str]) -> None:
+def restarts(rng: np.random.Generator, count: int, faults: Counter[str], counts: Counter[str], end: float) -> None:
     """Kill live tracking, ten times in a session, and let it go on."""
     from assoc import live
     from assoc._cli.track.plot_lines import replayed
@@ -120,7 +122,7 @@ def restarts(rng: np.random.Generator, count: int, faults: Counter[str], counts:
     # states are saved after each plot: a try need not wait
     live._EVERY = 0.0
     session = 0
-    while counts["restarts"] < count:
+    while counts["restarts"] < count and time.monotonic() < end:
         scene = simulate("rotating-radars", 100 + session, aircraft=3, duration=60.0, false_alarms=1.0)
         scene.save("live-scene.npz")
         clear()
@@ -163,15 +165,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--signals", type=int, default=300)
     parser.add_argument("--restarts", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--publish", metavar="NAME", help="write what was found as this run of the result file")
+    add_ends(parser)
     chosen = parser.parse_args(arguments)
     rng, faults, counts = np.random.default_rng(chosen.seed), Counter[str](), Counter[str]()
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            signals(rng, chosen.signals, faults, counts)
-            restarts(rng, chosen.restarts, faults, counts)
+            last = time.monotonic() + 60.0 * chosen.minutes
+            signals(rng, chosen.signals, faults, counts, last)
+            restarts(rng, chosen.restarts, faults, counts, last)
         finally:
             os.chdir(before)
     return report("ended", chosen.publish, counts, faults)

@@ -15,6 +15,7 @@ read or write beyond an array; with ``PYTHONMALLOC=debug MALLOC_PERTURB_=165`` w
 import argparse
 import faulthandler
 import gc
+import math
 import os
 import sys
 import tempfile
@@ -40,7 +41,7 @@ from experiments.common.claims import Claim
 from experiments.common.measuring import processor_time
 from tests.reliability.differential import LISTED, WAYS, Judge
 from tests.reliability.fuzzing import limit_memory
-from tests.reliability.results import report
+from tests.reliability.results import add_ends, report
 
 SCANS = 8
 """Scans of a tracking session."""
@@ -49,6 +50,7 @@ LOOKS = 100
 LONG = {"multi-sensor": 1.0, "mht": 0.2, "nearest-neighbour": 0.2}
 """Trackers of long sessions, and their shares of the scans."""
 _SCENES = ("three-radar", "rotating-radar", "bearing-only", "crowd")
+_RANKED = ("rankings to the end", "solutions ranked", "probabilities")
 _PROGRESS = 60.0
 Faults = Counter[str]
 
@@ -270,15 +272,18 @@ def guarded(work: Callable[[], object], label: str, faults: Faults) -> None:
             print(f"{label}: {kind}", flush=True)
 
 
-def run(seed: int, problems: range, steps: int) -> tuple[Faults, Faults, Watch]:
+def run(seed: int, problems: range, steps: int, minutes: float = math.inf) -> tuple[Faults, Faults, Watch]:
     """Answer the problems, and between them track until there were so many steps; counts, faults, and the memory."""
+    last = time.monotonic() + 60.0 * minutes
     counts, faults, watch = Counter[str](), Counter[str](), Watch(max(len(problems), 1) // LOOKS)
     judge, session, said = Judge(seed, [*WAYS, *LISTED], each=1), problems.start, time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         for place, number in enumerate([*problems] or [0], start=1):
             if len(problems):
                 counts["problems"] += 1
-                for line in judge(number)[2]:
+                _, _, lines, compared = judge(number)
+                counts.update({what: compared[what] for what in _RANKED if what in compared})
+                for line in lines:
                     print(f"seed {seed} problem {number}: {line}", flush=True)
                     faults[" ".join(line.split()[:4])] += 1
             while counts["steps"] < steps * place // max(len(problems), 1):
@@ -286,6 +291,8 @@ def run(seed: int, problems: range, steps: int) -> tuple[Faults, Faults, Watch]:
                 for way in ways:
                     guarded(lambda way=way, at=session: way(at), f"seed {seed} session {session}", faults)
                 session += 1
+            if time.monotonic() > last:
+                break
             if watch.add(place) and len(watch.pace) == LOOKS // 10:
                 limit_memory()
             if time.perf_counter() - said > _PROGRESS:
@@ -302,10 +309,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--scans", type=int, default=0, help="of the multi-sensor tracker's long session")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=int, default=0, help="number of the first problem")
-    parser.add_argument("--publish", metavar="NAME", help="write what was found as this run of the result file")
+    add_ends(parser)
     chosen = parser.parse_args(arguments)
     faulthandler.enable()
-    counts, faults, watch = run(chosen.seed, range(chosen.start, chosen.start + chosen.problems), chosen.steps)
+    counts, faults, watch = run(
+        chosen.seed, range(chosen.start, chosen.start + chosen.problems), chosen.steps, chosen.minutes
+    )
     rng = np.random.default_rng(chosen.seed)
     claims = watch.claims(chosen.publish or "endurance", growth=50.0)
     for kind, share in LONG.items() if chosen.scans else ():

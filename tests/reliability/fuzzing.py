@@ -30,6 +30,7 @@ import numpy as np
 from assoc.errors import AssocError, AssocWarning, InfeasibleError
 from tests.reliability.mutations import MARKER, spoil
 from tests.reliability.readers import ROOMS, Room
+from tests.reliability.results import add_ends, report
 
 SECONDS = 5
 MEMORY = 1 << 30
@@ -157,6 +158,8 @@ def campaign(seed: int, numbers: range, made: dict[str, list[Path]], folder: Pat
             child.join()
             yield at, f"{ROOMS[at % len(ROOMS)].name}: the process died (exit code {child.exitcode})"
             left = range(at + 1, left.stop)
+        finally:
+            child.kill()
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -166,34 +169,33 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=int, default=0)
+    add_ends(parser)
     chosen = parser.parse_args(arguments)
     started = time.perf_counter()
     kinds: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
         made = prepare(folder)
-        tried = 0
+        tried = Counter[str]()
         lock = threading.Lock()
 
         def work(part: int) -> None:
-            nonlocal tried
             share = -(-chosen.count // chosen.processes)
             begin = chosen.start + part * share
             numbers = range(begin, min(begin + share, chosen.start + chosen.count))
             for number, fault in campaign(chosen.seed, numbers, made, folder / f"work{part}"):
                 with lock:
-                    tried += 1
+                    tried[ROOMS[number % len(ROOMS)].name] += 1
                     _note(kinds, fault, f"seed {chosen.seed} case {number}")
+                if time.perf_counter() - started > 60.0 * chosen.minutes:
+                    break
 
         threads = [threading.Thread(target=work, args=(part,)) for part in range(chosen.processes)]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-    print(f"{tried} cases, {time.perf_counter() - started:.0f} s: {sum(kinds.values())} faults")
-    for kind, count in kinds.most_common():
-        print(f"{count:6d} {kind}")
-    return 1 if kinds else 0
+    return report("fuzzing", chosen.publish, Counter(files=tried.total()) + tried, kinds)
 
 
 def _note(kinds: Counter[str], fault: str | None, label: str) -> None:

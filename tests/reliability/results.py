@@ -1,5 +1,7 @@
 """What long runs found, printed and kept in the result file from which docs/reliability.md takes its figures."""
 
+import argparse
+import math
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -11,6 +13,12 @@ from experiments.common.results import print_claims, result_file
 _ABOUT = "Long runs of tests/reliability: what was tried, with which command, and the faults found."
 
 
+def add_ends(parser: argparse.ArgumentParser) -> None:
+    """Add the options of when a run ends, and where what it found is kept."""
+    parser.add_argument("--minutes", type=float, default=math.inf, help="end after so long; what was done is reported")
+    parser.add_argument("--publish", metavar="NAME", help="write what was found as this run of the result file")
+
+
 def report(
     program: str, published: str | None, counts: Counter[str], faults: Counter[str], claims: Sequence[Claim] = ()
 ) -> int:
@@ -19,8 +27,11 @@ def report(
     What was counted under the same name is replaced, the rest of the file stays.
     """
     name = published or program
-    # without what names the run alone
-    words = [word for word in sys.argv[1:] if word not in ("--publish", published)]
+    words = sys.argv[1:]
+    for option in ("--publish", "--minutes"):
+        # what names the run, or says when it was cut off, does not change what is tried
+        if option in words:
+            del words[words.index(option) : words.index(option) + 2]
     command = f"python -m tests.reliability.{program} {' '.join(words)}".strip()
     found = [Claim(f"{name}: {what}", ours=count, source=command) for what, count in counts.items()]
     found += [Claim(f"{name}: faults", ours=sum(faults.values()), band=(None, 0.0), source=command), *claims]
