@@ -1,15 +1,17 @@
-"""What long runs found, printed and kept in the result file from which docs/reliability.md takes its figures."""
+"""What long runs found, printed and kept in `results.json`, from which docs/_tables/reliability.md is made."""
 
 import argparse
 import math
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 from experiments.common.claims import Claim, load_json, save_json
-from experiments.common.command import replaced
-from experiments.common.results import print_claims, result_file
+from experiments.common.results import plain_table, print_claims
 
+FILE = Path(__file__).with_name("results.json")
+TABLE = Path(__file__).parents[2] / "docs" / "_tables" / "reliability.md"
 _ABOUT = "Long runs of tests/reliability: what was tried, with which command, and the faults found."
 
 
@@ -39,7 +41,20 @@ def report(
     for kind, count in faults.most_common():
         print(f"{count:6d} {kind}")
     if published:
-        path = result_file("reliability")
-        known = [c for c in load_json(path) if not c.quantity.startswith(f"{name}: ")] if path.exists() else []
-        save_json(path, replaced(known, found), "reliability", 0, _ABOUT)
+        known = [c for c in load_json(FILE) if not c.quantity.startswith(f"{name}: ")] if FILE.exists() else []
+        save_json(FILE, [*known, *found], "reliability", 0, _ABOUT)
+        TABLE.write_text(table())
     return int(any(claim.holds is False for claim in found))
+
+
+def table() -> str:
+    """The runs of the result file: command, what was tried, faults."""
+    runs: dict[str, list[Claim]] = {}
+    for claim in load_json(FILE):
+        if claim.source.startswith("python"):
+            runs.setdefault(claim.quantity.partition(": ")[0], []).append(claim)
+    rows = []
+    for name, claims in runs.items():
+        tried = [f"{claim.ours:,.0f} {claim.quantity.partition(': ')[2]}" for claim in claims]
+        rows.append([name, f"`{claims[0].source}`", ", ".join(tried[:-1]), tried[-1].partition(" ")[0]])
+    return plain_table(["run", "command", "tried", "faults"], rows) + "\n"

@@ -5,7 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tests.reliability import endurance
+from experiments.common.claims import load_json
+from tests.reliability import endurance, results
 from tests.reliability.endurance import Watch, guarded, run
 
 
@@ -42,3 +43,8 @@ def test_a_short_run_of_each_tracker(kind):
     sound = {claim.quantity: claim for claim in endurance.follow(kind, 40, np.random.default_rng(1), looks=10)}
     assert sound[f"{kind}: least eigenvalue of a correlation matrix"].holds
     assert 0.2 < sound[f"{kind}: distance to the next track, second half / first"].ours < 5.0
+
+
+def test_the_page_has_the_table_of_the_result_file():
+    assert results.TABLE.read_text() == results.table()
+    assert all(claim.holds is not False for claim in load_json(results.FILE))
