@@ -284,7 +284,7 @@ def check(problem: Problem, text: str) -> list[str]:
     cost = cost_of(problem, chosen, proof.get("cost"))
     bound = proved(problem, proof, cost)
     if "bound" in proof and bound < number(proof["bound"]):
-        raise RefusedError(f"the proof gives the bound {shown(bound)}, not {proof['bound']:.60}")
+        raise RefusedError(f"the proof gives the bound {shown(bound)}, not {proof['bound']!r:.60}")
     conclusion = f"proved: no solution costs less than {shown(bound)} (gap {shown(cost - bound)})"
     return [f"feasible, cost {shown(cost)}", conclusion]
 

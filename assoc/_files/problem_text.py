@@ -51,7 +51,7 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
     if len(head) < 3 or any(words[0] != key for key, words in head.items()):
         raise InvalidInputError(f"{path}: expected the lines 'sizes ...', 'dummies yes' or 'dummies no', 'tuples N'")
     if head["dummies"][1:] not in (["yes"], ["no"]):
-        raise InvalidInputError(f"{path}: expected 'dummies yes' or 'dummies no', got {lines[2]:.40}")
+        raise InvalidInputError(f"{path}: expected 'dummies yes' or 'dummies no', got {lines[2][:40]!r}")
     try:
         sizes = np.array(head["sizes"][1:], dtype=np.int64)
         count = int(head["tuples"][1])

@@ -110,7 +110,7 @@ def signals(rng: np.random.Generator, count: int, faults: Counter[str], counts: 
 
 def clear() -> None:
     """Remove what programs wrote."""
-    for path in ("study/study.sqlite", "live.csv", "live.npz", "o.json", "o.html", "o.csv"):
+    for path in ("study/study.sqlite", "whole.csv", "live.csv", "live.npz", "o.json", "o.html", "o.csv"):
         Path(path).unlink(missing_ok=True)
 
 

@@ -208,13 +208,6 @@ def _positions(folder: Path) -> list[Path]:
     return [folder / "ais.csv"]
 
 
-def _ferry(folder: Path) -> list[Path]:
-    from tests.recordings.test_autoferry import FRAMES
-
-    (folder / "scenario1_detections.json").write_text(json.dumps(FRAMES))
-    return [folder / "scenario1_detections.json"]
-
-
 def _radars(folder: Path) -> list[Path]:
     from tests.programs.test_radars import described
 
@@ -295,12 +288,6 @@ def _use_positions(path: Path) -> None:
     from assoc.recordings.flights.positions import read_positions
 
     read_positions(str(path))
-
-
-def _use_ferry(path: Path) -> None:
-    from assoc.recordings.autoferry import read_autoferry
-
-    read_autoferry(path)
 
 
 def _use_radars(path: Path) -> None:
@@ -392,7 +379,6 @@ ROOMS = [
     Room("track table", "text", _track_tables, _use_track_table),
     Room("tracks.ast", "bytes", _system_tracks, _use_system_tracks),
     Room("ais.csv", "text", _positions, _use_positions),
-    Room("ferry.json", "text", _ferry, _use_ferry),
     Room("radars.toml", "text", _radars, _use_radars),
     Room("plots.parquet", "bytes", _parquet, _use_plots),
 ]

@@ -5,7 +5,6 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from experiments.common.claims import load_json
 from tests.reliability import endurance, results
 from tests.reliability.endurance import Watch, guarded, run
 
@@ -47,4 +46,3 @@ def test_a_short_run_of_each_tracker(kind):
 
 def test_the_page_has_the_table_of_the_result_file():
     assert results.TABLE.read_text() == results.table()
-    assert all(claim.holds is not False for claim in load_json(results.FILE))

@@ -154,7 +154,9 @@ def _with_widths(progress: Progress, states: Any, rows: Array, dwelled: Array, p
                 own = own - own @ H.T @ np.linalg.solve(H @ own @ H.T + R, H @ own)
             values, vectors = np.linalg.eigh(both - own)
             ids.append(one)
-            wider.append((vectors * np.maximum(values, 0.0)) @ vectors.T)
+            spread = (vectors * np.maximum(values, 0.0)) @ vectors.T
+            # symmetric to the last bit, as all covariances are
+            wider.append(0.5 * (spread + spread.T))
     return progress._replace(shared=shared._replace(wider=(np.array(ids), np.array(wider))))
 
 
