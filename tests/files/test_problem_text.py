@@ -15,6 +15,13 @@ def test_indices_that_are_none(tmp_path, index):
         AssignmentProblem.load(tmp_path / "p.txt")
 
 
+def test_a_line_that_is_quoted_is_one(tmp_path):
+    (tmp_path / "p.txt").write_text(HEAD.replace("yes", "y\x0be\x85s"))
+    with pytest.raises(InvalidInputError, match="expected 'dummies yes' or 'dummies no'") as caught:
+        AssignmentProblem.load(tmp_path / "p.txt")
+    assert len(str(caught.value).splitlines()) == 1
+
+
 def test_names_that_no_file_has():
     with pytest.raises(InvalidInputError, match="cannot be read") as caught:
         AssignmentProblem.load("p\0.txt")

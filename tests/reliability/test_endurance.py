@@ -14,6 +14,12 @@ def test_mixed_problems_and_steps():
     assert (counts["problems"], dict(faults)) == (30, {}) and counts["steps"] >= 16
 
 
+@pytest.mark.parametrize("number", [121, 307])
+def test_sessions_whose_covariances_were_not_symmetric(number, tmp_path):
+    """Two unresolved tracks were widened by a product of matrices, symmetric to rounding only."""
+    endurance.track_some(8100, number, tmp_path, Counter())
+
+
 def test_faults_are_seen():
     found = Counter()
     guarded(lambda: [][1], "a kernel", found)
