@@ -15,7 +15,7 @@ from experiments.real.autoferry import LEFT_OUT, SETS
 from experiments.sdlib import store
 from experiments.sdlib.comparison import comparison_tables
 from experiments.trackers.real_scenes import ADAPTING
-from experiments.trackers.unseen import ABLATION, NAMES, WHOLE
+from experiments.trackers.unseen import ABLATION, ALL, NAMES, WHOLE
 
 SHOWN = {
     "oracle": "oracle",
@@ -341,8 +341,8 @@ def ablation() -> str:
     r = Results("trackers.unseen")
     rows = []
     for kind in labels(r, f", {next(iter(ABLATION))}: GOSPA"):
-        whole = r[f"{kind}, {WHOLE}: GOSPA"].ours
-        rows.append([_said().get(kind, (kind, ""))[0], mean(r[f"{kind}, {WHOLE}: GOSPA"]),
+        whole = r[f"{kind}, {ALL}: GOSPA"].ours
+        rows.append([_said().get(kind, (kind, ""))[0], mean(r[f"{kind}, {ALL}: GOSPA"]),
                      *(number(r[f"{kind}, {name}: GOSPA"].ours / whole) for name in ABLATION)])  # fmt: skip
     return table(["", "all: GOSPA, m", *(f"without {name.partition('without ')[2]}" for name in ABLATION)], rows)
 

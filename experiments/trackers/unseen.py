@@ -89,6 +89,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "biases and clocks": {f"{_ROOM}.records.biases.Biases.after": lambda self, *_: self},
 }  # fmt: skip
 """Parts of what adapts, and what takes their place when they are taken out."""
+ALL = f"{WHOLE}, all parts"
 ABLATION = {f"{WHOLE}, without {part}": changes for part, changes in PARTS.items()}
 
 
@@ -195,7 +196,7 @@ def experiment(chosen: Namespace) -> list[Claim]:
     """All kinds of the files and folders, or those named."""
     # what is published may replace a part of a file
     chosen.only = chosen.kinds or chosen.trackers or chosen.ablation
-    names = tuple(chosen.trackers or ([WHOLE, *ABLATION] if chosen.ablation else NAMES))
+    names = tuple(chosen.trackers or ([ALL, *ABLATION] if chosen.ablation else NAMES))
     units = []
     for path in chosen.paths:
         scenes = path.suffix == ".py"
@@ -224,7 +225,13 @@ def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("paths", metavar="PATH", nargs="+", type=Path, help="scenes: make(name, seed) and CASES; or a recording")
     add("--kinds", nargs="+", metavar="NAME", help="these kinds alone")
-    add("--trackers", nargs="+", choices=[*NAMES, *ABLATION], metavar="NAME", help=f"these alone: {', '.join(NAMES)}")
+    add(
+        "--trackers",
+        nargs="+",
+        choices=[*NAMES, ALL, *ABLATION],
+        metavar="NAME",
+        help=f"these alone: {', '.join(NAMES)}",
+    )
     add("--ablation", action="store_true", help="multi-sensor without each part of what adapts")
     add("--peer-seeds", type=whole(0), default=PEER_SEEDS, metavar="N", help="scenes for Stone Soup (%(default)s)")
     add("--processes", type=whole(1), default=1, metavar="N", help="so many scenes at once")

@@ -22,7 +22,8 @@ def test_tables_are_those_of_the_results_and_each_stands_on_a_page(capsys):
     assert main(["--check"]) == 0, capsys.readouterr().out
     pages = "".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.md"))
     included = re.findall(r"^```\{include\} _tables/([\w-]+)\.md\n```$", pages, flags=re.MULTILINE)
-    assert sorted(included) == sorted(TABLES) == sorted(path.stem for path in FOLDER.iterdir())
+    # the long runs of tests/reliability write their own
+    assert sorted(included) == sorted([*TABLES, "reliability"]) == sorted(path.stem for path in FOLDER.iterdir())
 
 
 def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monkeypatch, capsys):
