@@ -38,8 +38,13 @@ class Program:
         if not sys.warnoptions:
             # of numpy, on infinities and the like: what matters is told by lines of our own
             warnings.simplefilter("ignore", RuntimeWarning)
-        self.listen()
-        code = self.main(arguments)
+        try:
+            self.listen()
+            code = self.main(arguments)
+        except KeyboardInterrupt:
+            # it came just before the work began, or just after it ended
+            ended = self.interruption or Interruption(self.name)
+            end_early(ended.code or INTERRUPTED, f"{ended.line()}\n")
         if code == INTERRUPTED or (self.interruption is not None and self.interruption.code):
             end_early(code)
         return code

@@ -141,9 +141,10 @@ class PlotReader:
         clean, doubts, step = None, _Doubts(units), scale["time"]
         for rows in table.of_frames(found.content) if parquet else table.of_lines(found.content, found.done):
             doubts.see(rows)
-            rows[:, RANGE] *= scale["range"]
-            rows[:, AZIMUTH] = math.pi / 2 - rows[:, AZIMUTH] * scale["bearing"]
-            rows[:, ALTITUDE] *= scale["altitude"]
+            with np.errstate(over="ignore"):
+                rows[:, RANGE] *= scale["range"]
+                rows[:, AZIMUTH] = math.pi / 2 - rows[:, AZIMUTH] * scale["bearing"]
+                rows[:, ALTITUDE] *= scale["altitude"]
             clock = bool(table.clock)
             if clean is None:
                 garbled = () if units["altitude"] != "fl" else GARBLED_CODES if self._codes is None else self._codes

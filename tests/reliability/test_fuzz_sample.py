@@ -9,7 +9,7 @@ import pytest
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from tests.reliability.fuzzing import judge, prepare, run_case, warm_up
-from tests.reliability.readers import Room
+from tests.reliability.readers import ROOMS, Room
 from tests.running import printed
 from tests.sizes import few_or_all
 
@@ -62,3 +62,25 @@ def test_a_format_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_pat
         "assert format_of(sys.argv[1]) is None; assert tracemalloc.get_traced_memory()[1] < 1e6"
     )
     printed("-W", "error", "-c", code, path)
+
+
+@pytest.mark.parametrize("column", [1, 2, 4])
+def test_numbers_that_overflow(column, made, tmp_path):
+    (room,) = (one for one in ROOMS if one.name == "plots.csv")
+    rows = made[room.name][0].read_text().splitlines()
+    cells = rows[7].split(",")
+    cells[column] = "1e308"
+    (tmp_path / "plots.csv").write_text("\n".join([*rows[:7], ",".join(cells), *rows[8:]]))
+    assert judge(room, tmp_path / "plots.csv") is None
+
+
+def test_a_plot_of_a_scan_that_cannot_be(made, tmp_path):
+    (room,) = (one for one in ROOMS if one.name == "live.npz")
+    with np.load(made[room.name][0]) as saved:
+        arrays = dict(saved)
+    assert arrays["live.plots"].size
+    arrays["live.plots"][0, 0] = 1e300
+    np.savez(tmp_path / "live.npz", **arrays)
+    assert judge(room, tmp_path / "live.npz") is None
+    with pytest.raises(InvalidInputError):
+        room.read(tmp_path / "live.npz")

@@ -128,3 +128,16 @@ for number in range(2):
 def test_while_a_kernel_takes_a_generator():
     # numba asks Python's ctypes for addresses; a signal that comes there ended the process
     assert printed("-c", DRAWN, ASSOC_INTERPRET=0) == ""
+
+
+EARLY = """
+import signal
+from assoc._cli.program import Program
+
+Program("early", lambda words: None, lambda: signal.raise_signal(signal.SIGINT)).start([])
+"""
+
+
+def test_before_the_work_begins():
+    done = process("-c", EARLY)
+    assert (done.returncode, done.stderr) == (130, "early: interrupted\n")

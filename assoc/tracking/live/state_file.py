@@ -93,7 +93,7 @@ def _filled(
     settings: LiveSettings, late: LatePlots, found: dict[str, Array]
 ) -> tuple[LiveState, set[int], Counter[str]]:
     sensors, plots = settings.scene.sensors, found["live.plots"]
-    if not np.isfinite(plots[:, :_BEFORE_VALUES]).all():
+    if not (np.abs(plots[:, :_BEFORE_VALUES]) < 2.0**53).all():
         raise ValueError("a plot has no sensor or time")
     late.names = dict(found["live.names"].tolist())
     scan, sensor = plots[:, 0].astype(int), plots[:, 1].astype(int)
