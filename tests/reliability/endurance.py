@@ -216,7 +216,7 @@ class Watch:
 
         found = [
             _limited(f"{name}: growth of resident memory from the second tenth", grown(self.resident), growth, "MB"),
-            _limited(f"{name}: growth of Python's objects", grown(self.objects), 200.0 * growth),
+            _limited(f"{name}: growth of Python's objects", grown(self.objects), 1_000.0),
         ]
         if any(self.pace):
             # the first look has what was compiled and imported on the way
