@@ -8,7 +8,8 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
 from tests.reliability.exact import exact_marginals, exact_optimum, exact_ranks, marginals_of_part, ranks_of_part
-from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, make, many_parts
+from tests.reliability.problems import STRUCTURES, Case, draw, make, many_parts
+from tests.reliability.tempers import TEMPERS
 from tests.sizes import few_or_all, sample
 
 # the structures and tempers there were when the faults below were found: the same numbers then draw the same problems
