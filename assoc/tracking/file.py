@@ -53,6 +53,10 @@ class Saved(dict[str, Array]):
         return found
 
 
+# estimates are far from it; sums and quotients of such numbers are finite
+_HUGE = 1e30
+
+
 def save(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> None:
     """Write a state; the file appears whole or not at all."""
     save_npz(path, FORMAT, VERSION, file_arrays(settings, state))
@@ -188,10 +192,10 @@ def _estimates(model: Estimates, saved: Saved) -> Estimates:
     for name, value in model._asdict().items():
         shape = np.shape(value)
         shape = (count, *shape[1:]) if name in PER_TRACK else shape
-        good = saved[name].shape == shape and np.isfinite(saved[name]).all()
-        saved.require(good, name, f"finite numbers of the shape {shape}")
+        good = saved[name].shape == shape and (np.abs(saved[name]) < _HUGE).all()
+        saved.require(good, name, f"numbers below {_HUGE:g} of the shape {shape}")
     for name in ("factors", "used", "manoeuvres", "bands"):
-        saved.require((saved[name] > 0).all(), name, "numbers above 0")
+        saved.require((saved[name] > 1.0 / _HUGE).all(), name, f"numbers above {1.0 / _HUGE:g}")
     saved.require((saved["used"][:, DETECTION] < 1).all(), "used", "probabilities below 1 in its second column")
     saved.require((saved["bands"] < 1).all(), "bands", "probabilities below 1")
     saved.require((np.linalg.eigvalsh(saved["weights"]) > 0).all(), "weights", "a positive definite matrix")
@@ -226,8 +230,8 @@ def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> Clut
 def _biases(model: Biases, saved: Saved) -> Biases:
     """Biases in these arrays, checked."""
     for name, value in model._asdict().items():
-        good = saved[name].shape == value.shape and np.isfinite(saved[name]).all()
-        saved.require(good, name, f"finite numbers of the shape {value.shape}")
+        good = saved[name].shape == value.shape and (np.abs(saved[name]) < _HUGE).all()
+        saved.require(good, name, f"numbers below {_HUGE:g} of the shape {value.shape}")
     some = (np.linalg.eigvalsh(saved["information"] + saved["information"].swapaxes(1, 2)) > -1e-6).all()
     saved.require(some, "information", "matrices that are not negative")
     return Biases(**saved)

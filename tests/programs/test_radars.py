@@ -185,6 +185,7 @@ def test_live_from_the_same_file(tmp_path, capsys, monkeypatch):
             {"file": '"other.csv"'},
             r"no column bearing .* it has: 'time, rho_m, brng.*columns = \{ ... \} of .*radar north",
         ),
+        ({"reach_km": 0.5}, "radar north: reach_km: no plot is within 0.5 km"),
         ({"place": None}, r"radar north: place: expected \[latitude, longitude, height\]"),
         ({"place": [147.5, 8.0]}, "radar north: place: expected a latitude within"),
         ({"noise": [40.0]}, r"radar north: noise: expected \[metres, degrees\]"),

@@ -123,6 +123,17 @@ def test_each_lie_is_named(name, lies, tmp_path):
         assert again.time is None
 
 
+@pytest.mark.parametrize("field", ["estimates.dwells", "estimates.used", "biases.used"])
+def test_numbers_too_large_for_any_estimate_are_named(field, tmp_path):
+    tracker = TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True)
+    step(tracker)
+    arrays = {key: np.array(value) for key, value in arrays_of(tracker).items()}
+    arrays[field][...] = 1e308
+    save_npz(tmp_path / "bad.npz", FORMAT, VERSION, arrays)
+    with pytest.raises(InvalidInputError, match=f"'{field}'.*below 1e\\+30"):
+        TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize(
     "make",
     [

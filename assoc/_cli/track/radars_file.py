@@ -383,6 +383,8 @@ def _read_radar(path: str, number: int, table: dict[str, Any]) -> tuple[Any, ...
         view = radar.field_of_view.copy()
         view[0, 1] = 1e3 * _number(table["reach_km"], f"{where}: reach_km")
         recording = recording.take(np.flatnonzero(recording.ranges <= view[0, 1]))
+        if not len(recording):
+            raise InvalidInputError(f"{where}: reach_km: no plot is within {table['reach_km']} km")
         radar = replace(radar, field_of_view=view)
     heard = bool(np.isfinite(recording.trusted_altitudes).any())
     return recording, radar, turn, place, (given[2] if len(given) == 3 else _HEIGHT_NOISE) if heard else None
