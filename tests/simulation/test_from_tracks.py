@@ -97,6 +97,7 @@ def test_columns_by_name(tmp_path):
         (b"time,id,lat,lon,altitude\n0,b,99,3,4\n", "no row has a time, an identity and a position that can be"),
         (b"time,id,lat,lon,altitude,heading\n0,a,3,3\n", "no row has"),
         (b"time,id,lat,lon\n0,a,3,3\n", "no column altitude or geoaltitude or baroaltitude"),
+        ("time,id,lat,l\x85n\n0,a,3,3\n".encode(), r"it has: time, id, lat, l\\x85n$"),
     ],
 )
 def test_bad_files(tmp_path, content, message):

@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._files.reading import check_unpacked, kind_of, open_input, refuse_pipe
 from assoc._system.imports import check_extra
+from assoc._text.plain import printable
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings.columns import BLANKS, plain_name
@@ -123,7 +124,7 @@ def columns_of(
         elif wanted:
             raise _missing(path, header, meaning, [wanted])
     if len({*chosen.values()}) < len(chosen):
-        raise InvalidInputError(f"{path}: the columns must be different, got {', '.join(chosen.values())}")
+        raise InvalidInputError(f"{path}: the columns must be different, got {printable(', '.join(chosen.values()))}")
     return chosen
 
 
@@ -137,7 +138,7 @@ def require(
 
 
 def _missing(path: str, header: Sequence[str], meaning: str, names: Sequence[str]) -> InvalidInputError:
-    have = ", ".join(str(column)[:30] for column in header[:12])
+    have = printable(", ".join(str(column)[:30] for column in header[:12]))
     return InvalidInputError(f"{path}: no column {' or '.join(names)} for the {meaning}; it has: {have}")
 
 
