@@ -101,6 +101,8 @@ def learn(progress: Progress) -> Progress:
     rows = _rows(progress, tracks.track_id)
     if len(tracks):
         _seek(progress, late, rows, dwelled)
+    contested, doubtful = _contested(progress, late)
+    rows[contested], dwelled[contested] = 0, False
     if progress.shared is not None:
         hidden = progress.shared.hidden(tracks.track_id)
         rows[hidden], dwelled[hidden] = 0, False
@@ -111,8 +113,8 @@ def learn(progress: Progress) -> Progress:
     dwelled = hits | (dwelled & plain[:, None])
     turns = _turns(progress)
     # where false alarms are dense they are no part of the usual ones
-    usual = zip(step.confirmed, progress.dense, strict=True)
-    alarms = np.array([np.count_nonzero(~taken & ~dense) for taken, dense in usual])
+    usual = zip(step.confirmed, progress.dense, doubtful, strict=True)
+    alarms = np.array([np.count_nonzero(~(taken | dense | either)) for taken, dense, either in usual])
     # before tracks are confirmed, targets look like false alarms
     declared = progress.work.settings.sensors
     if state.scan >= 3:
@@ -182,6 +184,32 @@ def _rows(progress: Progress, ids: Array) -> Array:
         known = np.flatnonzero(ids[index] == taken)
         rows[index[known], s] = known + 1
     return rows
+
+
+def _contested(progress: Progress, late: TrackBatch) -> tuple[Array, list[Array]]:
+    """Whose plot is whose cannot be told of tracks whose gates overlap: they take those of targets without a track.
+
+    Their dwells, bool (T, S), and the measurements in their gates, bool (n_s,) of each sensor. Both are known before
+    the scan, so that what is left is no choice among detections and misses.
+    """
+    settings, sizes = progress.settings, progress.scan.sizes.tolist()
+    contested, doubtful = np.zeros((len(late), len(sizes)), dtype=np.bool_), [np.zeros(n, np.bool_) for n in sizes]
+    for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
+        if len(late) < 2:
+            continue
+        gate, periods = gate_of(sensor, settings.gate_probability), periods_of(sensor)
+        expected = settings.filter.expected(late.states, sensor)
+        # two gates of one size overlap within twice that
+        first, second = near_pairs(expected, expected.mean, periods, 4.0 * gate)
+        first, second = np.stack([first, second])[:, first != second]
+        off = sensor.residual(expected.mean[second], expected.mean[first])
+        square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[first], off)
+        near = square <= 4.0 * gate
+        contested[first[near], s] = contested[second[near], s] = True
+        rows = np.flatnonzero(contested[:, s])
+        gates = Expected(expected.mean[rows], expected.covariance[rows])
+        doubtful[s][near_pairs(gates, z, periods, gate)[1]] = True
+    return contested, doubtful
 
 
 def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> None:
