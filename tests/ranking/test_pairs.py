@@ -70,6 +70,19 @@ def test_small_problems_are_those_of_all_joint_events(count):
             assert (low <= expected + 1e-12).all() and (expected <= high + 1e-12).all()
 
 
+def test_sets_of_wide_clusters_are_the_likeliest_ones():
+    """Six members each, all near each other: with 256 sets of some 900 shares are nearly those of all."""
+    first, second = (one.reshape(-1) for one in np.indices((6, 6)))
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        log_weight = 5.0 - 0.3 * (first - second - rng.normal(0.0, 0.8, 6)[second]) ** 2
+        exact = pair_probabilities(first, second, log_weight, (6, 6), WIDE)
+        expected = enumerated(first, second, log_weight, permutations=False)
+        share = without_permutations(first, second, log_weight, (6, 6), exact.probability, 2048)
+        np.testing.assert_allclose(share, expected, atol=0.01)
+        assert np.abs(exact.probability - expected).max() > 0.2
+
+
 def test_huge_weights_give_numbers():
     """Where rounding of sums is above all that events differ by, probabilities are numbers, and bounds say nothing."""
     for seed in range(40):

@@ -247,6 +247,21 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     assert sum(track.reported for track in tracker.tracks) >= 11
 
 
+def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
+    """Eleven tracks of twelve targets miss seldom, and leave plots over: neither is the sensor's."""
+    sensor, plots = group(3, 120.0, 60.0, 50.0, scans=60)
+    tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=True, initiation=Initiation(speed=120.0))
+    taken = []
+    for k, z in enumerate(plots):
+        step = tracker.step(float(k), [z])
+        taken += step.confirmed if k >= 10 else []
+    learnt = tracker.state.estimates
+    # as one who believes every track would have it
+    shown = sum(track.reported for track in tracker.tracks)
+    assert np.concatenate(taken).sum() / (shown * 50) > 0.92
+    assert learnt.dwells.sum() < 5 and (learnt.used == [[1.0, 0.9, 5.0]]).all()
+
+
 def test_targets_that_fly_together_are_confirmed_as_without_the_map():
     """What may be a place in the first turns is none unless it predicts surely better than tracks do."""
     for seed in range(4):

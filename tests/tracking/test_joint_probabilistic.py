@@ -105,6 +105,22 @@ def test_tracks_side_by_side_stay_apart(own_times):
     assert 0.8 < np.mean(apart["best"]) < 1.2
 
 
+@pytest.mark.parametrize(("permutations", "least", "most"), [("best", 0.8, 1.5), ("all", 0.0, 0.5)])
+def test_tracks_of_a_formation_stay_apart(permutations, least, most):
+    """Twelve in rows of three, 12 m apart under a sensor of 10 m, one cluster: errors widen it, no more."""
+    velocity, spread = np.array([3.0, 0.0, 0.0]), []
+    place = [380.0, 480.0, 250.0] + 12.0 * np.stack([np.arange(12) // 3, np.arange(12) % 3, np.zeros(12)], axis=1)
+    start = Gaussian(np.hstack([place, [velocity] * 12]), np.array([np.diag([100.0] * 3 + [4.0] * 3)] * 12))
+    for seed in range(3):
+        rng, tracker = np.random.default_rng(seed), tracker_of(plain.sensor(), permutations=permutations)
+        tracker.begin(0.0, start)
+        for k in range(1, 41):
+            seen = place[rng.random(12) < 0.9] + k * velocity
+            tracker.step(float(k), [seen + rng.normal(0.0, 10.0, seen.shape)])
+        spread.append(np.sqrt(np.var([track.position[:2] for track in tracker.tracks], axis=0).sum()))
+    assert least < np.mean(spread) / np.sqrt(np.var(place, axis=0).sum()) < most
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_intervals_of_few_events_hold(seed):
     rng, sensor = np.random.default_rng(seed), plain.sensor()

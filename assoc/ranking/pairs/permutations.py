@@ -17,12 +17,17 @@ import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array, Floats, Ints
+from assoc.packing.kernels.sorting import order_of
 from assoc.ranking.pairs.events import reduced
 from assoc.ranking.pairs.graph import PairGraph, pair_graph
 from assoc.ranking.sweep import cluster
 
 _LEAST, _STEP = 1e-4, 4.0
 """Less likely pairs keep their probability; where a cluster is too large, this limit rises by that factor."""
+_BITS = 62
+"""Most vertices of a cluster: a set is a number with a bit for each."""
+_DEARER = 8
+"""A set costs so many times what a sum over joint events does."""
 
 
 def without_permutations(
@@ -30,8 +35,8 @@ def without_permutations(
 ) -> Floats:
     """Probability of each pair when each set of detected tracks and used measurements has only its best permutation.
 
-    Pairs are as for `pair_probabilities`, ``probability`` (K,) theirs among all joint events. Where a cluster would
-    have more than ``states`` sets, the least likely pairs are left as they are.
+    Pairs are as for `pair_probabilities`, ``probability`` (K,) theirs among all joint events. Of a cluster's sets the
+    likeliest count, of ``states`` an eighth, after each track.
     """
     share = np.array(probability, dtype=np.float64)
     likely = np.flatnonzero(share >= _LEAST)
@@ -40,7 +45,7 @@ def without_permutations(
         graph, weight = pair_graph(first[likely], second[likely], sizes), np.asarray(log_weight, np.float64)[likely]
         weights = reduced(graph, weight, np.ones(len(likely), np.bool_), np.zeros(sum(sizes)), sizes[0])
         shares = share[likely]
-        _permuted(graph, *weights, sizes[0], max(4, int(states).bit_length() - 1), shares)
+        _permuted(graph, *weights, sizes[0], max(1, int(states) // _DEARER), shares)
         share[likely] = shares
     return share
 
@@ -54,8 +59,10 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
     for v in range(rows):
         while label[v] < 0:
             inside = members[: cluster(graph.graph, kept, v, v, label, members)]
-            if inside.size <= most:
-                _permute(graph, (weights, free), kept, np.sort(inside), rows, share, (bit, found))
+            if inside.size <= _BITS:
+                for i in range(inside.size):
+                    bit[inside[i]] = 1 << i
+                _permute(graph, (weights, free), kept, inside, rows, most, share, (bit, found))
                 break
             level = _STEP * limit[inside].max()
             for u in inside:
@@ -68,47 +75,63 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
 
 @inner_njit
 def _permute(
-    graph: PairGraph, reduced: tuple[Floats, Floats], kept: Array, members: Ints, rows: int, share: Floats,
-    work: tuple[Ints, Floats],
+    graph: PairGraph, reduced: tuple[Floats, Floats], kept: Array, members: Ints, rows: int, most: int,
+    share: Floats, work: tuple[Ints, Floats],
 ) -> None:  # fmt: skip
-    """Replace the probabilities of a cluster's pairs; `members` are its vertices, sorted.
+    """Replace the probabilities of a cluster's pairs.
 
-    ``reduced`` are weights of edges and of unmatched vertices; ``work`` is room for as many numbers of each, the
-    latter zeros.
+    ``members`` are its vertices, those below ``rows`` tracks, neighbours near each other; ``reduced`` are weights of
+    edges and of unmatched vertices; ``work`` is the bit of each vertex, and zeros, a number for each pair.
 
-    A set of vertices is a number with a bit for each, those of tracks above. Its best permutation, and the sum over
-    all, follow from the sets without its last track.
+    Sets of detected tracks and used measurements grow track by track; of each the sum over all permutations is known,
+    and the best one, by the set it grew from and its last pair.
     """
-    size, tracks = members.size, np.searchsorted(members, rows)
-    if tracks < 2 or size - tracks < 2:
+    tracks = members[members < rows]
+    if tracks.size < 2 or members.size - tracks.size < 2:
         return
     weights, free = reduced
     bit, found = work
-    for i in range(size):
-        bit[members[i]] = 1 << ((i - tracks) % size)
-    best, total, last = np.zeros(1 << size), np.zeros(1 << size), np.empty(1 << size, np.int64)
-    best[0] = total[0] = 1.0
-    for v in members[:tracks]:
-        for x in range(graph.ptr[v], graph.ptr[v + 1]):
-            e = graph.edge[x]
-            here = bit[graph.ends[e, 1]]
-            for s in range(bit[v] if kept[e] else 0):
-                if total[s] > 0.0 and not s & here:
-                    n = s | here | bit[v]
-                    total[n] += weights[e] * total[s]
-                    if weights[e] * best[s] > best[n]:
-                        best[n], last[n] = weights[e] * best[s], e
-    for s in range(best.size):
-        if best[s] > 0.0:
-            weight, left = total[s], s
-            for v in members:
-                if not s & bit[v]:
-                    weight *= free[v]
-            while left:
-                found[last[left]] += weight
-                left &= ~(bit[graph.ends[last[left], 0]] | bit[graph.ends[last[left], 1]])
+    origin, pair = np.empty((tracks.size, most), np.int64), np.empty((tracks.size, most), np.int64)
+    sets, total, best = np.zeros(1, np.int64), np.ones(1), np.ones(1)
+    for i in range(tracks.size):
+        v = tracks[i]
+        room = sets.size * (1 + graph.ptr[v + 1] - graph.ptr[v])
+        grown, where, by = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
+        count = 0
+        for k in range(sets.size):
+            grown[count], where[count], by[count] = sets[k], k, -1
+            count += 1
+            for x in range(graph.ptr[v], graph.ptr[v + 1]):
+                e = graph.edge[x]
+                here = bit[graph.ends[e, 1]]
+                if kept[e] and not sets[k] & here:
+                    grown[count], where[count], by[count] = sets[k] | here | bit[v], k, e
+                    count += 1
+        order = order_of(grown[:count])
+        sums, tops, last, held = np.zeros(count), np.zeros(count), np.empty(count, np.int64), -1
+        for n in range(count):
+            k = order[n]
+            if n == 0 or grown[k] != grown[order[n - 1]]:
+                held += 1
+            weight = free[v] if by[k] < 0 else weights[by[k]]
+            sums[held] += weight * total[where[k]]
+            if weight * best[where[k]] >= tops[held]:
+                tops[held], last[held] = weight * best[where[k]], k
+        likeliest = order_of(-sums[: held + 1])[:most]
+        total, best, sets = sums[likeliest], tops[likeliest], grown[last[likeliest]]
+        for n in range(likeliest.size):
+            origin[i, n], pair[i, n] = where[last[likeliest[n]]], by[last[likeliest[n]]]
+    for k in range(sets.size):
+        weight, at = total[k], k
+        for v in members[members >= rows]:
+            if not sets[k] & bit[v]:
+                weight *= free[v]
+        for i in range(tracks.size - 1, -1, -1):
+            if pair[i, at] >= 0:
+                found[pair[i, at]] += weight
+            at = origin[i, at]
     # pairs that were left out do not change the probability that a track is detected
-    for v in members[:tracks]:
+    for v in tracks:
         old = new = 0.0
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             if kept[graph.edge[x]]:
