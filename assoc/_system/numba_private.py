@@ -50,6 +50,7 @@ COMPLETE = all(
         _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
         " enable_object_caching",
         _COMPILER.Compiler: "compile_extra",
+        _COMPILER.Flags: "copy summary",
         types: "NumPyRandomGeneratorType NumPyRandomBitGeneratorType npy_rng",
     }.items()
     for name in names.split()
@@ -87,8 +88,7 @@ def make(
     width of whole numbers. ``lean``: it makes and returns no arrays, and counts no references to those it is given.
     """
     chosen = _OPTIONS | (_INNER if inner else {}) | (_LEAN if lean else {})
-    pipeline = _InnerCompiler if inner else _COMPILER.Compiler
-    kernel: Any = numba.njit(**chosen, pipeline_class=pipeline)(function)
+    kernel: Any = numba.njit(**chosen, pipeline_class=_InnerCompiler if inner else _Compiler)(function)
     if not literal:
         kernel.get_call_template = _called_with_common_types(kernel)
     # no folder, not even a temporary one: each process compiles for itself
@@ -248,11 +248,48 @@ class _InnerLibrary(_CODEGEN.JITCodeLibrary):  # type: ignore[misc]
         super()._finalize_final_module()
 
 
-class _InnerCompiler(_COMPILER.Compiler):  # type: ignore[misc]
-    """numba's compiler, with an `_InnerLibrary` for its results."""
+class _Flags(_COMPILER.Flags):  # type: ignore[misc]
+    """The options that a kernel is compiled with; what its numpy functions inherit of them is `_Inherited`."""
 
-    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
-        super().__init__(typingctx, targetctx, library, *others)
+    def copy(self) -> Any:
+        """Return the options by which numba finds numpy's functions, compiled for this kernel or another."""
+        own = _Inherited(self)
+        # what the wrappers of a kernel are does not matter to what it calls
+        own.no_cpython_wrapper = own.no_cfunc_wrapper = True
+        return _INHERITED.setdefault(own.summary(), own)
+
+
+class _Inherited(_COMPILER.Flags):  # type: ignore[misc]
+    """Options that never change, hashed once: numba does it at each call in a kernel, from all its options."""
+
+    @functools.cached_property
+    def _hash(self) -> int:
+        return int(super().__hash__())
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or bool(super().__eq__(other))
+
+
+# all that there are: the same options are one object, which is equal to itself at once
+_INHERITED: dict[str, _Inherited] = {}
+
+
+class _Compiler(_COMPILER.Compiler):  # type: ignore[misc]
+    """numba's compiler, whose tables find what a kernel calls by `_Inherited` options."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.flags = _Flags(self.state.flags)
+
+
+class _InnerCompiler(_Compiler):
+    """The same with an `_InnerLibrary` for its results."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, *others: Any) -> None:
+        super().__init__(typingctx, targetctx, *others)
         self.state.library = _InnerLibrary(targetctx.codegen(), "inner")
         self.state.library.enable_object_caching()
 

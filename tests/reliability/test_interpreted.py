@@ -10,7 +10,7 @@ import pytest
 from numba.core.errors import NumbaError
 
 import assoc
-from assoc._system.compiled import compiled_only, lean_inner_njit, njit
+from assoc._system.compiled import compiled_only, inner_njit, lean_inner_njit, njit
 from assoc.simulation import simulate
 from tests.running import printed
 from tests.sizes import sample
@@ -159,3 +159,44 @@ def test_lean_kernels_that_make_an_array_are_not_compiled():
     # so what they hold are their callers' arrays, and views of them, which live as long as the call
     with pytest.raises(NumbaError, match="NRT required but not enabled"), compiled_only():
         _copies(np.zeros(3))
+
+
+@inner_njit
+def _less(x: float) -> float:
+    return min(x, 2.5)
+
+
+@njit
+def _least(x: float) -> float:
+    return min(_less(x), 0.5 * x)
+
+
+_COUNTED = """
+import gc
+from numba.core import event
+from tests.reliability.test_interpreted import _least
+
+compiled, collecting = [], set()
+
+
+class Listener(event.Listener):
+    def on_start(self, event):
+        if "dispatcher" in event.data:
+            compiled.append(event.data["dispatcher"].py_func.__qualname__)
+        collecting.add(gc.isenabled())
+
+    def on_end(self, event):
+        pass
+
+
+for kind in ("numba:compile", "numba:run_pass"):
+    event.register(kind, Listener())
+assert (_least(4.0), _least(8.0)) == (2.0, 2.5)
+assert gc.isenabled() and collecting == {False}, collecting
+print(compiled)
+"""
+
+
+def test_what_kernels_and_inner_ones_call_is_compiled_once(tmp_path):
+    compiled = ast.literal_eval(run(_COUNTED, tmp_path, "0"))
+    assert len(compiled) == len(set(compiled)) == 3
