@@ -12,14 +12,14 @@ from assoc._system.interrupts import interruptible
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.costs import positions
-from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays, unmissed
+from assoc.costs.arrays import SensorArrays, sensor_arrays, unmissed
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import fitting
-from assoc.costs.own_sensors import any_own, grow_own
+from assoc.costs.own_sensors import any_own, every_pair
 from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
-from assoc.costs.pairs import compatible_pairs
-from assoc.costs.positions import scan_of
+from assoc.costs.pairs import coarse_pairs, compatible_pairs
+from assoc.costs.positions import measured_and_fit, scan_of
 from assoc.costs.prices import PositionPrior, position_prior, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError, LimitExceededError
@@ -128,18 +128,14 @@ def _gated_problem(
         misses = np.log1p([-sensor.detection_probability for sensor in scene.sensors])
         sensors = unmissed(sensors, misses, blind)
     gates = _gates(scene, sensors, probability)
-    if any_own(scene):
-        rates = range_rates(scene, scan, speed)
-        tuples, costs = grow_own(scene, sensors, scan, gates, rates, prior, scan.index, most)
-        if blind is not None and blind.any():
-            costs = costs - np.where(blind & (tuples == 0), misses, 0.0).sum(axis=1)
-        return AssignmentProblem(tuples, costs, scan.sizes)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
-    measured, index = scan_arrays(sensors, scan, reach, least)
+    measured, index, fit = measured_and_fit(scene, sensors, scan, reach, least)
     limits = {"number": scan.index, "max_tuples": most}
-    pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, scan, speed), prior=prior, **limits)
+    coarse = every_pair(measured) if any_own(scene) else coarse_pairs(sensors, measured, gates.pair)
+    pairs = compatible_pairs(measured, fit, coarse, gates, **limits)
+    rates = range_rates(scene, scan, speed)
+    rows, costs = grow(sensors, measured, fit, pairs, gates, rates=rates, prior=prior, **limits)
     if blind is not None and blind.any():
         costs = costs - np.where(blind & (rows < 0), misses, 0.0).sum(axis=1)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0

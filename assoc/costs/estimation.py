@@ -15,6 +15,7 @@ position, and an undetermined one pays only where its measurements pull away fro
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -48,6 +49,9 @@ _POOR_FIT = 10.0
 _DOUBTFUL = 3.0
 # how far beyond the region's heights such a fit may end, in half heights: mirror images lie farther
 _HEIGHT_SLACK = 1.1
+
+Fit = Callable[[Array, bool], tuple[Array, Array, Array]]
+"""`fit` with sensors and scan given, or what sensors of one's own are fitted by: of rows (K, S), whether gating."""
 
 
 @inner_njit

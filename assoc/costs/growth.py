@@ -9,7 +9,7 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.estimation import fit
+from assoc.costs.estimation import Fit
 from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
 from assoc.costs.limits import refuse, too_many
 from assoc.costs.pairs import Pairs
@@ -75,11 +75,9 @@ def _extend(
     return parent[:count], added[:count], len(rows)
 
 
-def _windows(
-    sensors: SensorArrays, scan: ScanArrays, rows: Array, chi: Array, t: int, limit: float
-) -> tuple[Array, Array]:
+def _windows(sensors: SensorArrays, fit: Fit, rows: Array, chi: Array, t: int, limit: float) -> tuple[Array, Array]:
     """Azimuths at bearing sensor t for each tuple: middle and half width; pi where all must be tried."""
-    _, position, covariance = fit(sensors, scan, rows, False)
+    _, position, covariance = fit(rows, False)
     dx, dy = position[:, 0] - sensors.position[t, 0], position[:, 1] - sensors.position[t, 1]
     away = np.maximum(dx * dx + dy * dy, 1e-12)
     u, v = -dy / away, dx / away
@@ -93,6 +91,7 @@ def _windows(
 def grow(
     sensors: SensorArrays,
     scan: ScanArrays,
+    fit: Fit,
     pairs: Pairs,
     gates: Gates,
     *,
@@ -118,7 +117,7 @@ def grow(
     worth: Array = np.empty(0)
     priced = rates is not None or prior is not None
     for t in range(1, count):
-        grown_rows, grown_chi = _grown(sensors, scan, pairs, gates, rows, chi, t, number, max_tuples)
+        grown_rows, grown_chi = _grown(sensors, scan, fit, pairs, gates, rows, chi, t, number, max_tuples)
         chosen = np.flatnonzero(second_owner == t) if count > 2 else slice(None)
         new = np.full((len(pairs.first[chosen]), count), -1, dtype=np.int32)
         new[np.arange(len(new)), scan.owner[pairs.first[chosen]]] = pairs.first[chosen]
@@ -127,7 +126,8 @@ def grow(
         chi = np.concatenate([chi, pairs.chi[chosen], grown_chi])
         worth = (rows >= 0) @ sensors.gain - sensors.base
         if priced:
-            price = np.append(price, prices(sensors, scan, rows[len(price) :], rates, prior))
+            fresh = rows[len(price) :]
+            price = np.append(price, prices(sensors, scan, fresh, rates, prior, *fit(fresh, False)[1:]))
         total = chi + price if priced else chi
         hopeful: Array = 0.5 * total < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
         if not hopeful.all():
@@ -143,6 +143,7 @@ def grow(
 def _grown(
     sensors: SensorArrays,
     scan: ScanArrays,
+    fit: Fit,
     pairs: Pairs,
     gates: Gates,
     rows: Array,
@@ -163,14 +164,14 @@ def _grown(
         part = slice(low, low + _BLOCK)
         middle = half = np.empty(0)
         if sensors.code[t] == BEARING:
-            middle, half = _windows(sensors, scan, rows[part], chi[part], t, largest)
+            middle, half = _windows(sensors, fit, rows[part], chi[part], t, largest)
         parent, added, done = _extend(
             rows[part], t, pairs.second, pairs.start, scan.z[:, 0].copy(), middle, half, _BLOCK
         )
         low += done
         grown = rows[part].take(parent, axis=0)
         grown[:, t] = added
-        value = fit(sensors, scan, grown, True)[0]
+        value = fit(grown, True)[0]
         detected = grown >= 0
         freedom = np.minimum(degrees_of_freedom(sensors, detected) + later + 1, len(gates.joint) - 1)
         hopeful = value <= gates.joint[freedom] + SLACK

@@ -7,16 +7,13 @@ positions of its measurements.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
-from assoc.costs.limits import refuse
-from assoc.costs.prices import PositionPrior, prices_at
-from assoc.costs.range_rates import RangeRates
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
@@ -31,8 +28,10 @@ def any_own(scene: Scene) -> bool:
     return any(type(sensor) not in CODES for sensor in scene.sensors)
 
 
-def fit_own(scene: Scene, arrays: SensorArrays, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
-    """As `assoc.costs.estimation.fit`, of tuples (K, S) of 1-based measurements, 0 where a sensor missed."""
+def fit_own(scene: Scene, arrays: SensorArrays, scan: Scan, rows: Array) -> tuple[Array, Array, Array]:
+    """As `assoc.costs.estimation.fit`, of tuples (K, S) of rows of `flat_scan`, -1 where a sensor missed."""
+    before = np.append(0, np.cumsum(scan.sizes))[:-1]
+    tuples = np.where(rows >= 0, rows - before + 1, 0).astype(np.int64)
     sensors = [sensor.position_part for sensor in scene.sensors]
     z = [np.asarray(found)[:, : part.dim] for found, part in zip(scan.measurements, sensors, strict=True)]
     middle, half = arrays.middle, arrays.half
@@ -125,54 +124,23 @@ def _normal(
     return chi, total + chi, A, g
 
 
-def flat_scan(sensors: SensorArrays, scan: Scan) -> ScanArrays:
-    """The measurements as kernels take them, without positions."""
+def flat_scan(sensors: SensorArrays, scan: Scan) -> tuple[ScanArrays, Array]:
+    """`assoc.costs.arrays.scan_arrays` without positions and in the order of the scan."""
     start = np.append(0, np.cumsum(scan.sizes)).astype(np.int64)
     z = np.zeros((int(start[-1]), 3))
     for s, found in enumerate(scan.measurements):
         z[start[s] : start[s + 1], : sensors.dim[s]] = np.asarray(found)[:, : sensors.dim[s]]
-    nothing = np.zeros((len(z), 6))
-    return ScanArrays(z, np.repeat(np.arange(len(scan.sizes)), scan.sizes), start, nothing[:, :3], nothing, nothing)
+    owner, nothing = np.repeat(np.arange(len(scan.sizes)), scan.sizes), np.zeros((len(z), 6))
+    flat = ScanArrays(z, owner, start, nothing[:, :3], nothing, nothing)
+    return flat, (np.arange(len(z)) - start[owner] + 1).astype(np.int32)
 
 
-def rows_of(tuples: Array, scan: Scan) -> Array:
-    """Rows of `flat_scan` of 1-based measurements, or -1, int32 (K, S)."""
-    start = np.append(0, np.cumsum(scan.sizes))[:-1]
-    return np.where(tuples > 0, start + tuples - 1, -1).astype(np.int32)
-
-
-def grow_own(
-    scene: Scene, sensors: SensorArrays, scan: Scan, gates: Gates, rates: RangeRates | None,
-    prior: PositionPrior | None, number: int, max_tuples: int,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Candidate tuples (K, S) of 1-based measurements and their costs, as `assoc.costs.growth.grow` finds them."""
-    count, sizes = len(sensors.dim), scan.sizes.tolist()
-    near: dict[tuple[int, int], Array] = {}
-    for r in range(count):
-        for s in range(r + 1, count):
-            # 0, a miss, goes with everything
-            near[r, s] = np.ones((sizes[r] + 1, sizes[s] + 1), dtype=np.bool_)
-            two = np.zeros((sizes[r] * sizes[s], count), dtype=np.int64)
-            two[:, r], two[:, s] = 1 + np.indices((sizes[r], sizes[s])).reshape(2, -1)
-            near[r, s][1:, 1:] = (fit_own(scene, sensors, scan, two)[0] <= gates.pair[r, s]).reshape(sizes[r], sizes[s])
-    grown = np.zeros((1, count), dtype=np.int64)
-    for s, size in enumerate(sizes):
-        new = np.repeat(grown, size, axis=0)
-        new[:, s] = np.tile(np.arange(1, size + 1), len(grown))
-        for r in range(s):
-            new = new[near[r, s][new[:, r], new[:, s]]]
-        if len(new) + len(grown) > max_tuples + sum(sizes) + 1:
-            raise refuse(number, len(new) + len(grown), max_tuples)
-        later = int(sensors.dim[s + 1 :].sum())
-        freedom = np.minimum(degrees_of_freedom(sensors, new > 0) + later + 1, len(gates.joint) - 1)
-        good = ((new > 0).sum(axis=1) < 3) | (fit_own(scene, sensors, scan, new)[0] <= gates.joint[freedom] + SLACK)
-        grown = np.concatenate([grown, new[good]])
-    tuples = grown[(grown > 0).sum(axis=1) > 1]
-    if not len(tuples):
-        return tuples.astype(np.int32), np.zeros(0)
-    chi, *where = fit_own(scene, sensors, scan, tuples)
-    good = chi <= gates.joint[degrees_of_freedom(sensors, tuples > 0)]
-    chi = chi + prices_at(sensors, flat_scan(sensors, scan), rows_of(tuples, scan), rates, prior, *where)
-    costs = 0.5 * chi - (tuples > 0) @ sensors.gain + sensors.base
-    good &= costs < 0.0
-    return tuples[good].astype(np.int32), costs[good]
+def every_pair(scan: ScanArrays) -> Iterator[tuple[Array, float]]:
+    """All pairs of measurements of two sensors, with the share of them that is done after each block."""
+    ends, done = scan.start.tolist(), 0.0
+    total = 0.5 * (len(scan.z) ** 2 - float((np.diff(scan.start) ** 2).sum()))
+    for s, t in combinations(range(len(ends) - 1), 2):
+        first, second = np.arange(ends[s], ends[s + 1]), np.arange(ends[t], ends[t + 1])
+        pairs = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2).astype(np.int32)
+        done += len(pairs)
+        yield pairs, done / max(total, 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.estimation import fit
+from assoc.costs.estimation import Fit
 from assoc.costs.gating import Gates
 from assoc.costs.limits import refuse, too_many
 from assoc.sensors.codes import BEARING, POSITION
@@ -193,7 +193,7 @@ def _near_within(
     return found[:count]
 
 
-def _coarse(
+def coarse_pairs(
     sensors: SensorArrays, scan: ScanArrays, limits: Array, *, brute: int = _BRUTE, block: int = _BLOCK
 ) -> Iterator[tuple[Array, float]]:
     """Blocks of coarse pairs, each with the share of the search that is done after it.
@@ -313,20 +313,22 @@ def _strips(sensors: SensorArrays, scan: ScanArrays, rows: Array, others: Array,
     return _Windows(rows[which[some]], others[order], first[some], last[some])
 
 
-def compatible_pairs(sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int) -> Pairs:
-    """All pairs of measurements of different sensors that pass the pair gate.
+def compatible_pairs(
+    scan: ScanArrays, fit: Fit, coarse: Iterable[tuple[Array, float]], gates: Gates, *, number: int, max_tuples: int
+) -> Pairs:
+    """All pairs of measurements of different sensors that pass the pair gate, of those that are `coarse_pairs`.
 
     LimitExceededError, naming the scan `number`, if more than `max_tuples` pass.
     """
-    count = len(sensors.dim)
+    count = len(gates.pair)
     kept, values, so_far = [np.empty((0, 2), np.int32)], [np.empty(0)], 0
-    for pairs, share in _coarse(sensors, scan, gates.pair):
+    for pairs, share in coarse:
         for k in range(0, len(pairs), _BLOCK):
             block = pairs[k : k + _BLOCK]
             rows = np.full((len(block), count), -1, dtype=np.int32)
             owners = scan.owner[block]
             np.put_along_axis(rows, owners, block, axis=1)
-            chi = fit(sensors, scan, rows, True)[0]
+            chi = fit(rows, True)[0]
             passed = chi <= gates.pair[owners[:, 0], owners[:, 1]]
             kept.append(block.compress(passed, axis=0))
             values.append(chi[passed])

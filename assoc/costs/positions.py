@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
-from assoc.costs.estimation import fit
-from assoc.costs.own_sensors import any_own, fit_own, flat_scan, rows_of
-from assoc.costs.prices import position_prior, prices_at, with_prior
+from assoc.costs.arrays import ScanArrays, SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.estimation import Fit, fit
+from assoc.costs.own_sensors import any_own, fit_own, flat_scan
+from assoc.costs.prices import position_prior, prices, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
@@ -30,12 +31,10 @@ def tuple_costs(
     """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
     prior = position_prior(scene, sensor_arrays(scene), target_density)
     sensors = with_prior(sensor_arrays(scene), prior)
-    rows, chi, positions, covariances = _fit_tuples(scene, scan, tuples)
+    flat, rows, chi, positions, covariances = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
     if rates is not None or prior is not None:
-        chosen = scan_of(scene, scan)
-        flat = flat_scan(sensors, chosen) if any_own(scene) else scan_arrays(sensors, chosen, 1.0, 1.0)[0]
-        chi = chi + prices_at(sensors, flat, rows, rates, prior, positions, covariances)
+        chi = chi + prices(sensors, flat, rows, rates, prior, positions, covariances)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)
@@ -43,7 +42,7 @@ def tuple_costs(
 
 def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:
     """Maximum-likelihood positions of measurements of one time; see `assoc.costs.positions_and_covariances`."""
-    _, _, positions, covariances = _fit_tuples(scene, scan, tuples)
+    positions, covariances = _fit_tuples(scene, scan, tuples)[3:]
     return positions, covariances
 
 
@@ -78,15 +77,24 @@ _known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.W
 def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array) -> tuple[Array, Array]:
     count = len(scene.sensors)
     parts = tuple(measured if s == sensor else np.empty((0, other.dim)) for s, other in enumerate(scene.sensors))
-    if any_own(scene):
-        alone = np.zeros((len(measured), count), dtype=np.int64)
-        alone[:, sensor] = np.arange(1, len(measured) + 1)
-        return fit_own(scene, sensors, Scan(0, 0.0, parts), alone)[1:]
-    flat, index = scan_arrays(sensors, Scan(0, 0.0, parts), 1.0, 1.0)
+    _, index, fitted = measured_and_fit(scene, sensors, Scan(0, 0.0, parts))
     rows = np.full((len(measured), count), -1, dtype=np.int32)
     rows[index - 1, sensor] = np.arange(len(measured))
-    _, positions, covariances = fit(sensors, flat, rows, False)
+    _, positions, covariances = fitted(rows, False)
     return positions, covariances
+
+
+def measured_and_fit(
+    scene: Scene, sensors: SensorArrays, scan: Scan, reach: float = 1.0, least: float = 1.0
+) -> tuple[ScanArrays, Array, Fit]:
+    """The `scan_arrays` of a scan, and what fits positions to them: compiled, or with sensors of one's own in Python.
+
+    `reach` and `least` do not matter where nothing is gated.
+    """
+    if any_own(scene):
+        return *flat_scan(sensors, scan), lambda rows, gating: fit_own(scene, sensors, scan, rows)
+    measured, index = scan_arrays(sensors, scan, reach, least)
+    return measured, index, partial(fit, sensors, measured)
 
 
 def scan_of(scene: Scene, scan: int | Scan) -> Scan:
@@ -100,23 +108,18 @@ def scan_of(scene: Scene, scan: int | Scan) -> Scan:
     return scan
 
 
-def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
-    """Rows of measurements (K, S), chi-square (K,), positions (K, 3) and covariances (K, 3, 3) of tuples."""
+def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[ScanArrays, Array, Array, Array, Array]:
+    """The scan, rows (K, S) in it, chi-square (K,), positions (K, 3) and covariances (K, 3, 3) of tuples."""
     scan = scan_of(scene, scan)
-    sensors = sensor_arrays(scene)
-    if any_own(scene):
-        wanted = checked_tuples(tuples, scan.sizes)
-        return (rows_of(wanted, scan), *fit_own(scene, sensors, scan, wanted))
-    measured, index = scan_arrays(sensors, scan, 1.0, 1.0)  # gates do not matter here
-    sizes = scan.sizes
-    wanted = checked_tuples(tuples, sizes)
+    measured, index, fitted = measured_and_fit(scene, sensor_arrays(scene), scan)
+    wanted = checked_tuples(tuples, scan.sizes)
     # bearings were sorted: from 1-based index to row
     row_of = np.empty(len(index) + 1, dtype=np.int32)
     row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
     rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1)
     # the kernel is compiled for one layout
     rows = np.ascontiguousarray(rows, dtype=np.int32)
-    return (rows, *fit(sensors, measured, rows, False))
+    return (measured, rows, *fitted(rows, False))
 
 
 def checked_tuples(tuples: Array, sizes: Array) -> Array:

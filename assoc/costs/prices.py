@@ -25,7 +25,6 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.estimation import fit
 from assoc.costs.range_rates import RangeRates
 from assoc.costs.range_rates import prices as range_rate_prices
 from assoc.errors import InvalidInputError
@@ -82,26 +81,14 @@ def with_prior(sensors: SensorArrays, prior: PositionPrior | None) -> SensorArra
 
 
 def prices(
-    sensors: SensorArrays,
-    scan: ScanArrays,
-    rows: Array,
-    rates: RangeRates | None,
-    prior: PositionPrior | None,
-) -> Array:
-    """Twice the prices of tuples, (K,); 0 or more, and it hardly ever falls when a tuple grows.
-
-    `rows`, int32 (K, S), are the row of `scan` for each sensor, or -1. Without `rates` or `prior` there is no such
-    price.
-    """
-    _, positions, covariances = fit(sensors, scan, rows, False)
-    return prices_at(sensors, scan, rows, rates, prior, positions, covariances)
-
-
-def prices_at(
     sensors: SensorArrays, scan: ScanArrays, rows: Array, rates: RangeRates | None, prior: PositionPrior | None,
     positions: Array, covariances: Array,
 ) -> Array:  # fmt: skip
-    """`prices` of tuples with these positions (K, 3) and covariances (K, 3, 3)."""
+    """Twice the prices of tuples, (K,); 0 or more, and it hardly ever falls when a tuple grows.
+
+    `rows`, int32 (K, S), are the row of `scan` for each sensor, or -1, `positions` (K, 3) and `covariances` (K, 3, 3)
+    those of the tuples. Without `rates` or `prior` there is no such price.
+    """
     total = np.zeros(len(rows))
     if rates is not None:
         total += range_rate_prices(sensors, scan, rates, rows, positions)

@@ -1,10 +1,13 @@
 """Pairs of measurements in a gate: none missed, and a search whose effort grows with the measurements."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from assoc.costs import pairs
 from assoc.costs.arrays import scan_arrays, sensor_arrays
+from assoc.costs.estimation import fit
 from assoc.costs.gating import make_gates
 from assoc.simulation import simulate
 from tests.costs.reference import make_scene
@@ -21,7 +24,7 @@ def _arrays(targets, **options):
 @pytest.mark.parametrize("options", [{}, {"sensor": "radar"}, {"noise": 700.0}, {"width": 300.0}])
 def test_strips_miss_no_pair(options):
     sensors, scan, gates = _arrays(300, **options)
-    found = np.concatenate([block for block, _ in pairs._coarse(sensors, scan, gates.pair)])
+    found = np.concatenate([block for block, _ in pairs.coarse_pairs(sensors, scan, gates.pair)])
     every = pairs._near_all(sensors, scan, gates.pair, 0, len(scan.z))
     assert len(scan.z) ** 2 > pairs._BRUTE and len(every) > 100
     assert {tuple(pair) for pair in found.tolist()} >= {tuple(pair) for pair in every.tolist()}
@@ -49,7 +52,8 @@ def test_a_search_in_windows_finds_what_trying_all_finds(kinds, probability):
         gates = make_gates(sensors, probability)
         scan = scan_arrays(sensors, scene.scan(0), float(gates.pair.max()), 1.0)[0]
         # so few are all tried
-        every = pairs.compatible_pairs(sensors, scan, gates, number=0, max_tuples=10**6)
-        found = np.concatenate([block for block, _ in pairs._coarse(sensors, scan, gates.pair, brute=-1)])
+        near = pairs.coarse_pairs(sensors, scan, gates.pair)
+        every = pairs.compatible_pairs(scan, partial(fit, sensors, scan), near, gates, number=0, max_tuples=10**6)
+        found = np.concatenate([block for block, _ in pairs.coarse_pairs(sensors, scan, gates.pair, brute=-1)])
         expected = set(zip(every.first.tolist(), every.second.tolist(), strict=True))
         assert expected and expected <= {tuple(pair) for pair in found.tolist()}
