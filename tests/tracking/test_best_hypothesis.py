@@ -5,8 +5,9 @@ import pytest
 
 from assoc import assign
 from assoc.problem import AssignmentProblem
+from assoc.tracking.growth import Births, Offers
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
-from assoc.tracking.mht.branches import Hits, Roots, Tables, extend
+from assoc.tracking.mht.branches import Tables, extend
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import decide, keep_best
 from assoc.tracking.records.track_batch import ID, SCORE
@@ -92,9 +93,9 @@ def test_a_solver_is_asked_where_the_search_takes_too_long():
         mask[rows[solution.indices[solution.indices < len(rows)]]] = True
         return mask
 
-    hits = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
-    roots = Roots(np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int32), np.zeros(0), np.zeros(0))
-    _, after, chosen, _ = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve, 20)
+    births = Births(np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int32), np.zeros(0), np.zeros(0))
+    offers = Offers(np.zeros(len(tree)), *np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)), births)
+    _, after, chosen, _ = extend(tables, offers, 0, 0, 30, 15.0, solve, 20)
     assert asked
     assert -after.numbers[chosen, SCORE].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 

@@ -28,7 +28,7 @@ from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.tracking.file import Saved
 from assoc.tracking.growth import Offers, growth_of
-from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
+from assoc.tracking.mht.branches import Tables, count_scan, extend
 from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
@@ -106,13 +106,12 @@ class TrackTrees(DeferringMethod):
 
     def _extended(self, progress: Progress, tables: Tables, offers: Offers, s: int) -> tuple[Array, Tables, Array]:
         scan, most = progress.state.scan, progress.settings.max_tuples
-        hits = Hits(offers.branch, offers.measurement, offers.gain, offers.when)
 
         def solve(tree: Array, score: Array, history: Array) -> Array:
             return _solved(progress, tree, score, history)
 
         limits = self.max_branches, self.branch_drop
-        kept, grown, chosen, gap = extend(tables, offers.missed, hits, Roots(*offers.births), s, scan, *limits, solve)
+        kept, grown, chosen, gap = extend(tables, offers, s, scan, *limits, solve)
         if len(kept) > most:
             raise LimitExceededError(
                 f"scan {scan}: {len(kept)} branches, more than max_tuples = {most}; "

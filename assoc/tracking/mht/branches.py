@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Array, Floats
 from assoc.packing.kernels.copying import copy_to
+from assoc.tracking.growth import Offers
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
@@ -30,74 +31,41 @@ class Tables(NamedTuple):
     born: Array
 
 
-class Hits(NamedTuple):
-    """Pairs of a branch (row) and a measurement (0-based) in its gate, gain of the score, seconds; each (K,)."""
-
-    branch: Array
-    measurement: Array
-    gain: Array
-    when: Array
-
-
-class Roots(NamedTuple):
-    """New trees: ids (K,), 1-based measurements of the scan's sensors (K, S), times (s) and initial scores (K,)."""
-
-    ids: Array
-    rows: Array
-    when: Array
-    score: Array
+_Grown = tuple[NDArray[np.int64], Floats, Floats, NDArray[np.bool_]]
+"""All candidates: tree, score, loss, and whether the best global hypothesis contains it; each (K,)."""
 
 
 def extend(
-    tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
+    tables: Tables, offers: Offers, column: int, scan: int, most: int, drop: float,
     solve: Callable[[Array, Array, Array], Array], visits: int = VISITS,
 ) -> tuple[Array, Tables, Array, float]:  # fmt: skip
     """Grow all B branches and keep those that matter to good global hypotheses.
 
     The branches of the best global hypothesis are always kept. Where the search does not find it quickly, a solver
     does: a branch that is cut around a poor hypothesis cannot come back. `solve` returns it as a mask, given the
-    branches' trees, scores and histories. `miss` (B,) is what a miss adds to the score of each branch, `column` that of
-    the sensor in the history, `scan` the one in which the new trees begin; `most` and `drop` are as for `keep_best`,
-    `visits` as for `choose`.
+    branches' trees, scores and histories. `column` is that of the sensor in the history, `scan` the one in which the
+    new trees begin; `most` and `drop` are as for `keep_best`, `visits` as for `choose`.
 
     Returns rows of the candidates that are kept, their tables, which of them form the best global hypothesis found, and
     how far its score may be below the best one's where no solver was asked, relative; mostly 0.
     """
-    limits = _Limits(most, drop, visits)
-    history, doubtful, gap, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
+    history, doubtful, gap, grown, *cut = _extend(tables, offers, column, scan, most, drop, visits)
     if doubtful.size:
         tree, score, _, chosen = grown
         other = solve(tree[doubtful], score[doubtful], history[doubtful])
         if score[doubtful[other]].sum() > score[doubtful[chosen[doubtful]]].sum():
             chosen[doubtful] = other
-            cut = _cut(tables, hits, roots, _Grown(*grown), column, scan, limits)
+            cut = _cut(tables, offers, grown, column, scan, most, drop)
     kept, chosen, *rest = cut
     return kept, Tables(*rest), chosen, gap
 
 
-class _Grown(NamedTuple):
-    """All candidates: tree, score, loss, and whether the best global hypothesis contains it; each (K,)."""
-
-    tree: NDArray[np.int64]
-    score: Floats
-    loss: Floats
-    chosen: NDArray[np.bool_]
-
-
-class _Limits(NamedTuple):
-    """Limits of `keep_best` (most branches of a tree, loss) and of `choose` (visits)."""
-
-    most: int
-    drop: float
-    visits: int
-
-
 @njit
-def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
+def _extend(tables: Tables, offers: Offers, column: int, scan: int, most: int, drop: float, visits: int) -> Any:
     """Grow all branches and prune them; also return what is needed to prune them again."""
     numbers, counts, history, born = tables
-    branch, measurement, gain, _ = hits
-    ids, rows, _, first = roots
+    miss, branch, measurement, gain, _, births = offers
+    ids, rows, _, first = births
     old, pairs = born.size, branch.size
     tree, score = np.empty(old + pairs + ids.size, np.int64), np.empty(old + pairs + ids.size)
     for i in range(old):
@@ -115,22 +83,21 @@ def _extend(tables: Tables, miss: Floats, hits: Hits, roots: Roots, column: int,
     for i in range(ids.size):
         copy_to(wide[old + pairs + i, : rows.shape[1]], rows[i])
     known = priced(tree, score, wide)
-    chosen, doubtful, gap = choose(score, wide, known, limits.visits)
-    grown = _Grown(tree, score, known.loss, chosen)
-    kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, hits, roots, grown, column, scan, limits)
-    fields = (tree, score, known.loss, chosen)
-    return wide, np.flatnonzero(doubtful), gap, fields, kept, ours, new_numbers, new_counts, new_history, new_born
+    chosen, doubtful, gap = choose(score, wide, known, visits)
+    grown = tree, score, known.loss, chosen
+    kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, offers, grown, column, scan, most, drop)
+    return wide, np.flatnonzero(doubtful), gap, grown, kept, ours, new_numbers, new_counts, new_history, new_born
 
 
 @njit
-def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, scan: int, limits: _Limits) -> Any:
+def _cut(tables: Tables, offers: Offers, grown: _Grown, column: int, scan: int, most: int, drop: float) -> Any:
     """Prune the candidates; return the rows kept and their tables."""
     numbers, counts, history, born = tables
-    branch, measurement, _, when = hits
-    ids, rows, since, first = roots
-    score = grown.score
+    _, branch, measurement, _, when, births = offers
+    ids, rows, since, first = births
+    tree, score, loss, chosen = grown
     old, pairs = born.size, branch.size
-    kept = keep_best(grown.tree, score, np.where(grown.chosen, -1.0, grown.loss), limits.most, limits.drop)
+    kept = keep_best(tree, score, np.where(chosen, -1.0, loss), most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):
@@ -155,7 +122,7 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
             new_numbers[k, HIDDEN] = 0.0
             new_history[k, column] = measurement[row - old] + 1
-    return kept, grown.chosen[kept], new_numbers, new_counts, new_history, new_born
+    return kept, chosen[kept], new_numbers, new_counts, new_history, new_born
 
 
 @njit
