@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
@@ -92,13 +92,50 @@ def sigma_points(mean: Array, P: Array, scale: float, points: Array) -> int:
     for b in range(B):
         if not factor(P[b], n, L):
             return BAD_COVARIANCE + STATUSES * b
-        for i in range(n):
-            points[b, 0, i] = mean[b, i]
-            for k in range(n):
-                step = scale * L[i, k] if k <= i else 0.0
-                points[b, 1 + k, i] = mean[b, i] + step
-                points[b, 1 + n + k, i] = mean[b, i] - step
+        _draw(mean[b], scale, L, points[b])
     return GOOD
+
+
+@lean_inner_njit
+def _draw(mean: Array, scale: float, factor: Array, points: Array) -> None:
+    """Write the 2 n + 1 sigma points of one Gaussian; the factor of its covariance is lower triangular."""
+    n = len(mean)
+    for i in range(n):
+        points[0, i] = mean[i]
+        for k in range(n):
+            step = scale * factor[i, k] if k <= i else 0.0
+            points[1 + k, i] = mean[i] + step
+            points[1 + n + k, i] = mean[i] - step
+
+
+@lean_inner_njit
+def _regress(h: Array, weights: Array, F: Array, mu: Array, C: Array, extra: Array) -> None:
+    """Weighted mean (d,) of measured sigma points (2 n + 1, d), their cross covariance (d, n), covariance (d, d).
+
+    `F` is the factor of the state's covariance.
+    """
+    m, d = h.shape
+    n = len(F)
+    scale = weights[0, 1]
+    for a in range(d):
+        total = 0.0
+        for s in range(m):
+            total += weights[1, s] * h[s, a]
+        mu[a] = total
+    for a in range(d):
+        for i in range(n):
+            C[a, i] = 0.0
+        for e in range(a + 1):
+            total = 0.0
+            for s in range(m):
+                total += weights[2, s] * (h[s, a] - mu[a]) * (h[s, e] - mu[e])
+            extra[a, e] = total
+            extra[e, a] = total
+        for k in range(n):
+            above, below = h[1 + k, a] - mu[a], h[1 + n + k, a] - mu[a]
+            u = scale * (weights[2, 1 + k] * above - weights[2, 1 + n + k] * below)
+            for i in range(k, n):
+                C[a, i] += u * F[i, k]
 
 
 @njit
@@ -148,7 +185,6 @@ def unscented(
     """
     B, n = mean.shape
     d, m = z.shape[1], 2 * n + 1
-    scale, wm, wc = weights[0, 1], weights[1], weights[2]
     v, S, nis, ll = parts_of(rest, B, d)
     wide = max(n, d)
     F, h, x = np.zeros((n, n)), np.zeros((m, d)), np.empty((m, n))
@@ -163,31 +199,10 @@ def unscented(
             return BAD_MEASUREMENT + STATUSES * b
         if not factor(P[b], n, F):
             return BAD_COVARIANCE + STATUSES * b
-        for s in range(m):
-            x[s] = mean[b]
-            if s > 0:
-                k = (s - 1) % n
-                for i in range(k, n):
-                    x[s, i] += weights[0, s] * F[i, k]
+        _draw(mean[b], weights[0, 1], F, x)
         observe_points(code, position, columns, matrix, x, first, h)
+        _regress(h, weights, F, mu, C, extra)
         for a in range(d):
-            total = 0.0
-            for s in range(m):
-                total += wm[s] * h[s, a]
-            mu[a] = total
-        for a in range(d):
-            for i in range(n):
-                C[a, i] = 0.0
-            for e in range(a + 1):
-                total = 0.0
-                for s in range(m):
-                    total += wc[s] * (h[s, a] - mu[a]) * (h[s, e] - mu[e])
-                extra[a, e] = total
-                extra[e, a] = total
-            for k in range(n):
-                u = scale * (wc[1 + k] * (h[1 + k, a] - mu[a]) - wc[1 + n + k] * (h[1 + n + k, a] - mu[a]))
-                for i in range(k, n):
-                    C[a, i] += u * F[i, k]
             for i in range(n):
                 slopes[a, i] = C[a, i]
             solve_in_place(F, n, slopes[a])
@@ -245,6 +260,40 @@ def move_ensemble(members: Array, F: Array, shocks: Array, moved: Array, factors
                 out[b, s, i] = total
 
 
+@lean_inner_njit
+def _sample_moments(members: Array, h: Array, noise: Array, mu: Array, mean: Array, C: Array, S: Array) -> None:
+    """Sample means (d,) and (n,) of measured members (N, d) and of members (N, n), covariances (n, d) and (d, d).
+
+    The last is that of measurements, with their noise.
+    """
+    N, n = members.shape
+    d = h.shape[1]
+    for a in range(d):
+        mu[a] = 0.0
+        for e in range(d):
+            S[a, e] = 0.0
+        for i in range(n):
+            C[i, a] = 0.0
+    for i in range(n):
+        mean[i] = 0.0
+    for s in range(N):
+        for a in range(d):
+            mu[a] += h[s, a] / N
+        for i in range(n):
+            mean[i] += members[s, i] / N
+    for s in range(N):
+        for a in range(d):
+            u = (h[s, a] - mu[a]) / (N - 1)
+            for e in range(a + 1):
+                S[a, e] += u * (h[s, e] - mu[e])
+            for i in range(n):
+                C[i, a] += u * (members[s, i] - mean[i])
+    for a in range(d):
+        for e in range(a + 1):
+            S[a, e] += noise[a, e]
+            S[e, a] = S[a, e]
+
+
 @njit
 def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out: Array, rest: Array) -> int:
     """Correction of ensembles with perturbed measurements, into the last two arrays; `rest` as in `unscented`.
@@ -266,27 +315,8 @@ def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out:
             return BAD_MEASUREMENT + STATUSES * b
         if not factor(noise, d, LR):
             return BAD_COVARIANCE + STATUSES * b
-        mu[:] = 0.0
-        mean[:] = 0.0
         observe_points(code, position, columns, matrix, members[b], first, h)
-        for s in range(N):
-            for a in range(d):
-                mu[a] += h[s, a] / N
-            for i in range(n):
-                mean[i] += members[b, s, i] / N
-        S[b] = 0.0
-        C[:] = 0.0
-        for s in range(N):
-            for a in range(d):
-                u = (h[s, a] - mu[a]) / (N - 1)
-                for e in range(a + 1):
-                    S[b, a, e] += u * (h[s, e] - mu[e])
-                for i in range(n):
-                    C[i, a] += u * (members[b, s, i] - mean[i])
-        for a in range(d):
-            for e in range(a + 1):
-                S[b, a, e] += noise[a, e]
-                S[b, e, a] = S[b, a, e]
+        _sample_moments(members[b], h, noise, mu, mean, C, S[b])
         if folding > 0.0 and 9.0 * S[b, 3, 3] > folding * folding:
             # says nothing, as in `assoc.filters.kernels.gaussian.blur`
             for a in range(3):
