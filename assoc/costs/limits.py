@@ -31,3 +31,11 @@ def refuse(scan: int, expected: float, limit: int) -> LimitExceededError:
         f"scan {scan}: about {expected:.3g} candidate tuples ({memory.in_words(_BYTES * expected)}), more than "
         f"max_tuples = {limit}; lower gate_probability, split the scan, or raise max_tuples"
     )
+
+
+def refuse_of_tracks(expected: float, limit: int) -> LimitExceededError:
+    """The same for tuples of tracks and measurements."""
+    return LimitExceededError(
+        f"about {expected:.3g} candidate tuples of tracks and measurements, more than max_tuples = {limit}; "
+        "lower gate_probability or raise max_tuples"
+    )

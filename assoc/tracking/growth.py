@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.limits import refuse_of_tracks
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_pairs
-from assoc.errors import LimitExceededError
 from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
@@ -170,10 +170,7 @@ class AtOnce(Growth):
         pairs = track_pairs(self._filter, self._states, scan.measurements[s], sensor, gate)
         count, most = len(pairs.track) + len(self._states), settings.max_tuples
         if count > most:
-            raise LimitExceededError(
-                f"scan {scan.index}: {count} candidate tuples of tracks and measurements, more than "
-                f"max_tuples = {most}; lower gate_probability or raise max_tuples"
-            )
+            raise refuse_of_tracks(count, most)
         self._corrected = pairs.correct
         missed = misses_of(self._progress, self._states, s, self._partly)
         gain = pairs.log_likelihood + terms.detection[s] - scan.crowd(s, pairs.measurement)
@@ -224,7 +221,7 @@ class AtOnce(Growth):
 
         def grown(part: int, places: Array, rows: Array) -> Any:
             begun = self._begun[part][rows]
-            return corrected(settings.filter, begun, scan.measurements, settings.sensors, self._since[places])
+            return corrected(settings.filter, begun, scan.measurements, settings.sensors, self._since[places])[0]
 
         return _in_blocks(self._sources, [len(states) for states in self._begun], grown)
 
@@ -275,11 +272,12 @@ class InOrder(Growth):
         """Pairs by the measurements of sensor s, filtered in time order with those of earlier sensors."""
         timed, terms, past = self._timed, self._progress.settings.terms, self._past
         past[:, s] = self._misses[:, s]
-        grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows, self._progress.settings.max_tuples)
-        self._total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
-        missed = self._misses[self._anchor, s]
-        gain = self._total - self._gained[grown.parent]
-        return Offers(missed, grown.parent, grown.measurement, gain, grown.followed.when, self._no_births())
+        parent, measurement, rows, followed = timed.grown(
+            s, self._done, self._anchor, self.origin, self.rows, self._progress.settings.max_tuples
+        )
+        self._total = -score_costs(timed, followed, rows, terms, past[self._anchor[parent]])
+        missed, gain = self._misses[self._anchor, s], self._total - self._gained[parent]
+        return Offers(missed, parent, measurement, gain, followed.when, self._no_births())
 
     def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
         """New targets, which only the sensors processed so far can have missed."""

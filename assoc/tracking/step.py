@@ -20,7 +20,7 @@ from assoc._types import Array
 from assoc.costs.tracks.own_times import PairEvidence, TimedScan
 from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import predict_each
-from assoc.filters.batches import concatenate
+from assoc.filters.batches import placed
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.tracking.adapting.learning import correct, learn, remember_tracks, use_estimates
@@ -204,8 +204,9 @@ def within_heights(progress: Progress) -> Progress:
         return progress
     middle = np.full((np.count_nonzero(wide), 1), settings.scene.region[2].mean())
     known = settings.filter.update(tracks.states[wide], middle, height).state
-    order = np.argsort(np.argsort(~wide, kind="stable"))
-    return progress.with_state(tracks=tracks.moved(concatenate([known, tracks.states[~wide]])[order]))
+    rest = np.flatnonzero(~wide)
+    states = placed(len(tracks), [(np.flatnonzero(wide), known), (rest, tracks.states[rest])])
+    return progress.with_state(tracks=tracks.moved(states))
 
 
 def remember_identities(progress: Progress) -> Progress:

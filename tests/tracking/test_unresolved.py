@@ -154,14 +154,14 @@ def test_plots_are_explained_as_a_sum_over_events():
     a, b, C = np.array([3.0, 4.0]), np.array([-8.0, 1.0]), 40.0 * np.eye(2)
     clutter = np.array([-12.0, -11.0])
     looks = Looks(Expected(a[None], (C + R)[None]), Expected(b[None], (C + R)[None]), (a - b)[None], 2.0 * C[None])
-    told = explained(SENSOR, z, clutter, looks)
+    log_one, log_two, plot = explained(SENSOR, z, clutter, looks)
     f = lambda at, S: np.array([multivariate_normal(at, S).pdf(one) for one in z]) / np.exp(clutter)  # noqa: E731
     of_a, of_b = f(a, C + R), f(b, C + R)
     two = (1 - P) ** 2 + P * (1 - P) * (of_a.sum() + of_b.sum()) + P**2 * (of_a[0] * of_b[1] + of_a[1] * of_b[0])
     middle = f((a + b) / 2, R + C / 2 + (np.outer(a - b, a - b) + 2.0 * C) / 12.0)
     one = (1 - P) ** 2 + (1 - (1 - P) ** 2) * middle.sum()
-    np.testing.assert_allclose([told.one[0], told.two[0]], np.log([one, two]), rtol=1e-9)
-    assert told.plot.tolist() == [int(middle.argmax())]
+    np.testing.assert_allclose([log_one[0], log_two[0]], np.log([one, two]), rtol=1e-9)
+    assert plot.tolist() == [int(middle.argmax())]
 
 
 def test_only_pairs_that_were_seen_apart_are_two():

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.limits import refuse_of_tracks
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import TrackTuples, gate_of, require_states
 from assoc.costs.views import bands_of, log_missed, places_of, share_in_view
-from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter
-from assoc.filters.batches import arrays_of, concatenate, state_from
+from assoc.filters.batches import concatenate, placed
 from assoc.filters.measurement import periods_of
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
@@ -66,18 +66,6 @@ class Followed(NamedTuple):
     """Of all measurements but the lead's, less their `clutter`, (M,)."""
     inside: Array
     """Whether each measurement passed its gate, bool (M,)."""
-
-
-class Grown(NamedTuple):
-    """K partial tuples with one more measurement."""
-
-    parent: Array
-    """Row of the tuple before, (K,)."""
-    measurement: Array
-    """0-based, (K,)."""
-    rows: Array
-    """(K, S)."""
-    followed: Followed
 
 
 class TimedScan:
@@ -138,8 +126,7 @@ class TimedScan:
         leads[fresh] = lead
         when = np.empty(len(track))
         when[fresh], when[old] = first[fresh], self.before[track[old]]
-        back = np.argsort(np.concatenate([old, fresh]), kind="stable")
-        states = concatenate([self.states[track[old]], begun])[back]
+        states = placed(len(track), [(old, self.states[track[old]]), (fresh, begun)])
         log_likelihood, inside = np.zeros(len(track)), np.ones(len(track), dtype=np.bool_)
         for k in range(rows.shape[1]):
             due = (count > k) & (turn[:, k] != leads)
@@ -148,7 +135,9 @@ class TimedScan:
                 moved = self._moved(states[here], now - when[here])
                 z = np.ascontiguousarray(self.measurements[s][rows[here, s] - 1])
                 done = self.filter.update(moved, z, sensor)
-                states, when[here] = _put(states, here, done.state), now
+                when[here] = now
+                rest = np.setdiff1d(np.arange(len(track)), here)
+                states = placed(len(track), [(rest, states[rest]), (here, done.state)])
                 log_likelihood[here] += done.log_likelihood
                 if self.clutter is not None:
                     log_likelihood[here] -= self.clutter[s][rows[here, s] - 1]
@@ -199,8 +188,7 @@ class TimedScan:
             return self._moved(followed.states, self.end - followed.when)
         seen, missed = np.flatnonzero(~idle), np.flatnonzero(idle)
         moved = self._moved(followed.states[seen], self.end - followed.when[seen])
-        back = np.argsort(np.concatenate([seen, missed]), kind="stable")
-        return concatenate([moved, self.late[track[missed]]])[back]
+        return placed(len(track), [(seen, moved), (missed, self.late[track[missed]])])
 
     def misses(self, terms: ScoreTerms) -> Array:
         """Score of a miss of each track and each measurement's target (as anchors) by each sensor, (A, S)."""
@@ -221,13 +209,16 @@ class TimedScan:
         """The measurement, as anchor, with which each new target began, (M,)."""
         return self.offsets[lead] + np.take_along_axis(rows, lead[:, None], axis=1)[:, 0] - 1
 
-    def grown(self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array, max_tuples: int) -> Grown:
+    def grown(
+        self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array, max_tuples: int
+    ) -> tuple[Array, Array, Array, Followed]:
         """Partial tuples with one more measurement, of sensor s, that passes all gates.
 
         LimitExceededError where these and the ones before are more than `max_tuples`.
 
         Measurements of the sensors in `done` may have begun new targets. Of the partial tuples: `anchor` (M,), the
         track, or the measurement that began a new target; `track` (M,), the row of the track or -1; `rows` (M, S).
+        Returns the rows (K,) of the tuples before, measurements from 0 (K,), the new rows (K, S), filtered.
         """
         near_anchor, near_found = self.near(s)
         for r in done:
@@ -244,15 +235,12 @@ class TimedScan:
             good = np.flatnonzero(followed.inside)
             count += len(good)
             if count > max_tuples:
-                raise LimitExceededError(
-                    f"{count} or more candidate tuples of tracks and measurements, more than max_tuples = "
-                    f"{max_tuples}; lower gate_probability or raise max_tuples"
-                )
+                raise refuse_of_tracks(count, max_tuples)
             blocks.append((block[good], new[good], followed.states[good], [part[good] for part in followed[1:]]))
         kept, new_rows, states, others = zip(*blocks, strict=True)
         chosen = Followed(concatenate(states), *map(np.concatenate, zip(*others, strict=True)))
         every = np.concatenate(kept)
-        return Grown(parent[every], found[every], np.concatenate(new_rows), chosen)
+        return parent[every], found[every], np.concatenate(new_rows), chosen
 
     def near(self, s: int) -> tuple[Array, Array]:
         """Tracks and measurements of sensor s that may pass the gate, ordered by track."""
@@ -325,20 +313,6 @@ def _diagonal(variances: Array) -> Array:
     return covariance
 
 
-def _put(states: Any, rows: Array, new: Any) -> Any:
-    """The states, those in `rows` replaced."""
-    if len(rows) == len(states):
-        return new
-    parts, arrays = arrays_of(new), {name: np.array(value) for name, value in arrays_of(states).items()}
-    if any(parts[name].shape[1:] != value.shape[1:] for name, value in arrays.items()):
-        # histories of measurements have no width before the first one
-        rest = np.setdiff1d(np.arange(len(states)), rows)
-        return concatenate([new, states[rest]])[np.argsort(np.concatenate([rows, rest]), kind="stable")]
-    for name, value in arrays.items():
-        value[rows] = parts[name]
-    return state_from(type(states), arrays)
-
-
 def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tuples: int) -> TrackTuples:
     """Candidate tuples of tracks, or of new targets (track -1), and one measurement or none of each sensor.
 
@@ -353,17 +327,17 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, misses: Array, max_tup
     alone = costs.copy()
     done: list[int] = []
     for s in scan.order:
-        new = scan.grown(s, done, anchor, track, rows, max_tuples)
-        value = score_costs(scan, new.followed, new.rows, terms, misses[anchor[new.parent]])
+        parent, _, grown, followed = scan.grown(s, done, anchor, track, rows, max_tuples)
+        value = score_costs(scan, followed, grown, terms, misses[anchor[parent]])
         starts = np.flatnonzero(scan.places.fit[s])
         single = np.zeros((len(starts), width), dtype=np.int32)
         single[:, s] = starts + 1
         start_anchor = scan.offsets[s] + starts
         begun = terms.miss[s] - misses[start_anchor].sum(axis=1) - scan.places.births[s][starts]
         costs = np.concatenate([costs, value, begun])
-        rows = np.concatenate([rows, new.rows, single])
-        track = np.concatenate([track, track[new.parent], np.full(len(starts), -1)])
-        anchor = np.concatenate([anchor, anchor[new.parent], start_anchor])
+        rows = np.concatenate([rows, grown, single])
+        track = np.concatenate([track, track[parent], np.full(len(starts), -1)])
+        anchor = np.concatenate([anchor, anchor[parent], start_anchor])
         done.append(s)
     # not cheaper than a track all missed: its measurements are better false alarms, at cost 0
     good = (track < 0) | ~rows.any(axis=1)

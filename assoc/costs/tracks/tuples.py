@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._system import memory
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
-from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.limits import MAX_TUPLES, refuse_of_tracks
 from assoc.costs.tracks import depth_first
 from assoc.costs.tracks.gating import Near, near_both, near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
-from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected, Filter, Parts, complain
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.kernels.gaussian import GOOD
@@ -148,14 +147,19 @@ def grow_track_tuples(
 
 def corrected(
     filter: Filter[Any], states: Any, measurements: Sequence[Array], sensors: Sequence[Measurement], rows: Array
-) -> Any:
-    """The states of T tracks corrected by a tuple each, rows (T, S) of 1-based measurements, 0 where one missed."""
+) -> tuple[Any, Array, Array]:
+    """The states of T tracks corrected by a tuple each, rows (T, S) of 1-based measurements, 0 where one missed.
+
+    Also the log likelihood of each measurement given those before, and its NIS, (T, S), 0 where there is none.
+    """
+    log_likelihood, nis = np.zeros(rows.shape), np.zeros(rows.shape)
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
         seen, missed = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
         if len(seen):
-            done = filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor).state
-            states = placed(len(states), [(missed, states[missed]), (seen, done)])
-    return states
+            done = filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
+            log_likelihood[seen, s], nis[seen, s] = done.log_likelihood, done.nis
+            states = placed(len(states), [(missed, states[missed]), (seen, done.state)])
+    return states, log_likelihood, nis
 
 
 class _Growth(NamedTuple):
@@ -176,13 +180,6 @@ def _near(growth: _Growth, states: Any, s: int, z: Array) -> Near:
     expected = growth.filter.expected(states, growth.sensors[s])
     track, found = near_pairs(expected, z, growth.periods[s], growth.gates[s])
     return Near(np.searchsorted(track, np.arange(len(states) + 1)), found)
-
-
-def _too_many(about: float, max_tuples: int) -> NoReturn:
-    raise LimitExceededError(
-        f"about {about:.3g} candidate tuples of tracks and measurements, "
-        f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
-    )
 
 
 def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_tuples: int) -> TrackTuples:
@@ -217,7 +214,7 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
     if len(track) > max_tuples:
         # ordered by track: extrapolated to those left
         work = np.sum([pairs.first for pairs in near], axis=0)
-        _too_many(len(track) * work[-1] / work[int(track[-1]) + 1], max_tuples)
+        raise refuse_of_tracks(len(track) * work[-1] / work[int(track[-1]) + 1], max_tuples)
     return TrackTuples(track, rows, costs)
 
 
@@ -234,7 +231,7 @@ def _in_blocks(growth: _Growth, states: Any, misses: Array, max_tuples: int) -> 
         block = _grown(growth, states[low:high], misses[low:high], here, max_tuples - made)
         made += len(block.track)
         if made > max_tuples:
-            _too_many(made * work[-1] / work[high], max_tuples)
+            raise refuse_of_tracks(made * work[-1] / work[high], max_tuples)
         blocks.append(block._replace(track=low + block.track))
         low = high
     return TrackTuples(*(np.concatenate(arrays) for arrays in zip(*blocks, strict=True)))

@@ -97,19 +97,13 @@ def nearest_plots(sensor: Sensor, plots: Array, looks: Looks) -> Array:
     return np.asarray(np.einsum("kni,ij,knj->kn", off, np.linalg.inv(sensor.covariance), off).argmin(axis=1))
 
 
-class Explained(NamedTuple):
-    """The plots of a sensor explained by each of N pairs of tracks and false alarms."""
+def explained(sensor: Sensor, z: Array, clutter: Array, looks: Looks) -> tuple[Array, Array, Array]:
+    """How each of N pairs of tracks, with false alarms, explains the plots z (n, d) of a sensor.
 
-    one: Array
-    """Logarithm of their likelihood if the pair is unresolved, relative to false alarms alone, (N,)."""
-    two: Array
-    """If it is not, (N,)."""
-    plot: Array
-    """The plot (from 0) that is likeliest to be of both, (N,); nothing where there are none."""
-
-
-def explained(sensor: Sensor, z: Array, clutter: Array, looks: Looks) -> Explained:
-    """How pairs explain plots z (n, d); `clutter` (n,) is the logarithm of the density of false alarms."""
+    `clutter` (n,) is the logarithm of the density of false alarms. Returns the logarithm of the plots' likelihood,
+    relative to false alarms alone, if the pair is unresolved (N,), and if it is not (N,); and the plot (from 0) that is
+    likeliest to be of both (N,), nothing where there are none.
+    """
     P = sensor.detection_probability
     middle = looks.second.mean + 0.5 * looks.difference
     spread = spread_of(sensor.covariance, looks.covariance, looks.difference)
@@ -124,7 +118,7 @@ def explained(sensor: Sensor, z: Array, clutter: Array, looks: Looks) -> Explain
     )
     both = (1.0 + a.sum(axis=1)) * (1.0 + b.sum(axis=1)) - (a * b).sum(axis=1)
     two = 2.0 * math.log1p(-P) + np.log(np.maximum(both, 1.0))
-    return Explained(np.logaddexp(2.0 * math.log1p(-P), seen), two, at_middle.argmax(axis=1) if len(z) else seen[:0])
+    return np.logaddexp(2.0 * math.log1p(-P), seen), two, at_middle.argmax(axis=1) if len(z) else seen[:0]
 
 
 def offers(sensor: Sensor, plot: Array, looks: Looks, precision: Array, pull: Array) -> Array:

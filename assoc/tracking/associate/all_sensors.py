@@ -16,9 +16,8 @@ from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples, score_costs
-from assoc.costs.tracks.tuples import gate_of, grow_track_tuples, require_states
+from assoc.costs.tracks.tuples import corrected, gate_of, grow_track_tuples, require_states
 from assoc.filters.base import predict_each
-from assoc.filters.batches import placed
 from assoc.filters.measurement import periods_of
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import owners
@@ -67,13 +66,24 @@ class WholeScan(ABC):
             Gain of the track's score, or score of the new target.
         """
 
-    @abstractmethod
     def near(self, tuples: Array) -> tuple[Array, Array]:
         """Tracks, and which of the tuples (K, S) may be theirs by the first sensor in it."""
+        lead = np.argmax(tuples > 0, axis=1) if len(tuples) else np.zeros(0, dtype=np.int64)
+        tracks, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        for s in range(tuples.shape[1]):
+            led = np.flatnonzero(lead == s)
+            track, which = self._near(s, tuples[led, s] - 1)
+            tracks.append(track)
+            found.append(led[which])
+        return np.concatenate(tracks), np.concatenate(found)
 
     @abstractmethod
-    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
-        """Tracks of these rows (M,), each corrected by a tuple, rows (M, S); `inside` counts only where `gated`."""
+    def _near(self, s: int, numbers: Array) -> tuple[Array, Array]:
+        """Tracks, and which of these measurements (from 0) of sensor s may be in their gates."""
+
+    @abstractmethod
+    def follow(self, track: Array, rows: Array) -> Corrected:
+        """Tracks of these rows (M,), each corrected by a tuple, rows (M, S)."""
 
     @abstractmethod
     def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
@@ -121,20 +131,14 @@ class _AtOnce(WholeScan):
         gain = np.append(-known.costs - scan.crowding(known.rows), scores)
         return track, np.concatenate([known.rows, rows]), gain
 
-    def near(self, tuples: Array) -> tuple[Array, Array]:
+    def _near(self, s: int, numbers: Array) -> tuple[Array, Array]:
         """By the gates of the predicted tracks."""
-        settings, tracks, found = self._progress.settings, [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        lead = np.argmax(tuples > 0, axis=1) if len(tuples) else np.zeros(0, dtype=np.int64)
-        for s, (z, sensor) in enumerate(zip(self._progress.scan.measurements, settings.sensors, strict=True)):
-            led = np.flatnonzero(lead == s)
-            expected = settings.filter.expected(self._tracks.states, sensor)
-            gate = gate_of(sensor, settings.gate_probability)
-            near = near_pairs(expected, z[tuples[led, s] - 1], periods_of(sensor), gate)
-            tracks.append(near[0])
-            found.append(led[near[1]])
-        return np.concatenate(tracks), np.concatenate(found)
+        settings, z = self._progress.settings, self._progress.scan.measurements[s]
+        expected = settings.filter.expected(self._tracks.states, settings.sensors[s])
+        gate = gate_of(settings.sensors[s], settings.gate_probability)
+        return near_pairs(expected, z[numbers], periods_of(settings.sensors[s]), gate)
 
-    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
+    def follow(self, track: Array, rows: Array) -> Corrected:
         """Sensor after sensor; inside by the distances of all measurements together."""
         settings, scan = self._progress.settings, self._progress.scan
         require_states(self._tracks.states, len(track))
@@ -142,20 +146,13 @@ class _AtOnce(WholeScan):
         states = self._tracks.states if whole else self._tracks.states[track]
         missed = self.missed if whole else self.missed[track]
         alone = missed.sum(axis=1)
+        states, log_likelihood, nis = corrected(settings.filter, states, scan.measurements, settings.sensors, rows)
         gain = alone - scan.crowding(rows)
-        nis, freedom = np.zeros(len(track)), np.zeros(len(track), dtype=np.int64)
-        for s, (z, sensor) in enumerate(zip(scan.measurements, settings.sensors, strict=True)):
-            seen, rest = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
-            if not len(seen):
-                continue
-            done = settings.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
-            gain[seen] += done.log_likelihood + settings.terms.detection[s] - missed[seen, s]
-            if gated:
-                nis[seen] += done.nis
-            freedom[seen] += sensor.dim
-            states = placed(len(track), [(rest, states[rest]), (seen, done.state)])
-        largest = int(sum(sensor.dim for sensor in settings.sensors))
-        inside = nis <= chi_square_quantiles(settings.gate_probability, largest)[freedom]
+        for s, detection in enumerate(settings.terms.detection):
+            gain += np.where(rows[:, s] > 0, log_likelihood[:, s] + detection - missed[:, s], 0.0)
+        dims = np.array([sensor.dim for sensor in settings.sensors])
+        freedom = (rows > 0) @ dims
+        inside = nis.sum(axis=1) <= chi_square_quantiles(settings.gate_probability, int(dims.sum()))[freedom]
         inside &= (gain > alone) | (freedom == 0)
         return Corrected(states, gain, np.where(freedom > 0, scan.time, np.nan), inside)
 
@@ -188,21 +185,15 @@ class _InOrder(WholeScan):
         good = np.flatnonzero((found.track >= 0) | (found.costs < 0))
         return found.track[good], found.rows[good], -found.costs[good]
 
-    def near(self, tuples: Array) -> tuple[Array, Array]:
+    def _near(self, s: int, numbers: Array) -> tuple[Array, Array]:
         """By the gates of the tracks at any time of the scan."""
-        tracks, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        lead = np.argmax(tuples > 0, axis=1) if len(tuples) else np.zeros(0, dtype=np.int64)
-        for s, z in enumerate(self._progress.scan.measurements):
-            led = np.flatnonzero(lead == s)
-            leads = np.full(len(z), -1)
-            leads[tuples[led, s] - 1] = led
-            track, measurement = self._timed.near(s)
-            there = leads[measurement] >= 0
-            tracks.append(track[there])
-            found.append(leads[measurement][there])
-        return np.concatenate(tracks), np.concatenate(found)
+        which = np.full(len(self._progress.scan.measurements[s]), -1)
+        which[numbers] = np.arange(len(numbers))
+        track, measurement = self._timed.near(s)
+        there = which[measurement] >= 0
+        return track[there], which[measurement][there]
 
-    def follow(self, track: Array, rows: Array, gated: bool = False) -> Corrected:
+    def follow(self, track: Array, rows: Array) -> Corrected:
         """From measurement to measurement, each within its gate."""
         timed, terms = self._timed, self._progress.settings.terms
         followed = timed.follow(track, rows)

@@ -29,7 +29,7 @@ class StaticFusion(Method):
         order = np.lexsort((which, track))
         track, which = track[order], which[order]
         rows = np.concatenate([fused, np.zeros((1, fused.shape[1]), dtype=np.int32)])[which]
-        after = scan.follow(track, rows, gated=True)
+        after = scan.follow(track, rows)
         good = np.flatnonzero(after.inside)
         value = doubted_gain(scores[track[good]], after.gain[good])
         columns = np.stack([track[good] + 1, which[good] + 1], axis=1)

@@ -83,17 +83,17 @@ def share(progress: Progress) -> Progress:
             continue
         sensor, z = progress.settings.sensors[s], progress.scan.measurements[s]
         clutter = math.log(sensor.false_alarm_rate / sensor.volume) + progress.scan.crowd(s, np.arange(len(z)))
-        told = explained(sensor, z, clutter, looks.of(near))
+        one, two, plots = explained(sensor, z, clutter, looks.of(near))
         learns = steady[pairs[near]]
         if declared.resolution is None and learns.any():
-            known = known.learnt(s, by_limit[near[learns]], told.one[learns], told.two[learns])
-        gain = np.log(np.maximum(P[near], 1e-300)) + told.one - np.log1p(-P[near]) - told.two
+            known = known.learnt(s, by_limit[near[learns]], one[learns], two[learns])
+        gain = np.log(np.maximum(P[near], 1e-300)) + one - np.log1p(-P[near]) - two
         for n in np.flatnonzero(gain > 0.0).tolist() if len(z) else ():
-            one = looks.of(near[[n]])
-            narrow, pull = narrowed(one.difference, one.covariance, limits, weights * by_limit[near[[n]]])
+            pair = looks.of(near[[n]])
+            narrow, pull = narrowed(pair.difference, pair.covariance, limits, weights * by_limit[near[[n]]])
             precision[pairs[near[n]], s, : limits.shape[1]] = narrow[0]
-            plot = int(told.plot[n])
-            offered = offers(sensor, z[plot], one, narrow[0], pull[0])
+            plot = int(plots[n])
+            offered = offers(sensor, z[plot], pair, narrow[0], pull[0])
             found.append((float(gain[n]), s, int(pairs[near[n]]), plot, offered))
     progress = progress.with_state(unresolved=known)._replace(shared=Shared(sure, probability))
     progress = _doubled(progress, sure, probability, found)
