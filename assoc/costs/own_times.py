@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.costs.positions import checked_tuples, positions_of_scan
 from assoc.costs.range_rates import checked_speed
 from assoc.costs.tracks.own_times import Places, TimedScan, grow_timed_tuples, score_costs
-from assoc.costs.tracks.scores import ScoreTerms
+from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.kalman import ExtendedKalmanFilter
 from assoc.filters.motion.models import ConstantVelocity
@@ -39,7 +39,7 @@ def timed_problem(
     A tuple has at least one measurement that determines a position: bearings alone are not compared over time.
     """
     timed = _timed_scan(scene, scan, gate_probability, speed)
-    terms = _terms(scene)
+    terms = score_terms(scene.sensors)
     found = grow_timed_tuples(timed, terms, timed.misses(terms), max_tuples)
     rows = found.rows[np.count_nonzero(found.rows, axis=1) > 1]
     costs = found.costs[np.count_nonzero(found.rows, axis=1) > 1] - _fusion(timed, rows)
@@ -52,7 +52,7 @@ def timed_costs(scene: Scene, scan: Scan, tuples: Array, speed: float | Sequence
     timed = _timed_scan(scene, scan, 1.0, speed)
     rows = _checked(timed, tuples)
     followed = timed.follow(np.full(len(rows), -1), rows)
-    terms = _terms(scene)
+    terms = score_terms(scene.sensors)
     misses = timed.misses(terms)[timed.anchors(rows, followed.lead)]
     costs = score_costs(timed, followed, rows, terms, misses) - _fusion(timed, rows)
     return np.where(np.count_nonzero(rows, axis=1) == 1, 0.0, costs)
@@ -121,13 +121,6 @@ def _fusion(timed: TimedScan, rows: Array) -> Array:
         seen = np.flatnonzero(rows[:, s])
         total[seen] += np.linalg.inv(covariances)[rows[seen, s] - 1]
     return np.asarray(0.5 * np.linalg.slogdet(total)[1])
-
-
-def _terms(scene: Scene) -> ScoreTerms:
-    P = np.array([sensor.detection_probability for sensor in scene.sensors])
-    density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in scene.sensors])
-    # births are in `Places`
-    return ScoreTerms(np.log(P / density), np.log1p(-P), np.zeros(len(P)))
 
 
 def _checked(timed: TimedScan, tuples: Array) -> Array:

@@ -32,16 +32,13 @@ BANDS = 10
 _TRIED = (9, 9, 5)
 
 
-def share_in_view(sensor: Sensor, positions: Array, covariances: Array | None, sector: Array | None = None) -> Array:
+def share_in_view(sensor: Sensor, positions: Array, covariances: Array | None) -> Array:
     """Probability (B,) that targets lie in a sensor's view; 0 or 1 where it is within 1e-6 of either.
 
     Each component of a measurement is taken as Gaussian, with the sensor's derivatives at the mean, and as independent
-    of the others. Positions (B, 3), metres, are exact without covariances (B, 3, 3). `sector` (2,), of a scan: its
-    first and last azimuth; see `assoc.Scene`.
+    of the others. Positions (B, 3), metres, are exact without covariances (B, 3, 3).
     """
     share = np.ones(len(positions))
-    if sector is not None and not sector[1] > sector[0]:
-        return np.zeros(len(positions))
     limits = sensor.position_part.limits
     if len(positions) and limits:
         mean = sensor.position_part.measure(positions)
@@ -51,14 +48,24 @@ def share_in_view(sensor: Sensor, positions: Array, covariances: Array | None, s
             spread = np.sqrt(((slope @ covariances) * slope).sum(axis=2))
         for axis, low, high in limits:
             share *= _within(mean[:, axis], spread[:, axis], (low, high), sensor.angular[axis])
-    if sector is not None and sector[1] - sector[0] < _FULL_TURN:
-        away = positions - sensor.position
-        across = np.zeros(len(positions))
-        if covariances is not None:
-            ground = np.maximum(away[:, 0] ** 2 + away[:, 1] ** 2, 1e-18)
-            slope = np.stack([-away[:, 1], away[:, 0]], axis=1) / ground[:, None]
-            across = np.sqrt(np.einsum("bi,bij,bj->b", slope, covariances[:, :2, :2], slope))
-        share *= _within(np.arctan2(away[:, 1], away[:, 0]), across, (float(sector[0]), float(sector[1])), True)
+    return _rounded(share)
+
+
+def share_in_sector(sensor: Sensor, positions: Array, covariances: Array, sector: Array) -> Array:
+    """The same of the sector (2,) that a sensor covered in a scan: first and last azimuth, see `assoc.Scene`; (B,)."""
+    if not sector[1] > sector[0]:
+        return np.zeros(len(positions))
+    if sector[1] - sector[0] >= _FULL_TURN:
+        return np.ones(len(positions))
+    away = positions - sensor.position
+    ground = np.maximum(away[:, 0] ** 2 + away[:, 1] ** 2, 1e-18)
+    slope = np.stack([-away[:, 1], away[:, 0]], axis=1) / ground[:, None]
+    across = np.sqrt(np.einsum("bi,bij,bj->b", slope, covariances[:, :2, :2], slope))
+    limits = float(sector[0]), float(sector[1])
+    return _rounded(_within(np.arctan2(away[:, 1], away[:, 0]), across, limits, True))
+
+
+def _rounded(share: Array) -> Array:
     share[share < _SURE] = 0.0
     share[share > 1.0 - _SURE] = 1.0
     return share
@@ -111,8 +118,11 @@ class Views:
         rows = zip(self._sensors, self._by_range, strict=True)
         self._bounds = np.stack([np.append(_bounds(sensor), [reach(sensor), *bands]) for sensor, bands in rows])
 
-    def shares(self, states: Any, sensors: slice = slice(None)) -> Array:
-        """`share_in_view` of B targets for these sensors, less in bands that detect less, (B, S)."""
+    def shares(self, states: Any, sensors: slice = slice(None), sectors: Array | None = None) -> Array:
+        """`share_in_view` of B targets for these sensors, less in bands that detect less, (B, S).
+
+        `sectors` (S, 2) are those that all sensors covered in a scan; None: whole turns.
+        """
         shares = self._looked(states, self._bounds[sensors], True)
         for column, sensor in self._users(sensors):
             shares[:, column] = share_in_view(sensor, *_places(states, self._axes))
@@ -120,6 +130,8 @@ class Views:
         for column, sensor in enumerate(self._sensors[sensors]):
             if getattr(sensor, "notch", 0.0) > 0.0:
                 shares[:, column] *= beside_notch(sensor, states, self._axes)
+            if sectors is not None:
+                shares[:, column] *= share_in_sector(sensor, *_places(states, self._axes), sectors[sensors][column])
         return shares
 
     def at_means(self, states: Any) -> Array:

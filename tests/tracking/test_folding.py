@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assoc.costs.views import Views
+from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.filters.state import gaussian
 from assoc.sensors import Radar3D
 from assoc.simulation.observation import observe
@@ -57,3 +58,19 @@ def test_misses_in_the_notch_say_nothing():
     # half a notch away from its edge by one standard deviation: the normal distribution's share
     edge = gaussian(np.array([[*at, 17.0, 0.0, 0.0]]), np.diag([1e-4] * 3 + [4.0] * 3)[None])
     assert Views([blind], (0, 1, 2)).shares(edge)[0, 0] == pytest.approx(0.8413, abs=1e-4)
+
+
+@pytest.mark.parametrize("sectors", [None, [[-0.5, 0.5]]])
+def test_a_track_in_the_notch_is_not_held_to_be_missed_at_one_instant_or_in_a_sector(sectors):
+    lost = []
+    for notch in (0.0, 15.0):
+        motion = ConstantVelocity(1.0, kind="continuous")
+        region = [[-3e4, 3e4], [-3e4, 3e4], [0.0, 1e4]]
+        tracker = MultiSensorTracker([replace(RADAR, notch=notch)], ExtendedKalmanFilter(motion), region=region)
+        tracker.begin(
+            0.0, gaussian(np.array([[1e4, 0.0, 0.0, 0.0, 150.0, 0.0]]), np.diag([100.0] * 3 + [4.0] * 3)[None])
+        )
+        before = tracker.tracks[0].score
+        tracker.step(1.0, [np.zeros((0, 4))], sectors=sectors)
+        lost.append(before - tracker.tracks[0].score)
+    assert lost[1] < 0.01 < 1.0 < lost[0]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc.costs.views import share_in_view
+from assoc.costs.views import share_in_sector, share_in_view
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.sensors import Radar3D
 from assoc.tracking import TRACKERS
@@ -57,7 +57,9 @@ def test_shares_are_those_of_samples(sector):
     positions = rng.uniform([4e3, -3e3, 1e3], [11e3, 1e3, 4e3], (40, 3))
     root = rng.normal(0.0, 200.0, (40, 3, 3))
     covariances = root @ root.transpose(0, 2, 1)
-    shares = share_in_view(sensor, positions, covariances, None if sector is None else np.array(sector))
+    shares = share_in_view(sensor, positions, covariances)
+    if sector is not None:
+        shares = shares * share_in_sector(sensor, positions, covariances, np.array(sector))
     for share, where, spread in zip(shares, positions, covariances, strict=True):
         z = sensor.measure(rng.multivariate_normal(where, spread, 4000))
         inside = sensor.in_view(z)

@@ -21,10 +21,11 @@ from assoc.costs.limits import refuse_of_tracks
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import TrackTuples, gate_of, require_states
-from assoc.costs.views import bands_of, log_missed, places_of, share_in_view
+from assoc.costs.views import Views, log_missed
 from assoc.filters.base import Expected, Filter
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.measurement import periods_of
+from assoc.filters.state import gaussian
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
 
@@ -192,18 +193,15 @@ class TimedScan:
 
     def misses(self, terms: ScoreTerms) -> Array:
         """Score of a miss of each track and each measurement's target (as anchors) by each sensor, (A, S)."""
-        known = places_of(self.filter, self.late)
-        points = np.concatenate([known[0], *self.places.positions])
-        spreads = np.concatenate([known[1], *self.places.covariances])
-        result = np.empty((len(points), len(self.sensors)))
-        for s, sensor in enumerate(self.sensors):
-            share = share_in_view(sensor, points, spreads, None if self.sectors is None else self.sectors[s])
-            if terms.by_range is not None:
-                share = share * terms.by_range[s, bands_of(sensor, points)]
+        begun = gaussian(np.concatenate(self.places.positions), np.concatenate(self.places.covariances))
+        kinds = (self.late, self.filter.motion.position), (begun, range(3))
+        shares = np.concatenate(
+            [Views(self.sensors, axes, terms.by_range).shares(states, sectors=self.sectors) for states, axes in kinds]
+        )
+        for s in range(len(self.sensors)):
             # a sensor covers its own measurements, in spite of rounding
-            share[self.offsets[s] : self.offsets[s + 1]] = 1.0
-            result[:, s] = log_missed(terms.miss[s], share)
-        return result
+            shares[self.offsets[s] : self.offsets[s + 1], s] = 1.0
+        return log_missed(terms.miss, shares)
 
     def anchors(self, rows: Array, lead: Array) -> Array:
         """The measurement, as anchor, with which each new target began, (M,)."""
