@@ -12,7 +12,7 @@ from assoc._parameters import values_of
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import TOLERANCE
-from assoc.packing.kernels.matching import ProvedMatching, match_proved
+from assoc.packing.kernels.matching import Matching, match
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
@@ -70,7 +70,7 @@ def _of_matrix(matrix: Floats) -> _Answer | None:
     costs = np.ascontiguousarray(matrix.T) if upright else matrix
     n, m = costs.shape
     indptr, indices = np.arange(0, n * m + 1, m, dtype=np.int64), np.tile(np.arange(m, dtype=np.int64), n)
-    found = match_proved(indptr, indices, costs.reshape(-1), *_slacks(n, m))
+    found = match(indptr, indices, costs.reshape(-1), *_slacks(n, m))
     if found is None:
         return None
     edges = found.row_edge
@@ -84,7 +84,7 @@ def _of_tuples(problem: AssignmentProblem) -> _Answer | None:
     indptr, indices, costs, place, single = _edges(problem.tuples, problem.costs, n, m, int(upright))
     alone = problem.costs[single]
     row_slack, column_slack = (alone[:n].copy(), alone[n:].copy()) if problem.dummy else _slacks(n, m)
-    found = match_proved(indptr, indices, costs, row_slack, column_slack)
+    found = match(indptr, indices, costs, row_slack, column_slack)
     if found is None:
         return None
     matched = np.flatnonzero(found.row_edge >= 0)
@@ -105,14 +105,14 @@ def _slacks(n: int, m: int) -> tuple[Floats, Floats]:
     return np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
 
 
-def _duals(found: ProvedMatching, upright: bool) -> tuple[Floats, Floats]:
+def _duals(found: Matching, upright: bool) -> tuple[Floats, Floats]:
     u, v = found.row_duals, found.column_duals
     return (v, u) if upright else (u, v)
 
 
 @njit
 def _edges(tuples: NDArray[np.int32], costs: Floats, n: int, m: int, side: int) -> Any:
-    """Pairs as edges of `match_proved`, their places among the tuples, and the cheapest singletons (n + m,), -1: none.
+    """Pairs as edges of `match`, their places among the tuples, and the cheapest singletons (n + m,), -1: none.
 
     Rows are the list `side`, of n measurements, columns the other one, of m.
     """

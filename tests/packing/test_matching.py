@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 import assoc
-from assoc.errors import InfeasibleError
 from assoc.packing.kernels.matching import match
 
 
@@ -35,8 +34,7 @@ def _check(matrix, keep, row_slack, column_slack):
     indptr, indices, costs = _sparse(matrix, keep)
     expected = _expected(matrix, keep, row_slack, column_slack)
     if expected is None:
-        with pytest.raises(InfeasibleError):
-            match(indptr, indices, costs, row_slack, column_slack)
+        assert match(indptr, indices, costs, row_slack, column_slack) is None
         return False
     found = match(indptr, indices, costs, row_slack, column_slack)
     assert found.cost == pytest.approx(expected, abs=1e-8)

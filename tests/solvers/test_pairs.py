@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 import assoc
 from assoc import AssignmentProblem, assign
-from assoc.packing.kernels.matching import match_proved
+from assoc.packing.kernels.matching import match
 
 KINDS = ("uniform", "negative", "ties", "whole numbers", "products", "all equal")
 SHAPES = [(1, 1), (1, 7), (7, 1), (2, 2), (12, 12), (12, 17), (17, 12), (60, 60), (60, 45), (240, 240)]
@@ -31,7 +31,7 @@ def listed(matrix):
 
 
 def edges(matrix):
-    """All pairs as edges of `match_proved`, and slacks with which all rows are matched."""
+    """All pairs as edges of `match`, and slacks with which all rows are matched."""
     n, m = matrix.shape
     slacks = np.full(n, np.inf), np.full(m, np.inf if n == m else 0.0)
     return np.arange(0, n * m + 1, m), np.tile(np.arange(m), n), matrix.ravel(), *slacks
@@ -66,7 +66,7 @@ def test_the_optimum_with_its_proof(kind, shape):
 def test_the_bound_holds_in_exact_arithmetic(seed, shape, decades):
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=shape) * 10.0 ** rng.uniform(0.0, decades, shape)
-    found = match_proved(*edges(matrix))
+    found = match(*edges(matrix))
     prices = [Fraction(price) for price in found.column_duals.tolist()]
     assert shape[0] == shape[1] or max(prices) <= 0
     rows = [min(Fraction(cost) - price for cost, price in zip(row, prices, strict=True)) for row in matrix.tolist()]
@@ -82,7 +82,7 @@ def test_what_rounding_leaves_open_is_solved_from_the_tuples():
     problem = AssignmentProblem.from_dense(matrix, dummy=False)
     solution = assign(problem)
     assert solution.cost == 0.0 and solution.gap < 1e-6
-    assert match_proved(*edges(matrix)).bound < -0.1 and problem._listed is not None
+    assert match(*edges(matrix)).bound < -0.1 and problem._listed is not None
 
 
 @pytest.mark.parametrize("solver", ["greedy", "lagrangian", "milp"])

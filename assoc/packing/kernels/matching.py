@@ -28,7 +28,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats, Ints
-from assoc.errors import InfeasibleError
 from assoc.packing.kernels.auction import hold_auction, reduce_rows, solve_core
 from assoc.packing.kernels.augmenting import augment_all, augment_dense
 from assoc.packing.kernels.partial_matching import Costs, State
@@ -56,64 +55,32 @@ class Matching(NamedTuple):
     """v of it, (m,)."""
     cost: float
     """Total cost, including that of unmatched rows and columns."""
+    bound: float
+    """No matching costs less, whatever was rounded."""
 
 
 def match(
     indptr: ArrayLike, indices: ArrayLike, costs: ArrayLike, row_slack: ArrayLike, column_slack: ArrayLike
-) -> Matching:
-    """Solve a sparse two-dimensional assignment; InfeasibleError if a row or column that must be matched cannot be.
+) -> Matching | None:
+    """Solve a sparse two-dimensional assignment; None if a row or column that must be matched cannot be.
 
     Row i has edges ``indptr[i]:indptr[i+1]``, with columns ``indices`` (E,) and costs (E,) of any sign; parallel edges
     are allowed, and ``inf`` forbids one. ``row_slack`` (n,) and ``column_slack`` (m,) are the costs of leaving one
     unmatched; ``inf`` where it must be matched.
     """
-    edge_costs = np.ascontiguousarray(costs, dtype=np.float64)
-    rows = np.ascontiguousarray(row_slack, dtype=np.float64)
-    columns = np.ascontiguousarray(column_slack, dtype=np.float64)
-    row_edge = np.empty(rows.size, np.int64)
-    u, v = np.empty(rows.size), np.empty(columns.size)
-    cost = match_sparse(
-        np.ascontiguousarray(indptr, dtype=np.int64),
-        np.ascontiguousarray(indices, dtype=np.int64),
-        edge_costs,
-        rows,
-        columns,
-        row_edge,
-        u,
-        v,
-    )
+    pointer, ends = (np.ascontiguousarray(numbers, dtype=np.int64) for numbers in (indptr, indices))
+    edge_costs, rows, columns = (np.ascontiguousarray(c, dtype=np.float64) for c in (costs, row_slack, column_slack))
+    row_edge, u, v = np.empty(rows.size, np.int64), np.empty(rows.size), np.empty(columns.size)
+    cost = match_sparse(pointer, ends, edge_costs, rows, columns, row_edge, u, v)
     if cost == np.inf:
-        raise InfeasibleError("not every row and column that must be matched can be")
-    return Matching(row_edge, u, v, float(cost))
-
-
-class ProvedMatching(NamedTuple):
-    """A matching, and what proves it."""
-
-    row_edge: NDArray[np.int64]
-    """The chosen edge of each row, or -1, (n,)."""
-    row_duals: Floats
-    """u of the module's dual problem, (n,)."""
-    column_duals: Floats
-    """v of it, (m,)."""
-    bound: float
-    """No matching costs less, whatever was rounded."""
-
-
-def match_proved(
-    indptr: Ints, indices: Ints, costs: Floats, row_slack: Floats, column_slack: Floats
-) -> ProvedMatching | None:
-    """Solve as `match`, of writable arrays, with a bound that holds; None if there is no matching."""
-    row_edge, u, v = np.empty(row_slack.size, np.int64), np.empty(row_slack.size), np.empty(column_slack.size)
-    if match_sparse(indptr, indices, costs, row_slack, column_slack, row_edge, u, v) == np.inf:
         return None
-    v = np.minimum(v, column_slack)
+    v = np.minimum(v, columns)
     # what was updated in place proves nothing: u anew, by v
-    _least_reduced(indptr, indices, costs, v, row_slack, u)
+    _least_reduced(pointer, ends, edge_costs, v, rows, u)
     bound = math.fsum([*u.tolist(), *v.tolist()])
     # each difference and the sum are rounded once; rounding keeps the order of differences
     bound -= sys.float_info.epsilon * (float(np.abs(u).sum()) + 2.0 * abs(bound))
-    return ProvedMatching(row_edge, u, v, bound)
+    return Matching(row_edge, u, v, float(cost), bound)
 
 
 @njit

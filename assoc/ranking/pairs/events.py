@@ -154,5 +154,6 @@ def reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats,
     edge = graph.edge[: graph.ptr[rows]]
     costs = np.where(kept, -log_weight, np.inf)
     best = match(graph.ptr[: rows + 1], graph.ends[edge, 1] - rows, costs[edge], -log_free[:rows], -log_free[rows:])
+    assert best is not None
     dual = np.concatenate([best.row_duals, best.column_duals])
     return np.exp(dual[graph.ends].sum(axis=1) - costs), np.exp(dual + log_free)
