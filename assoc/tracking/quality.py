@@ -43,13 +43,13 @@ class TrackQuality(NamedTuple):
         Mean NIS by components, at most 1 if all is as declared; NaN before the second detection.
     consistent : bool
         Whether the NIS is not far above its mean.
-    hits : int64 array (S,)
+    hits : tuple of S int
         Measurements of each sensor that were the track's, by the decisions at the time.
     """
 
     nis: float
     consistent: bool
-    hits: Array
+    hits: tuple[int, ...]
 
 
 class Qualities:
@@ -79,7 +79,7 @@ class Qualities:
     def of_track(self, track_id: int) -> TrackQuality:
         """Quality of a track, also of one that has ended."""
         nis, consistent, hits = self.of(np.array([track_id]))
-        return TrackQuality(float(nis[0]), bool(consistent[0]), hits[0])
+        return TrackQuality(float(nis[0]), bool(consistent[0]), tuple(hits[0].tolist()))
 
     def _rows(self, ids: Array) -> Array:
         """Rows of tracks (n,), which need not be known."""

@@ -18,7 +18,8 @@ from assoc.scene import Scene
 from assoc.sensors import PositionSensor, Radar2D
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
-from assoc.tracking.live.pictures import Agreement, SensorState
+from assoc.tracking.live.pictures import SensorState
+from assoc.tracking.quality import TrackQuality
 from tests.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
@@ -46,7 +47,7 @@ HEARD = [
 def with_doubts(picture):
     """The picture with a track that is coasting, and one that does not agree with its measurements."""
     first, *rest = picture.tracks
-    worse = {rest[0].track_id: Agreement(3.25, False, (9, 4, 0))}
+    worse = {rest[0].track_id: TrackQuality(3.25, False, (9, 4, 0))}
     return picture._replace(tracks=[replace(first, missed=1), *rest], agreements=picture.agreements | worse)
 
 

@@ -70,4 +70,4 @@ def test_nis_is_that_of_the_prediction_also_at_times_of_its_own():
     off = z[0][0] - there[:3]
     expected = off @ np.linalg.solve(spread[:3, :3] + sensor.covariance, off) / 3
     assert qualities.of_track(1).nis == pytest.approx(expected)
-    assert qualities.of_track(1).hits.tolist() == [1]
+    assert qualities.of_track(1).hits == (1,)

@@ -28,7 +28,8 @@ from assoc.sensors import PositionSensor, Sensor
 
 if TYPE_CHECKING:
     from assoc.tracking import Picture, Track
-    from assoc.tracking.live.pictures import Agreement, SensorState
+    from assoc.tracking.live.pictures import SensorState
+    from assoc.tracking.quality import TrackQuality
 
 _FOLDER = Path(__file__).parent
 _FILES = {
@@ -148,7 +149,7 @@ class LivePage:
         }
         self._push(_event("picture", content | {"ended": picture.ended}))
 
-    def _row(self, track: Track, agreement: Agreement | None, heard: Sequence[SensorState]) -> list[Any]:
+    def _row(self, track: Track, agreement: TrackQuality | None, heard: Sequence[SensorState]) -> list[Any]:
         """Id, x, y, height, vx, vy, hits, start, status, quality; with an origin latitude and longitude, too.
 
         Quality: NIS (or null), whether it is as expected, and the measurements of each sensor in `heard`; or null.

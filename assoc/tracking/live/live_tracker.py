@@ -25,9 +25,9 @@ from assoc.tracking.live import state_file
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
 from assoc.tracking.live.own_positions import OwnPositions
-from assoc.tracking.live.pictures import Agreement, Antenna, CheckedPlot, Picture, SensorState
+from assoc.tracking.live.pictures import Antenna, CheckedPlot, Picture, SensorState
 from assoc.tracking.live.state import LiveSettings, LiveState
-from assoc.tracking.quality import Qualities
+from assoc.tracking.quality import Qualities, TrackQuality
 from assoc.tracking.records.identity_evidence import checked_identities
 from assoc.tracking.records.track import Step, Track
 from assoc.tracking.stages.checking import checked
@@ -404,7 +404,7 @@ class LiveTracker:
         names = {number: name for number in ids if (name := self._kept.name_of(number))}
         return Picture(end, tracks, ended, np.concatenate(found), owner, agreements, names)
 
-    def _agreements(self, step: Step | None, tracks: Sequence[Track]) -> dict[int, Agreement]:
+    def _agreements(self, step: Step | None, tracks: Sequence[Track]) -> dict[int, TrackQuality]:
         """How well the tracks agree with their measurements after a step, None if it failed."""
         if not self.settings.quality:
             return {}
@@ -416,8 +416,7 @@ class LiveTracker:
             on_time = replace(step, assigned=last.assigned)
             self._qualities.compare(late.tracker, last.before, on_time, last.measurements, last.times, late.names)
         self._qualities.keep(track.track_id for track in late.tracks)
-        known = {track.track_id: self._qualities.of_track(track.track_id) for track in tracks}
-        return {number: Agreement(q.nis, q.consistent, tuple(q.hits.tolist())) for number, q in known.items()}
+        return {track.track_id: self._qualities.of_track(track.track_id) for track in tracks}
 
     def summary(self) -> str:
         """One line: plots, steps and their times, plots left out, and how many tracks kept one identity."""

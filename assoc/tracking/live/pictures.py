@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from assoc._types import Array
 from assoc.scene.own_times import FULL_TURN
+from assoc.tracking.quality import TrackQuality
 from assoc.tracking.records.track import Track
 
 SILENCE = 15.0
@@ -37,15 +38,6 @@ class CheckedPlot(NamedTuple):
         return self.sensor, self.time, self.z.tobytes()
 
 
-class Agreement(NamedTuple):
-    """How well a track agrees with its measurements; see `assoc.tracking.quality`."""
-
-    nis: float
-    consistent: bool
-    hits: tuple[int, ...]
-    """Measurements of each sensor that it took."""
-
-
 class Picture(NamedTuple):
     """The situation at the end of a step."""
 
@@ -59,7 +51,7 @@ class Picture(NamedTuple):
     """Positions of the plots that came in since the last step, (n, 3), metres."""
     sensors: Array
     """Sensor of each plot, (n,)."""
-    agreements: Mapping[int, Agreement] = MappingProxyType({})
+    agreements: Mapping[int, TrackQuality] = MappingProxyType({})
     """By track id, if the tracker was made with `quality`."""
     names: Mapping[int, str] = MappingProxyType({})
     """Codes or addresses by track id, of those that have one."""

@@ -72,15 +72,6 @@ class IdentityParameters(Parameters):
         self._probability("code_garbled", "code_shared", "address_garbled", "address_shared")
 
 
-class Evidence(NamedTuple):
-    """Evidence of identities about K pairs of a track and a plot."""
-
-    log_ratio: Array
-    """Log likelihood ratio of "the plot is of the track" and "of something else", (K,); finite."""
-    possible: Array
-    """False where addresses rule the pair out, bool (K,)."""
-
-
 class Identities(NamedTuple):
     """Identities of the last plots of tracks."""
 
@@ -90,14 +81,18 @@ class Identities(NamedTuple):
     last: Array = np.zeros((0, MEMORY, 2), dtype=np.int64)
     """Code and address of each track's last plots, the newest first; 0 unknown; (K, MEMORY, 2)."""
 
-    def evidence(self, track_id: Array, identities: Array) -> Evidence:
-        """Weigh pairs of a track id (K,) and a plot's code and address (K, 2)."""
+    def evidence(self, track_id: Array, identities: Array) -> tuple[Array, Array]:
+        """Weigh pairs of a track id (K,) and a plot's code and address (K, 2).
+
+        Returns the log likelihood ratio of "the plot is of the track" and "of something else", (K,), finite; and bool
+        (K,), False where addresses rule the pair out.
+        """
         last = self._of(track_id)
         p = self.parameters
         code, _ = log_ratio(last[:, :, 0], identities[:, 0], CODES, p.code_garbled, p.code_shared)
         address, likeliest = log_ratio(last[:, :, 1], identities[:, 1], ADDRESSES, p.address_garbled, p.address_shared)
         both = (identities[:, 1] != UNKNOWN) & (likeliest != UNKNOWN)
-        return Evidence(np.where(both, address, code), ~both | (likeliest == identities[:, 1]))
+        return np.where(both, address, code), ~both | (likeliest == identities[:, 1])
 
     def after(self, taken: Sequence[Array], identities: Sequence[Array], living: Array) -> Identities:
         """Add plots and their tracks (0: none), by sensor; tracks that are not in `living` are forgotten."""
