@@ -64,17 +64,18 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
             assert status != OPTIMAL
             continue
         solvable += 1
-        assert (rest.columns == np.flatnonzero(open_columns)).all()
-        assert not covered[rest.rows[rest.rows < packing.num_rows]].any()
-        smaller += rest.rows.size < program.sides.size
-        all_of_it = all_allowed(rest.program, rest.slack)
-        begin = basis_of(rest.program, all_of_it, rest.variable, rest.duals)
-        status, exchanges = solve_dual(rest.program, all_of_it, begin, effort)
+        root, there, rows = rest
+        assert (there == np.flatnonzero(open_columns)).all()
+        assert not covered[rows[rows < packing.num_rows]].any()
+        smaller += rows.size < program.sides.size
+        all_of_it = all_allowed(root.program, root.slack)
+        begin = basis_of(root.program, all_of_it, root.variable, root.duals)
+        status, exchanges = solve_dual(root.program, all_of_it, begin, effort)
         assert status == OPTIMAL and exchanges == 0
-        assert bound_of(rest.program, begin) + program.weights[fixed].sum() == pytest.approx(least, abs=1e-8)
+        assert bound_of(root.program, begin) + program.weights[fixed].sum() == pytest.approx(least, abs=1e-8)
         # cuts that still bind, partly used by fixed columns
-        cut = rest.rows >= packing.num_rows
-        part_taken = rest.program.sides[cut] < program.sides[rest.rows[cut]]
+        cut = rows >= packing.num_rows
+        part_taken = root.program.sides[cut] < program.sides[rows[cut]]
         taken += int((part_taken & (begin.duals[cut] < -1e-6)).sum())
     assert solvable > 8 and smaller == solvable and (taken > 0 or cuts is with_random_cuts)
 
@@ -108,11 +109,11 @@ def test_nothing_left_is_a_program_without_rows():
         program = program_with_cuts(packing, np.random.default_rng(0))
         basis, allowed = solved(packing, program)
         none = np.zeros(0, dtype=np.int64)
-        rest = remainder_of(program, basis, none, none, np.ones_like(allowed.slack))
-        assert rest.program.sides.size == rest.variable.size == rest.rows.size == 0
+        root, _, rows = remainder_of(program, basis, none, none, np.ones_like(allowed.slack))
+        assert root.program.sides.size == root.variable.size == rows.size == 0
         # rows that must be covered stay, although no column can cover them
-        rest = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
-        assert rest.rows.size == program.sides.size and rest.variable.size == rest.rows.size
+        root, _, rows = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
+        assert rows.size == program.sides.size and root.variable.size == rows.size
 
 
 def test_where_no_variable_of_a_basis_is_left_it_begins_with_anchors():
@@ -121,6 +122,7 @@ def test_where_no_variable_of_a_basis_is_left_it_begins_with_anchors():
         basis, allowed = solved(packing, program)
         # the first column at every position, and it is not in the remainder
         alone = basis._replace(variable=np.zeros_like(basis.variable))
-        rest = remainder_of(program, alone, np.zeros(0, np.int64), np.arange(1, packing.num_columns), allowed.slack)
-        begin = basis_of(rest.program, all_allowed(rest.program, rest.slack), rest.variable, rest.duals)
-        assert (begin.variable >= rest.columns.size + rest.rows.size).all()
+        left = np.arange(1, packing.num_columns)
+        root, columns, rows = remainder_of(program, alone, np.zeros(0, np.int64), left, allowed.slack)
+        begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
+        assert (begin.variable >= columns.size + rows.size).all()

@@ -78,7 +78,7 @@ def test_it_searches_what_is_left_alone():
         part = part_of(packing, rng, 0.9, 2)
         linear.solve(columns=part.columns, slack=part.slack)
         rest = remainder_within(packing, linear, part)
-        arrays, program = arrays_within(packing, rest), rest.program
+        arrays, program = arrays_within(packing, rest), rest[0].program
         covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
         assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
         assert arrays.slack.size == program.sides.size <= packing.num_rows - covered

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
-from assoc.tracking.mht.children import FALSE, NEW, Meanings, Parents, best_children
+from assoc.tracking.mht.children import FALSE, NEW, Meanings, best_children
 from assoc.tracking.mht.clusters import cluster, merged, parts, without
 from tests.sizes import few_or_all
 from tests.tracking import plain
@@ -167,23 +167,23 @@ def test_the_best_children_of_several_parents(drop, problems):
         first = np.append(0, near.sum(axis=1).cumsum())
         birth = np.where(rng.random(count) < 0.2, -np.inf, rng.normal(-1, 1, count))
         meanings = Meanings(first, track, rng.normal(2, 4, len(track)), birth)
-        before = Parents(rng.random((parents, tracks)) < 0.7, rng.normal(0, 3, parents))
+        holds, before = rng.random((parents, tracks)) < 0.7, rng.normal(0, 3, parents)
         expected = []
         for h in range(parents):
             ways = [
                 [(FALSE, 0.0), (NEW, birth[j])]
-                + [(k, meanings.gain[k]) for k in range(first[j], first[j + 1]) if before.holds[h, track[k]]]
+                + [(k, meanings.gain[k]) for k in range(first[j], first[j + 1]) if holds[h, track[k]]]
                 for j in range(count)
             ]
             for way in itertools.product(*ways):
                 taken = [track[k] for k, _ in way if k >= 0]
-                value = before.weight[h] + sum(gain for _, gain in way)
+                value = before[h] + sum(gain for _, gain in way)
                 if len(taken) == len(set(taken)) and value > -np.inf:
                     expected.append((value, h, tuple(k for k, _ in way)))
         expected.sort(reverse=True)
         most = int(rng.integers(1, 60))
         expected = [one for one in expected if one[0] >= expected[0][0] - drop][:most]
-        parent, choice, weight = best_children(before, meanings, most, drop)
+        parent, choice, weight = best_children(holds, before, meanings, most, drop)
         np.testing.assert_allclose(weight, [one[0] for one in expected], atol=1e-9)
         assert list(zip(parent.tolist(), map(tuple, choice.tolist()), strict=True)) == [one[1:] for one in expected]
 

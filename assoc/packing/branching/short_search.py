@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import wait_for_kernels
-from assoc._types import Floats
 from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.node import new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
@@ -38,19 +37,11 @@ class Subproblem(NamedTuple):
     """Columns that must be used; ``columns`` has no other column that shares a row with them."""
 
 
-class Remainder(NamedTuple):
-    """The remainder of a program; n columns, m rows."""
+Remainder = tuple[Root, NDArray[np.int64], NDArray[np.int64]]
+"""The remainder of a program, and the indices of its columns, ascending, and rows in the whole program.
 
-    program: Program
-    slack: NDArray[np.bool_]
-    """Whether a row may stay uncovered, (m,)."""
-    columns: NDArray[np.int64]
-    """Indices in the whole program, ascending, (n,)."""
-    rows: NDArray[np.int64]
-    """The same of the rows, (m,)."""
-    variable: NDArray[np.int32]
-    """A basis, (m,), and its multipliers. Where a variable is repeated the basis has an anchor."""
-    duals: Floats
+Where a variable of its basis is repeated the basis has an anchor.
+"""
 
 
 def short_memory(packing: Packing, rows: float) -> float:
@@ -70,12 +61,11 @@ def search_shortly(
     rest = remainder_within(packing, linear, part)
     if rest is None:
         return nothing, True
-    work = new_work(arrays_within(packing, rest), rest.program, rest.slack)
-    no_sets = np.zeros((0, packing.num_rows), dtype=np.bool_)
-    nodes = OpenNodes(Root(rest.program, rest.slack, rest.variable, rest.duals, no_sets))
+    root, columns, _ = rest
+    work = new_work(arrays_within(packing, rest), root.program, root.slack)
     below = cutoff - float(packing.weights[part.fixed].sum())
-    left, _, count, _ = search_depth_first(work, nodes.arrays, 1, below, limits)
-    found = nothing if count < 0 else np.concatenate([part.fixed, rest.columns[work.found[:count]]])
+    left, _, count, _ = search_depth_first(work, OpenNodes(root).arrays, 1, below, limits)
+    found = nothing if count < 0 else np.concatenate([part.fixed, columns[work.found[:count]]])
     return found, left == 0
 
 
@@ -90,11 +80,12 @@ def remainder_within(packing: Packing, linear: LinearProgram, part: Subproblem) 
 
 def arrays_within(packing: Packing, rest: Remainder) -> PackingArrays:
     """The remaining columns of a packing over the remaining rows, as branch and bound takes them."""
-    rows = rest.rows[rest.rows < packing.num_rows]
+    root, columns, rows = rest
+    rows = rows[rows < packing.num_rows]
     index = np.full(packing.num_rows + 1, -1, dtype=np.int32)
     index[rows] = np.arange(rows.size)
     return packing.arrays._replace(
-        cols=index[packing.cols[rest.columns]], weights=packing.weights[rest.columns], slack=rest.slack[: rows.size]
+        cols=index[packing.cols[columns]], weights=packing.weights[columns], slack=root.slack[: rows.size]
     )
 
 
@@ -118,7 +109,8 @@ def remainder_of(
     start = np.concatenate([[0], np.cumsum(counts)])
     rest = Program(program.weights[columns], start, row_index[entries], sides[rows], program.width)
     variable = _variables(program, basis.variable, columns, row_index, rows.size)
-    return Remainder(rest, slack[rows], columns, rows, variable, basis.duals[rows])
+    no_sets = np.zeros((0, sides.size), dtype=np.bool_)
+    return Root(rest, slack[rows], variable, basis.duals[rows], no_sets), columns, rows
 
 
 def _entries(program: Program, columns: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -29,15 +29,6 @@ NEW, FALSE = -1, -2
 """Choices of a measurement besides the pairs."""
 
 
-class Parents(NamedTuple):
-    """Hypotheses before the measurements of a sensor."""
-
-    holds: Array
-    """Which tracks each contains, bool (H, T)."""
-    weight: Array
-    """Log-probability of each if all its tracks are missed and all measurements are false alarms, (H,)."""
-
-
 class Meanings(NamedTuple):
     """Possible choices of n measurements."""
 
@@ -99,7 +90,7 @@ def next_hypotheses(
         for b in range(tracks):
             if holds[h, b]:
                 alone[h] += missed[b]
-    parent, choice, after = best_children(Parents(holds, alone), meanings, most, drop)
+    parent, choice, after = best_children(holds, alone, meanings, most, drop)
     held = np.zeros((parent.size, tracks + pairs + meanings.birth.size), np.bool_)
     for c in range(parent.size):
         copy_to(held[c, :tracks], holds[parent[c]])
@@ -122,13 +113,13 @@ def next_hypotheses(
 
 
 @inner_njit
-def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
+def best_children(holds: NDArray[np.bool_], weight: Floats, meanings: Meanings, most: int, drop: float) -> Any:
     """Rank the children of all parents: parent (C,), choice (C, n) and weight (C,), the largest first.
 
-    The choice is the pair of each measurement, or `NEW`, or `FALSE`; weights are log-probabilities. There are `most`
-    children; those `drop` below the best are left out.
+    `holds` (H, T) says which tracks each parent contains; `weight` (H,) is its log-probability if all its tracks are
+    missed and all measurements are false alarms. The choice is the pair of each measurement, or `NEW`, or `FALSE`;
+    weights are log-probabilities. There are `most` children; those `drop` below the best are left out.
     """
-    holds, weight = parents
     count, room = meanings.birth.size, weight.size + 64
     nodes = _Nodes(
         np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
@@ -139,7 +130,7 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
     made, waiting = 0, 0
     for h in range(weight.size):
         nodes.parent[made], nodes.above[made], nodes.turn[made] = h, -1, 0
-        push(key, item, waiting, _bound(parents, meanings, h), made)
+        push(key, item, waiting, _bound(holds, weight, meanings, h), made)
         made, waiting = made + 1, waiting + 1
     found = np.empty(min(most, 64), np.int64)
     size, limit = 0, np.inf
@@ -148,7 +139,7 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
         waiting -= 1
         pop(key, item, waiting)
         if nodes.cost[node] == np.inf:
-            _solve(parents, meanings, nodes, work, node)
+            _solve(holds, weight, meanings, nodes, work, node)
             if nodes.cost[node] < np.inf:
                 push(key, item, waiting, nodes.cost[node], node)
                 waiting += 1
@@ -186,26 +177,26 @@ def _room(tracks: int, count: int, pairs: int) -> Any:
 
 
 @inner_njit
-def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
+def _bound(holds: NDArray[np.bool_], weight: Floats, meanings: Meanings, h: int) -> float:
     """Lower bound on the cost of a parent's best child: each measurement takes its best choice."""
-    cost = -parents.weight[h]
+    cost = -weight[h]
     for j in range(meanings.birth.size):
         most = max(0.0, meanings.birth[j])
         for k in range(meanings.first[j], meanings.first[j + 1]):
-            if parents.holds[h, meanings.track[k]]:
+            if holds[h, meanings.track[k]]:
                 most = max(most, meanings.gain[k])
         cost -= most
     return cost
 
 
 @inner_njit
-def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
+def _solve(holds: NDArray[np.bool_], weight: Floats, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
     """Find the best child of a node, and lower bounds on the cost of changing it; infinite where there is none."""
     first, track, gain, birth = meanings
     above, turn = nodes.above[node], nodes.turn[node]
     choice, h = nodes.choice[node], nodes.parent[node]
     count, tracks = birth.size, work.taken.size
-    cost = -parents.weight[h]
+    cost = -weight[h]
     work.taken[:] = False
     for j in range(turn):
         chosen = nodes.choice[above, j]
@@ -222,7 +213,7 @@ def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, nod
             work.columns[edges], work.costs[edges], work.choice[edges] = tracks + j, -birth[j], NEW
             edges += 1
         for k in range(first[j], first[j + 1]):
-            if parents.holds[h, track[k]] and not work.taken[track[k]]:
+            if holds[h, track[k]] and not work.taken[track[k]]:
                 work.columns[edges], work.costs[edges], work.choice[edges] = track[k], -gain[k], k
                 edges += 1
         if j == turn:
