@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from statistics import median
 
 from assoc._files.output import write_text
 
 HIT = 1e-6
+PROVING_PEERS = ("cp_sat", "cp_sat_1", "highs", "scip", "scip_1")
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,54 @@ class Row:
     def hit(self) -> bool:
         """Whether the cost is the reference, to 1e-6 relative."""
         return self.excess <= HIT
+
+
+class Results:
+    """Rows with the look-ups that tables need."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self.rows = list(rows)
+
+    def of(self, family: str, size: str | None = None, solver: str | None = None) -> list[Row]:
+        """Return the rows of a family, a size and a solver."""
+        return [
+            row
+            for row in self.rows
+            if row.family == family and (size is None or row.size == size) and (solver is None or row.solver == solver)
+        ]
+
+    def sizes(self, family: str) -> list[str]:
+        """Return the sizes measured, in order."""
+        return list(dict.fromkeys(row.size for row in self.of(family)))
+
+    def fastest_peer(self, row: Row) -> float:
+        """Return the least time in which a peer proved the optimum of the row's instance."""
+        times = [
+            other.taken
+            for other in self.of(row.family, row.size)
+            if (other.seed, other.item) == (row.seed, row.item)
+            and other.solver in PROVING_PEERS
+            and other.status == "optimal"
+        ]
+        return min(times, default=math.inf)
+
+    def fastest_proof(self, family: str, size: str) -> tuple[float, str] | None:
+        """Return the median time of the fastest peer that proved every instance, and its name; None: none did."""
+        runs: dict[tuple[str, float], list[Row]] = {}
+        for row in self.of(family, size):
+            if row.solver in PROVING_PEERS:
+                runs.setdefault((row.solver, row.limit), []).append(row)
+        times = [
+            (median(row.taken for row in rows), peer)
+            for (peer, _), rows in runs.items()
+            if all(row.status == "optimal" for row in rows)
+        ]
+        return min(times, default=None)
+
+    def best_peers(self, family: str, size: str, within: float) -> list[Row]:
+        """Return, for each instance, the row of a peer with the least cost, of those given so many seconds or less."""
+        rows = [row for row in self.of(family, size) if row.peer and row.limit <= within]
+        return list({(row.seed, row.item): row for row in sorted(rows, key=lambda row: -row.cost)}.values())
 
 
 def with_common_reference(rows: list[Row]) -> list[Row]:

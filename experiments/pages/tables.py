@@ -13,7 +13,6 @@ from experiments.metaheuristics.problems import PROBLEMS
 from experiments.real.air_traffic import UNITS, WHAT
 from experiments.real.autoferry import LEFT_OUT, SETS
 from experiments.sdlib import store
-from experiments.sdlib.comparison import comparison_tables
 from experiments.trackers.real_scenes import ADAPTING
 from experiments.trackers.unseen import ABLATION, ALL, NAMES, WHOLE
 
@@ -349,7 +348,6 @@ def ablation() -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     "benchmark-set": benchmark_set,
-    "benchmark-set-comparison": comparison_tables,
     "speed-ratios": partial(
         _plain, "filters.benchmark", "faster of the two / assoc",
         [f"faster of the two / assoc, {how}" for how in (

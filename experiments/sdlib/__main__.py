@@ -3,12 +3,11 @@
     python -m experiments.sdlib make [--compare]
     python -m experiments.sdlib solve --seconds 60 [NAME ...]
     python -m experiments.sdlib check [NAME ...]
-    python -m experiments.sdlib run [--solvers exact,highs] --seconds 60 [--all | NAME ...]
     python -m experiments.sdlib run --command "mysolver {instance} {solution}" --seconds 60 [--all | NAME ...]
 
-``run`` compares our solvers with each other and with the peers that are installed, or runs a command, once for each
-instance, with the paths of an instance (plain text) and of the solution that it must write. Each has one core and so
-many seconds of CPU time; solutions are judged by assoc/check.py. docs/benchmark_set.md describes the set and the files.
+``run`` starts a command once for each instance, with the paths of the instance (plain text) and of the solution that it
+must write. It has one core and so many seconds of CPU time; what it writes is judged by assoc/check.py.
+docs/benchmark_set.md describes the set and the files; ours beside other solvers: experiments.benchmarks.
 """
 
 import argparse
@@ -21,12 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
+from assoc._files.output import write_text
 from assoc.problem import AssignmentProblem
 from experiments.common.command import above_zero
 from experiments.sdlib import store
 from experiments.sdlib.command import run_command
-from experiments.sdlib.comparison import read_rows, write_comparison
-from experiments.sdlib.contest import CONTESTANTS, contest, representatives
 from experiments.sdlib.instances import PATH, Instance, instances
 from experiments.sdlib.solve import check_row, solve
 
@@ -41,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make = parts.add_parser("make", help="write the instances")
     make.add_argument("--compare", action="store_true", help="write nothing: compare them with what is stored")
     make.add_argument("--recording", metavar="FILE", help="of air traffic: without it, recorded ones stay as they are")
-    for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
+    for name, text in (("solve", "improve and prove what is known"), ("run", "run a command")):
         part = parts.add_parser(name, help=text)
         part.add_argument("--seconds", type=above_zero, default=60.0, help="limit for each instance (default 60)")
         part.add_argument("--family", choices=sorted({instance.family for instance in every}), help="only this family")
@@ -49,12 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     improve = parts.choices["solve"]
     improve.add_argument("--solver", default="exact", help="of ours (default exact, which alone proves)")
     run = parts.choices["run"]
-    who = run.add_mutually_exclusive_group()
-    who.add_argument("--command", help="your solver, with {instance} and {solution} in it")
-    who.add_argument("--solvers", type=_solvers, default=CONTESTANTS, help="names, with commas (default: all)")
+    run.add_argument("--command", required=True, help="your solver, with {instance} and {solution} in it")
     run.add_argument("--all", action="store_true", help="all instances, not two of each family")
     run.add_argument("--output", metavar="FILE", help="write the rows, with what was found when, as JSON")
-    run.add_argument("--resume", action="store_true", help="go on with the rows that --output names")
     check = parts.add_parser("check", help="check every solution and proof")
     check.add_argument("names", nargs="*", type=_name, metavar="NAME")
     chosen = parser.parse_args(arguments)
@@ -71,21 +66,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
         return _check(picked)
-    if chosen.command is not None and not ("{instance}" in chosen.command and "{solution}" in chosen.command):
+    if not ("{instance}" in chosen.command and "{solution}" in chosen.command):
         parser.error("--command: must have {instance} and {solution} in it")
-    if chosen.resume and chosen.output is None:
-        parser.error("--resume: needs --output")
     if not (chosen.all or chosen.names or family):
-        picked = representatives(picked)
-    return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
-
-
-def _solvers(text: str) -> list[str]:
-    names = text.split(",")
-    for name in names:
-        if name not in CONTESTANTS:
-            raise argparse.ArgumentTypeError(f"{name}: expected some of {', '.join(CONTESTANTS)}")
-    return names
+        picked = _representatives(picked)
+    return _run(picked, chosen.command, chosen.seconds, chosen.output)
 
 
 def _name(text: str) -> str:
@@ -141,26 +126,28 @@ def _check(picked: list[Instance]) -> int:
     return 1 if wrong else 0
 
 
-def _run(picked: list[Instance], chosen: argparse.Namespace, arguments: Sequence[str]) -> int:
-    words = " ".join(["python -m experiments.sdlib", *arguments])
+def _representatives(every: list[Instance]) -> list[Instance]:
+    """Of each family, in the order of tuples and names, the instances after a third and after two thirds of it."""
+    rows = store.table()
+    families: dict[str, list[Instance]] = {}
+    for instance in sorted(every, key=lambda instance: (rows[instance.name]["tuples"], instance.name)):
+        families.setdefault(instance.family, []).append(instance)
+    return [own[share * len(own) // 3] for own in families.values() for share in (1, 2)]
+
+
+def _run(picked: list[Instance], command: str, seconds: float, output: str | None) -> int:
+    rows = []
     try:
-        rows = read_rows(chosen.output, chosen.seconds) if chosen.resume else []
-        done = {(row["instance"], row["solver"]) for row in rows}
-        if chosen.command is not None:
-            left = [instance for instance in picked if (instance.name, "command") not in done]
-            found = run_command(left, chosen.command, chosen.seconds)
-        else:
-            found = contest(picked, chosen.solvers, chosen.seconds, done)
-        for row in found:
+        for row in run_command(picked, command, seconds):
             print(json.dumps({key: value for key, value in row.items() if key != "trace"}), flush=True)
             rows.append(row)
             # every now and then: a run of everything takes long
-            if chosen.output is not None:
-                write_comparison(chosen.output, rows, chosen.seconds, words)
+            if output is not None:
+                write_text(output, json.dumps({"command": command, "seconds": seconds, "rows": rows}, indent=1))
     except ValueError as error:
         print(error, file=sys.stderr)
     except OSError as error:
-        print(f"{error.filename or chosen.command}: {error.strerror}", file=sys.stderr)
+        print(f"{error.filename or command}: {error.strerror}", file=sys.stderr)
     else:
         return 0
     return 2

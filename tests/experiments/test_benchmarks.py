@@ -1,4 +1,4 @@
-"""The benchmark's machinery: rows, goals and report on numbers made for the purpose."""
+"""The benchmark's machinery: rows and report on numbers made for the purpose."""
 
 import math
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import goals, markdown, ranking, rows
+from experiments.benchmarks import markdown, ranking, rows
 from experiments.benchmarks.__main__ import main
 from experiments.benchmarks.families import Case, Entry, Instance, on_one_core
 from experiments.benchmarks.rows import Row
@@ -17,10 +17,6 @@ from experiments.common.instances import FIRST_SEED, synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
 PEER = replace(ROW, solver="highs", peer=True, seconds=0.3)
-
-
-def verdict(found: list[goals.Verdict], start: str) -> goals.Verdict:
-    return next(v for v in found if v.goal.startswith(start))
 
 
 def test_rows_round_trip(tmp_path: Path) -> None:
@@ -48,17 +44,14 @@ def test_gap_excess_and_hit() -> None:
     assert ROW.hit
 
 
-def test_speed_goal_needs_median_and_never_slower() -> None:
-    other = [replace(ROW, seed=1001, seconds=0.01), replace(PEER, seed=1001, seconds=0.5)]
-    found = goals.judge([ROW, PEER, *other])
-    speed = verdict(found, "exact: 30 times")
-    assert speed.met
-    assert "median 40 times, least 30" in speed.measured
-    slow = goals.judge([ROW, PEER, *other, replace(PEER, seed=1001, solver="cp_sat", seconds=0.005)])
-    assert not verdict(slow, "exact: 30 times").met
+def test_the_fastest_peer_is_one_that_proved_every_instance() -> None:
+    peers = [PEER, replace(PEER, seed=1001, seconds=0.5)]
+    results = rows.Results([ROW, *peers, replace(PEER, seed=1001, solver="cp_sat", seconds=0.005)])
+    assert results.fastest_proof("gated", "3x300") == (0.005, "cp_sat")
+    assert [results.fastest_peer(replace(ROW, seed=seed)) for seed in (1000, 1001)] == [0.3, 0.005]
     # a peer that did not prove its answer is not in the race
-    unproven = replace(PEER, seed=1001, solver="cp_sat", seconds=0.005, status="feasible")
-    assert verdict(goals.judge([ROW, PEER, *other, unproven]), "exact: 30 times").met
+    results = rows.Results([ROW, *peers, replace(PEER, solver="cp_sat", seconds=0.005, status="feasible")])
+    assert results.fastest_proof("gated", "3x300") == (0.4, "highs") and results.fastest_peer(ROW) == 0.3
 
 
 def test_several_processes_measure_the_same_on_one_core_each() -> None:
