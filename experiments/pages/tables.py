@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.common.claims import Claim
-from experiments.common.results import RESULTS, Results, number, plain_table, table
+from experiments.common.results import Results, number, plain_table, table
 from experiments.metaheuristics import parts
 from experiments.metaheuristics.problems import PROBLEMS
 from experiments.real.air_traffic import UNITS, WHAT
@@ -29,8 +29,6 @@ SHOWN = {
 """Trackers as the results name them, and in the tables; GNN is `nearest-neighbour` with the rule `assignment`."""
 FAR = 1.3
 """Of `multi-sensor` beside the oracle's GOSPA: more is explained."""
-GOALS = ("close_targets", "as_they_are", "bearings", "benchmark")
-"""Experiments of trackers whose goals are listed, in this order."""
 _HEADS = {
     "oracle": "oracle",
     "multi-sensor": "`multi-sensor` by what is declared",
@@ -179,25 +177,6 @@ def benchmark() -> str:
             rows.append([label, words, f"{done.ours:.0f} of {done.quantity.rpartition(' ')[2]}", *cells])
     heads = ["scans", "ours, ms a scan", "theirs / ours", "GOSPA, theirs, m", "GOSPA, ours - theirs, m"]
     return with_size(r, table(["", "theirs, ours", *heads], rows, lambda column: column > 1))
-
-
-def goals(names: Sequence[str] = GOALS, folder: Path = RESULTS) -> str:
-    """Every goal: measured, goal, met or not."""
-    rows = []
-    for name in names:
-        for claim in Results(f"trackers.{name}", folder).starting("goal: "):
-            low, high = claim.band
-            words = f"at least {low:.4g}" if low is not None else f"at most {high:.4g}"
-            unit = f" {claim.unit}" if claim.unit else ""
-            # of a ratio what it is above or below 1 matters
-            digits = 4 if not unit and 0.5 < claim.ours < 2 else 3
-            rows.append(
-                [f"`{name}`", claim.quantity.removeprefix("goal: "), mean(claim, digits) + unit, words + unit,
-                 "yes" if claim.holds else "**no**"]
-            )  # fmt: skip
-    met = sum(row[-1] == "yes" for row in rows)
-    head = f"{met} of {len(rows)} goals are met.\n\n"
-    return head + table(["experiment", "what", "measured", "goal", "met"], rows, lambda column: column in (2, 3))
 
 
 def _count(value: float) -> str:
@@ -360,7 +339,6 @@ TABLES: dict[str, Callable[[], str]] = {
     ),
     "scale-scans": scale_scans,
     "scale-trackers": scale_trackers,
-    "recordings-speed": partial(_plain, "scale.recordings", "tracker, recording", ("memory", "plots a second")),
     "probabilities": partial(
         _plain, "probabilities", "",
         ("mean error", "largest error", "within four errors", "seconds"),
@@ -376,7 +354,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "close-targets": close_targets,
     "bearings": bearings,
     "stone-soup": benchmark,
-    "goals": goals,
     "as-they-are": as_they_are,
     "unseen": unseen,
     "unseen-ablation": ablation,

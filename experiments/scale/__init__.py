@@ -1,1 +1,1 @@
-"""How the work grows: scenes, trackers, recordings and large components, size by size."""
+"""How the work grows: scenes and trackers, size by size."""

@@ -8,7 +8,7 @@ switches of reported tracks in a scene.
 """
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -18,9 +18,9 @@ from assoc.metrics import Trajectories, gospa_over_time, identity
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import main, whole
-from experiments.trackers.judging import CUTOFF, OracleTracker, goal, mean_claim, through
-from experiments.trackers.real_scenes import ADAPTING, JOINT, ROWS, Case, Row
+from experiments.common.command import main
+from experiments.trackers.judging import CUTOFF, OracleTracker, mean_claim, through
+from experiments.trackers.real_scenes import ADAPTING, ROWS, Case
 
 USUAL = ("oracle", "multi-sensor", ADAPTING, "mht, adapting")
 
@@ -70,51 +70,27 @@ def claims_of(label: str, runs: Sequence[Judged]) -> list[Claim]:
     return claims
 
 
-def _goals(label: str, row: Row, runs: Mapping[str, Sequence[Judged]]) -> list[Claim]:
-    """The goals of a row that was run through the trackers they are for."""
-    claims = []
-    for field, most in row.goals.items() if row.judged in runs else ():
-        values = np.array([getattr(run, field) for run in runs[row.judged]], dtype=np.float64)
-        claims.append(goal(f"{label}, {row.judged}: {WHAT[field]}", "m" if field == "gospa" else "", values, most))
-    if row.harmless and {"oracle", ADAPTING} <= set(runs):
-        ours, best = (np.array([run.gospa for run in runs[name]]) for name in (ADAPTING, "oracle"))
-        claims.append(goal(f"{label}, {ADAPTING}: GOSPA / the oracle's", "", ours / best, NEARLY))
-    return claims
-
-
-NEARLY = 1.1
-"""GOSPA of trackers that are as good as the oracle, nearly, as a multiple of its."""
-
-
 def experiment(chosen: argparse.Namespace) -> list[Claim]:
-    """Run trackers over rows of the table, those without a goal of their own on fewer scenes."""
+    """Run trackers over rows of the table."""
     claims = []
-    seeds = 2 if chosen.quick else chosen.seeds
     for label in chosen.names:
-        row = ROWS[label]
-        cases = [row.make(chosen.seed + k) for k in range(seeds if row.goals else min(seeds, chosen.others))]
-        taken = [name for name in dict.fromkeys([*USUAL, row.judged]) if name in (chosen.trackers or [name])]
-        runs = {name: [judge(name, case, case.declared) for case in cases] for name in taken}
+        cases = [ROWS[label](chosen.seed + k) for k in range(2 if chosen.quick else chosen.seeds)]
+        runs = {name: [judge(name, case, case.declared) for case in cases] for name in chosen.trackers or USUAL}
         if all(case.known for case in cases) and ADAPTING in runs:
             known = "multi-sensor if known"
             runs[known] = [judge("multi-sensor", case, case.known) for case in cases if case.known is not None]
         for name, found in runs.items():
             claims += claims_of(f"{label}, {name}", found)
-        claims += _goals(label, row, runs)
     return claims
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    text = "scenes at the most of a row that has no goal of its own (default 10)"
-    parser.add_argument("--others", type=whole(1), default=10, metavar="N", help=text)
-    parser.add_argument(
-        "--trackers", nargs="+", choices=[*USUAL, JOINT], default=[], metavar="NAME", help="these alone"
-    )
+    parser.add_argument("--trackers", nargs="+", choices=USUAL, default=[], metavar="NAME", help="these alone")
 
 
 program = partial(
     main, "trackers.as_they_are", experiment, __doc__, only=ROWS, seeds=(20, "scenes of each row", 1),
-    options=[_add_options], said=" {seeds} scenes of each row with a goal of its own, {others} of the others.",
+    options=[_add_options], said=" {seeds} scenes of each row.",
 )  # fmt: skip
 
 

@@ -160,10 +160,9 @@ def means(runs: Sequence[Judged]) -> Array:
     return np.array([run.distances.mean() for run in runs])
 
 
-def compare(label: str, names: Sequence[str], scenes: Sequence[Scene]) -> tuple[list[Claim], dict[str, list[Judged]]]:
-    """What trackers of these names did on the same scenes: the claims, and all runs."""
-    found = {name: [judge(name, scene) for scene in scenes] for name in names}
-    return [claim for name, runs in found.items() for claim in claims_of(label, name, runs)], found
+def compare(label: str, names: Sequence[str], scenes: Sequence[Scene]) -> list[Claim]:
+    """What trackers of these names did on the same scenes."""
+    return [claim for name in names for claim in claims_of(label, name, [judge(name, scene) for scene in scenes])]
 
 
 def claims_of(label: str, name: str, runs: Sequence[Judged]) -> list[Claim]:
@@ -183,8 +182,8 @@ def mean_claim(quantity: str, unit: str, values: Array) -> Claim:
     return Claim(quantity, unit, ours=float(values.mean()), interval=interval)
 
 
-def goal(quantity: str, unit: str, values: Array, most: float, *, surely: bool = True) -> Claim:
-    """A goal for a mean over scenes: at most so much, with the whole interval, or if not `surely` with a part of it."""
+def goal(quantity: str, unit: str, values: Array, most: float) -> Claim:
+    """A goal for a mean over scenes: at most so much, with the whole interval."""
     claim = mean_claim(f"goal: {quantity}", unit, values)
-    low, high = claim.interval or (claim.ours, claim.ours)
-    return replace(claim, band=(None, most), holds=(high if surely else low) <= most, source=GOAL)
+    _, high = claim.interval or (claim.ours, claim.ours)
+    return replace(claim, band=(None, most), holds=high <= most, source=GOAL)

@@ -1,4 +1,4 @@
-"""Scenes with something not as trackers are told, or as real sensors are; what a tracker is judged on, row by row.
+"""Scenes with something not as trackers are told, or as real sensors are, row by row.
 
 Twelve targets, 40 scans of 4 s, three 3-D radars, default settings unless a row says otherwise.
 """
@@ -180,46 +180,29 @@ TURNING: Mapping[str, Any] = {"turns": "4,5,5.5", "interval": INTERVAL, "duratio
 NOISY, LOUD = (160.0,) * 3, (240.0,) * 3
 ADAPTING = "multi-sensor, adapting"
 """What the programs run."""
-JOINT = "joint-probabilistic"
-
-
-class Row(NamedTuple):
-    """A row of the table.
-
-    make: Its scene, from a seed.
-    goals: Largest value of what is judged, by field of `Judged`, of the tracker ``judged``.
-    harmless: Nothing is wrong, or it does no harm: trackers have to be as good as the oracle, nearly.
-    """
-
-    make: Make
-    goals: Mapping[str, float] = {}
-    harmless: bool = False
-    judged: str = ADAPTING
 
 
 def _separate(**values: Any) -> Setting:
     return SEPARATE._replace(**values)
 
 
-ROWS: dict[str, Row] = {
-    "six radars of 17 km": Row(short_radars, {"gospa": 190.0}),
-    "six radars of 17 km, P_d 0.6": Row(lambda seed: short_radars(seed, 0.6), {"gospa": 300.0}),
-    "six radars, P_d falling with range": Row(farther_seen_less),
-    "three 2-D radars": Row(flat_radars, {"gospa": 170.0}),
-    "radars turning in 4, 5 and 5.5 s": Row(lambda seed: Case(made("rotating-radars", seed, **TURNING))),
-    "P_d 0.6, declared 0.9": Row(misdeclared(SEPARATE, _separate(detection_probability=0.6)), {"gospa": 310.0}),
-    "noise twice the declared": Row(misdeclared(SEPARATE, _separate(noise=NOISY)), {"gospa": 360.0}),
-    "noise three times the declared": Row(misdeclared(SEPARATE, _separate(noise=LOUD)), {"gospa": 450.0, "false": 0.3}),
-    "formations, noise twice the declared": Row(misdeclared(SETTINGS["formations"], Setting("formations", NOISY))),
-    "8 g": Row(agile, {"gospa": 260.0}),
-    "wind farm": Row(wind_farm, {"gospa": 230.0, "false": 0.5}),
-    "one 2-D radar, 100 false alarms": Row(one_planar, {"missed": 0.2 * TARGETS, "false": 0.02}),
-    "one 2-D radar, 100 false alarms, declared 20": Row(lambda seed: one_planar(seed, 20.0)),
-    "formations": Row(lambda seed: Case(simulate(SETTINGS["formations"], seed)), {"gospa": 205.0}, judged=JOINT),
-    "all as declared": Row(lambda seed: Case(simulate(SEPARATE, seed)), harmless=True),
-    "P_d 0.6, rightly declared": Row(
-        lambda seed: Case(simulate(_separate(detection_probability=0.6), seed)), harmless=True
-    ),
-    "P_d 0.9, declared 0.6": Row(misdeclared(_separate(detection_probability=0.6), SEPARATE), harmless=True),
-    "five times the false alarms": Row(misdeclared(SEPARATE, _separate(false_alarms=50.0)), harmless=True),
+ROWS: dict[str, Make] = {
+    "six radars of 17 km": short_radars,
+    "six radars of 17 km, P_d 0.6": lambda seed: short_radars(seed, 0.6),
+    "six radars, P_d falling with range": farther_seen_less,
+    "three 2-D radars": flat_radars,
+    "radars turning in 4, 5 and 5.5 s": lambda seed: Case(made("rotating-radars", seed, **TURNING)),
+    "P_d 0.6, declared 0.9": misdeclared(SEPARATE, _separate(detection_probability=0.6)),
+    "noise twice the declared": misdeclared(SEPARATE, _separate(noise=NOISY)),
+    "noise three times the declared": misdeclared(SEPARATE, _separate(noise=LOUD)),
+    "formations, noise twice the declared": misdeclared(SETTINGS["formations"], Setting("formations", NOISY)),
+    "8 g": agile,
+    "wind farm": wind_farm,
+    "one 2-D radar, 100 false alarms": one_planar,
+    "one 2-D radar, 100 false alarms, declared 20": lambda seed: one_planar(seed, 20.0),
+    "formations": lambda seed: Case(simulate(SETTINGS["formations"], seed)),
+    "all as declared": lambda seed: Case(simulate(SEPARATE, seed)),
+    "P_d 0.6, rightly declared": lambda seed: Case(simulate(_separate(detection_probability=0.6), seed)),
+    "P_d 0.9, declared 0.6": misdeclared(_separate(detection_probability=0.6), SEPARATE),
+    "five times the false alarms": misdeclared(SEPARATE, _separate(false_alarms=50.0)),
 }

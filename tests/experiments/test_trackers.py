@@ -61,7 +61,7 @@ def test_close_targets_and_the_oracle():
 @pytest.mark.parametrize("row", as_they_are.ROWS)
 def test_rows_of_sensors_as_they_are(row):
     """Each row has its targets, with the source of each measurement."""
-    case = as_they_are.ROWS[row].make(3)
+    case = as_they_are.ROWS[row](3)
     for scene in (case.declared, case.known or case.declared):
         assert scene.num_scans >= 10 and len(np.unique(np.concatenate(scene.truth.target_ids))) >= 2
         assert sum(int((one >= 0).sum()) for scan in scene.truth.sources for one in scan) > 100
