@@ -46,7 +46,7 @@ def test_without_its_parts_nothing_adapts():
     def tracked(adapt):
         return unseen.tracked(TRACKERS["multi-sensor"].for_scene(scene, adapt=adapt), scene).positions
 
-    scene = ROWS["noise twice the declared"].make(3).declared
+    scene = ROWS["noise twice the declared"](3).declared
     every = {name: other for changes in unseen.PARTS.values() for name, other in changes.items()}
     with unseen.without(every | {unseen.SETTLED: unseen.as_declared(NOISE, DETECTION, ALARMS)}):
         none = tracked(True)
