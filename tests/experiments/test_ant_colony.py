@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 import assoc
 from assoc.simulation import simulate
-from experiments.common.claims import load_json
 from experiments.papers.ant_colony import __main__ as experiment
 from experiments.papers.ant_colony import readings
 
@@ -55,19 +52,6 @@ def test_equal_settings_confirm_nothing():
         assert (rank.ours, rank.holds) == (12.5, False if mode == "paper" else None)
         assert found[f"mode {mode}: cycles, alpha > beta less the others, whole interval below 0"].holds is None
     assert found["mode paper: mean cycles over all settings"].holds is False
-
-
-@pytest.mark.slow
-def test_a_small_run(tmp_path, capsys):
-    words = ["--scans", "3", "--seeds", "2", "--jobs", "1", "--json", str(tmp_path / "c.json")]
-    assert experiment.program([*words, "--figure", str(tmp_path / "f.png")]) == 0
-    out = capsys.readouterr().out
-    assert "288 runs (3 scans, 2 seeds)" in out and "Table 1 of the ant colony paper" in out
-    content = json.loads((tmp_path / "c.json").read_text())
-    assert (content["format"], content["experiment"], content["seed"]) == ("assoc.claims", "papers.ant_colony", 0)
-    claims = load_json(tmp_path / "c.json")
-    assert sum("mode paper: mean cycles to convergence" in claim.quantity for claim in claims) == 24
-    assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow

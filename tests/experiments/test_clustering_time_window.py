@@ -8,8 +8,6 @@ import pytest
 
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
-from experiments.common.claims import load_json
-from experiments.papers.clustering_time_window import __main__ as experiment
 from experiments.papers.clustering_time_window import (
     own_tracker,
     pairs,
@@ -86,21 +84,6 @@ def test_a_pair_keeps_its_tracks(kind):
         assert (pairs.switches(recording, changed), pairs.swaps(recording, changed)) == (switches, swaps)
 
 
-@pytest.mark.slow
-def test_the_experiment():
-    # every method on one short recording
-    size = experiment.Size(1, 1, 150.0, pairs_of_each=1, kinds=("crossing",), pair_duration=200.0, false_starts=1)
-    claims = {c.quantity: c for c in experiment.judge(size, np.random.default_rng(0))}
-    # the thesis's tracker is Reid's with Murty's: its figures stand beside that one, and in no quick run it is missing
-    assert claims["CT, Reid's MHT, CTW"].paper == 87.66 and claims["CT, MHT, CTW"].paper is None
-    assert {claims[f"CT, Reid's MHT, {cell}"].ours > 0 for cell in (
-        "irregular groups", "CTW", "irregular groups, time stamps", "CTW, time stamps")} == {True}  # fmt: skip
-    assert sum(claim.band is not None for claim in claims.values()) >= 18
-    # in so short a recording tracks are confirmed late; what compares still holds
-    assert claims["CT gained by the window with constant step, MHT"].ours > 0
-    assert claims["CT, groups 1 to 10, Reid's MHT, CTW"].paper == 70.3
-
-
 def test_clusters_by_a_spanning_tree():
     """An aircraft is a track, also over a turn without a plot; a plot far from all others is none."""
     one = straight(20, missing=(7,))
@@ -112,18 +95,6 @@ def test_clusters_by_a_spanning_tree():
     lone = recording.sources[taken.rows] < 0
     assert len(np.unique(taken.tracks[~lone])) == 1 and taken.confirmed[~lone].all()
     assert lone.sum() == 1 and not taken.confirmed[lone].any()
-
-
-@pytest.mark.slow
-def test_the_thesiss_own_tracker(tmp_path):
-    assert own_tracker.program(["--quick", "--json", str(tmp_path / "a.json")]) == 0
-    ours = {c.quantity: c.ours for c in load_json(tmp_path / "a.json")}
-    assert ours["2.5 false plots a turn: false plots in tracks ever confirmed, Reid's MHT, CTW"] == 0
-    one, other = (
-        f"100 false plots a turn: false plots in tracks ever confirmed, {name}" for name in own_tracker.TRACKERS
-    )
-    assert ours[one] > 5 * ours[other]
-    assert ours["head-on: pairs without a switch, Reid's MHT, time stamps"] == 100
 
 
 def test_windows_in_which_an_aircraft_is_missed():

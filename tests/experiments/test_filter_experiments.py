@@ -1,23 +1,13 @@
 """The experiments with filters as programs: their claims, JSON and figures, at their quick size."""
 
-import re
-from functools import partial
-
 import numpy as np
 import pytest
 
 from assoc.simulation.dubins.paths import Pose, path, shortest
-from experiments.common.claims import load_json
-from experiments.common.command import main
-from experiments.common.results import Results
-from experiments.filters import benchmark, manoeuvres
-from experiments.papers.dubins_enkf import __main__ as dubins_enkf
+from experiments.filters import manoeuvres
 from experiments.papers.dubins_enkf import along_path, ensemble, flight_paths
-from experiments.papers.fuzzy_ekf import __main__ as fuzzy_ekf
 from experiments.papers.fuzzy_ekf import other_models, published, tuned_once
-from experiments.papers.modified_ekf import __main__ as modified_ekf
 from experiments.papers.modified_ekf import beyond, paper_setting
-from tests.sizes import few_or_all
 
 
 def test_what_the_papers_leave_open_in_small():
@@ -75,59 +65,3 @@ def test_what_is_misprinted_can_be_run():
     p, q = paper_setting.P0, paper_setting.Q
     # A is nearly the unit matrix: A P + P A' is 2 P
     assert spreads[1] / spreads[0] == pytest.approx((2 * p + q) / (p + q), rel=1e-3)
-
-
-@pytest.mark.slow
-@few_or_all("module", modified_ekf, dubins_enkf)
-def test_programs_whose_claims_hold(module, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert module.program(["--quick", "--json", "a.json", "--seed", "1", "--figure", "a.png"]) == 0
-    claims = load_json("a.json")
-    # what the papers claim and does not hold is on the page; what we accept by limits of our own must hold
-    judged = [c for c in claims if c.holds is not None and c.source.endswith("chosen by us") and "%" not in c.source]
-    judged = [c for c in judged if not re.search("table|figure|section|equation|abstract", c.source)]
-    assert len(judged) >= 5
-    assert not [c.quantity for c in judged if not (c.holds or may_hold(c))]
-    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
-    assert "holds" in capsys.readouterr().out
-
-
-def may_hold(claim):
-    """Whether the interval of a small run reaches into what is accepted."""
-    if claim.interval is None or claim.band is None:
-        return False
-    (low, high), (least, most) = claim.interval, claim.band
-    return (most is None or low <= most) and (least is None or high >= least)
-
-
-def test_b1_holds_at_full_size():
-    claims = [claim for claim in Results("papers.modified_ekf").starting("B1") if claim.band is not None]
-    assert len(claims) == 3 and all(claim.holds for claim in claims)
-
-
-@pytest.mark.slow
-def test_fuzzy_experiment(tmp_path):
-    name, experiment, about = fuzzy_ekf.program.args
-    file = str(tmp_path / "f.json")
-    words = ["--quick", "--json", file, "--figure", str(tmp_path / "f.png")]
-    of_c = partial(experiment, scenarios={"C": manoeuvres.SCENARIOS["C"]})
-    assert main(name, of_c, about, words, **fuzzy_ekf.program.keywords) == 0
-    by_name = {c.quantity: c for c in load_json(file)}
-    assert by_name["C: tuned rules / best fixed EKF"].holds
-    assert by_name["C: RMSE, IMM"].ours < by_name["C: RMSE, raw measurements"].ours
-    assert by_name["C: RMSE, raw measurements"].ours == pytest.approx(89.7, rel=0.03)
-    # the stand-in for the published rules is tuned: better than the sets chosen by eye
-    assert (
-        by_name["C: RMSE, the paper's rules, tuned sets"].ours
-        < by_name["C: RMSE, the paper's rules, sets chosen by eye"].ours
-    )
-
-
-@pytest.mark.slow
-def test_benchmark_times_all_three():
-    for kind in benchmark.KINDS:
-        assert benchmark.ours(kind, 3, 2) > 0
-    pytest.importorskip("filterpy")
-    pytest.importorskip("stonesoup")
-    assert benchmark.filterpy("Kalman", 2) > 0
-    assert benchmark.stonesoup("EKF", 1) > 0

@@ -8,13 +8,10 @@ import pytest
 
 from assoc.filters import (
     ConstantVelocity,
-    ExtendedKalmanFilter,
     Gaussian,
-    KalmanFilter,
     UnscentedKalmanFilter,
 )
 from assoc.sensors import Radar3D
-from tests.filters.common import PLACE
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -39,32 +36,6 @@ def same(ours, mean, covariance):
     scale = np.sqrt(np.diag(covariance))
     assert np.abs((ours.mean[0] - mean) / scale).max() < 1e-9
     assert np.abs((ours.covariance[0] - covariance) / np.outer(scale, scale)).max() < 1e-9
-
-
-@pytest.mark.parametrize("kind", ["kalman", "ekf"])
-def test_filterpy(kind):
-    motion = ConstantVelocity(2.0)
-    F, Q = (one[0] for one in motion.matrices(1.0))
-    sensor = PLACE if kind == "kalman" else RADAR
-    theirs = (filterpy.KalmanFilter if kind == "kalman" else filterpy.ExtendedKalmanFilter)(dim_x=6, dim_z=3)
-    theirs.F, theirs.Q, theirs.R = F, Q, sensor.covariance
-    theirs.x, theirs.P = START.mean[0].copy(), START.covariance[0].copy()
-    if kind == "kalman":
-        theirs.H = np.eye(3, 6)
-    ours = KalmanFilter(motion) if kind == "kalman" else ExtendedKalmanFilter(motion)
-    state = START
-    for z in measurements(sensor):
-        state = ours.update(ours.predict(state, 1.0), z, sensor).state
-        theirs.predict()
-        if kind == "kalman":
-            theirs.update(z)
-        else:
-            theirs.update(
-                z,
-                lambda x: np.hstack([RADAR.jacobian(x.reshape(1, -1)[:, :3])[0], np.zeros((3, 3))]),
-                lambda x: RADAR.measure(x.reshape(1, -1)[:, :3])[0],
-            )
-        same(state, theirs.x.ravel(), theirs.P)
 
 
 def test_filterpy_unscented():

@@ -1,17 +1,23 @@
-"""The root split on counts: its parts have all solutions, and their bounds are valid."""
+"""Roots split on counts, on packings so small that the tests run uncompiled, too: `make mutants` does that."""
+
+import os
 
 import numpy as np
 import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import counts
 from assoc.packing.branching.counts import USUAL, Splitting, split_on_counts
-from assoc.packing.branching.root import root_with_cuts
+from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from experiments.common.instances.synthetic import axial_random
 from tests.oracles import small_problems
-from tests.packings import all_covers, finished, ghosts
+from tests.packings import all_covers, finished, ghosts, random_packing, weights_of
 
+# uncompiled they take minutes
+compiled = pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="takes minutes without a compiler")
 # split whenever it can be, and at once
 ALWAYS = Splitting(after=1, raised=-np.inf, pays=np.inf)
 
@@ -47,24 +53,90 @@ def times_in(leaves, packing, used):
     return times
 
 
-def test_bounds_of_parts_hold_and_rise():
-    """Checked after every node, from incumbents near and far, with cuts."""
-    made = 0
-    for seed in (16, 24, 31, 37):
-        packing, duals, bound = ghosts(10, seed)
-        best = finished(BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))).weight
-        for incumbent in (0.95 * bound, best + 1e-3 * abs(best)):
-            one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
-            bounds = []
-            while not one.done:
-                one.run(1)
-                bounds.append(one.lower_bound)
-            made += len(one._leaves) > 1
-            assert one.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
-            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9
-    assert made > 2
+@pytest.fixture(params=[3, 26])
+def packing(request):
+    return random_packing(request.param)
 
 
+def split(packing, cutoff=np.inf):
+    leaves = split_on_counts(packing, plain_root(packing, dual_bound(packing)), cutoff, cutoff, np.inf, np.inf)
+    assert len(leaves) > 1
+    return leaves
+
+
+def test_every_solution_is_of_one_part(packing):
+    assert (times_in(split(packing), packing, columns_used(packing)) == 1).all()
+
+
+def test_a_search_in_parts_ends_at_the_optimum(packing):
+    best = weights_of(packing, all_covers(packing)).min()
+    for incumbent in (-1.0, best + 0.3):
+        one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True, splitting=ALWAYS)
+        bounds = []
+        while not one.done:
+            one.run(1)
+            bounds.append(one.lower_bound)
+        assert (np.diff(bounds) >= 0.0).all() and max(bounds) <= best + 1e-8
+        assert one.weight == pytest.approx(best, abs=1e-9)
+
+
+def test_the_least_bound_of_the_parts_bounds_the_whole(packing):
+    leaves = split(packing)
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True, splitting=ALWAYS)
+    one._begin()
+    one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
+    one._open.count, one._aim = 0, np.inf
+    assert not one.done and one.lower_bound == min(leaf.bound for leaf in leaves)
+
+
+@pytest.mark.parametrize("packing", [26], indirect=True)
+def test_a_pass_is_split_in_its_middle(packing):
+    """Split after one node, with others open: the bound proved so far stays."""
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True, splitting=ALWAYS)
+    one.run(1)
+    assert one._open.count and not one._leaves
+    shown = one.lower_bound
+    one.run(1)
+    assert len(one._leaves) > 1 and one.lower_bound >= shown
+
+
+def test_columns_of_many_rows_are_counted():
+    """More rows than an int8 holds."""
+    sensors, num = 130, 6
+    rng = np.random.default_rng(0)
+    cols = (3 * np.arange(sensors) + rng.integers(0, 3, (num, sensors))).astype(np.int32)
+    packing = assemble(cols, -np.ones(num), np.ones(3 * sensors, dtype=bool), np.arange(num, dtype=np.int32))
+    every = counts._counts_of(packing.component(0))
+    assert every.times.tolist() == [[1] * num, [sensors] * num]
+    program = counts._with_rows(plain_root(packing, np.zeros(packing.num_rows)).program, every)
+    last = program.sides.size - 3
+    assert (np.bincount(program.rows, minlength=last + 3)[[last - 1, last]] == [num + 1, num * sensors + 1]).all()
+
+
+def test_a_split_without_time_is_one_part_and_its_bound_holds(packing):
+    best = weights_of(packing, all_covers(packing)).min()
+    (leaf,) = split_on_counts(packing, plain_root(packing, dual_bound(packing)), np.inf, np.inf, -1.0, np.inf)
+    assert leaf.bound <= best + 1e-9
+
+
+def test_parts_that_there_is_no_time_to_solve_again_stay_as_they_were(packing):
+    best = weights_of(packing, all_covers(packing)).min()
+    root, everything = plain_root(packing, dual_bound(packing)), counts._counts_of(packing)
+    counted = counts._Counted(root, everything, np.inf, np.inf)
+    parts = counts._split(counted, everything, counted.effort.cutoff, np.inf)
+    assert len(parts) > 1
+    used = np.arange(len(everything.times)) < 1
+    fewer = counts._Counted(root, everything.only(used), np.inf, np.inf)
+    # in time, each has fewer rows, and a bound that is as good
+    again = counts._solved_again(fewer, parts, used, np.inf)
+    assert {leaf.root.slack.size for leaf in again} == {root.slack.size + 2}
+    leaves = counts._solved_again(fewer, parts, used, -1.0)
+    assert {leaf.root.slack.size for leaf in leaves} == {root.slack.size + 2 * len(used)}
+    assert min(leaf.bound for leaf in leaves) <= best + 1e-9
+    assert [leaf.bound for leaf in leaves] == [part.leaf.bound for part in parts]
+
+
+@compiled
 def test_axial_packings_and_problems_without_dummies():
     """All columns of one size leave nothing to split; of several sizes, with rows that must be covered, they do."""
     for seed in range(4):
@@ -81,6 +153,7 @@ def test_axial_packings_and_problems_without_dummies():
         assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
+@compiled
 def test_fewer_nodes_are_needed_where_the_gap_is_wide():
     packing, duals, bound = ghosts(20, 2018)
     weight, nodes = np.inf, []

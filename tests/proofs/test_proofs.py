@@ -243,6 +243,19 @@ def test_no_multipliers_prove_more_than_the_optimum(valid):
     assert proved > 50
 
 
+@pytest.mark.slow
+def test_trees_without_end_are_refused(valid):
+    """Nodes that are shared would double the work at each, and a chain of them would keep all its siblings."""
+    problem, proof = valid
+    pair = proof["trees"][0]["nodes"][0]["pair"]
+    shared = [{"pair": pair, "children": [i + 1, i + 1]} for i in range(60)]
+    chain = [{"pair": pair, "children": [2 * i + 1, 2 * i + 2]} for i in range(100_000)]
+    for nodes, words in ((shared, "children of its own"), (chain, "deeper than")):
+        spoiled = {**proof, "trees": [{**proof["trees"][0], "nodes": nodes}]}
+        with pytest.raises((check.RefusedError, ValueError), match=words):
+            check.check(problem, json.dumps(spoiled))
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -254,6 +267,11 @@ def test_no_multipliers_prove_more_than_the_optimum(valid):
         ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\nnan 1 1\n", "decimal number"),
         ("assoc-problem 1\nsizes 999999999\ndummies yes\ntuples 0\n", "measurements"),
         ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\n-1 1 0\n", "without dummies"),
+        # what would take more memory or time than there is
+        ("assoc-problem 1\nsizes 2 2\ndummies yes\ntuples 999999999\n0 1 0\n", "number of tuples"),
+        ("assoc-problem 1\nsizes 1 1\ndummies yes\ntuples " + "9" * 400_000 + "\n", ""),
+        ("assoc-problem 1\nsizes 1 1\ndummies yes\ntuples 1\n1e99999999 1 1\n", ""),
+        ("assoc-problem 1\nsizes 1 1\ndummies yes\ntuples 1\n" + "9" * 1_000_000 + " 1 1\n", ""),
     ],
 )
 def test_problems_that_cannot_be_read(tmp_path, text, reason):

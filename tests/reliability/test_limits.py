@@ -1,7 +1,7 @@
 """Time limits on problems that take much longer: kept, and what is returned is sound and no worse than greedy's.
 
 How late something is counts without what its thread waited for a processor; the allowance is generous, so that a
-busy machine does no harm: `python -m tests.reliability.limits` measures what is promised.
+busy machine does no harm.
 """
 
 import math

@@ -254,18 +254,6 @@ def test_a_saved_state_is_checked(scene, tmp_path):
             LiveTracker(scene, **({"make": tracker.settings.make, "turns": TURNS} | options)).restore(
                 tmp_path / "live.npz"
             )
-    arrays = dict(np.load(tmp_path / "live.npz"))
-    for field, value in [
-        ("live.plots", arrays["live.plots"][:, :3]),
-        ("live.plots", np.where(arrays["live.plots"] > 0, np.nan, 9.0)),
-        ("live.scans", arrays["live.scans"][::-1]),
-        ("live.counts", np.array("[1")),
-        ("live.antennas", arrays["live.antennas"][:1]),
-        ("live.names", np.zeros((2, 3), int)),
-    ]:
-        np.savez(tmp_path / "bad.npz", **{**arrays, field: value})
-        with pytest.raises(InvalidInputError, match="bad.npz: "):
-            live(scene)[0].restore(tmp_path / "bad.npz")
 
 
 def at_sea():
