@@ -38,8 +38,7 @@ tuples in the same process: CP-SAT (costs times 1e6, rounded), SCIP, HiGHS (gap 
 one* assigns one sensor at a time with scipy, as most trackers do.
 Independent code checks the feasibility and cost of every answer.
 
-Every run of every solver, with cost, bound, wall and processor time, is a row of the CSV (`docs/benchmarks.csv`); here
-they are summed up by family and size. The reference is the optimum (by construction, or proven by any solver) or else
+The reference is the optimum (by construction, or proven by any solver) or else
 the best cost that any solver found; an excess is relative to it. aco, genetic and tabu stop when they reach a known
 optimum."""
 
