@@ -25,6 +25,7 @@ def test_a_short_run(capsys):
     assert claims[f"{start}, assoc: wrong plots"] < 1.0
 
 
+@pytest.mark.slow
 def test_plots_have_the_errors_and_no_others():
     """With the true errors taken off, plots are off by the noise alone; a silent aircraft has nothing to name it."""
     traffic = air_traffic.simulated(0, 30.0)

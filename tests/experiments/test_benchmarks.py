@@ -54,6 +54,7 @@ def test_the_fastest_peer_is_one_that_proved_every_instance() -> None:
     assert results.fastest_proof("gated", "3x300") == (0.4, "highs") and results.fastest_peer(ROW) == 0.3
 
 
+@pytest.mark.slow
 def test_several_processes_measure_the_same_on_one_core_each() -> None:
     def make(seed: int):  # type: ignore[no-untyped-def]
         yield Instance(*synthetic.planted(3, seed, targets=4))

@@ -42,6 +42,7 @@ def test_all_trackers_follow_an_easy_scene(tmp_path):
     assert found["oracle"][0] <= min(found[name][0] for name in unseen.NAMES if name.startswith(unseen.CHOSEN)) + 1e-9
 
 
+@pytest.mark.slow
 def test_without_its_parts_nothing_adapts():
     def tracked(adapt):
         return unseen.tracked(TRACKERS["multi-sensor"].for_scene(scene, adapt=adapt), scene).positions

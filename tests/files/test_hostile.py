@@ -9,7 +9,7 @@ from tests.files.hostile import HOSTILE, MOST, Hostile, run
 pytestmark = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the peak of memory")
 
 
-FEW = ("problem.txt.xz", "long-names.parquet", "texts.npz")
+FEW = ("long-names.parquet", "texts.npz")
 CASES = [pytest.param(one, id=one.name, marks=() if one.name in FEW else pytest.mark.slow) for one in HOSTILE]
 
 

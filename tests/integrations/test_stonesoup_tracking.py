@@ -214,10 +214,8 @@ PAGE = (ROOT / "docs" / "stonesoup.md").read_text(encoding="utf-8")
 PRINTED = re.findall(r"\{literalinclude\} stonesoup/(\w+)\.py\n```\n(?:\n```text\n(.*?)```)?", PAGE, re.DOTALL)
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [pytest.param(*one, marks=[] if one[0] == "fusion" else pytest.mark.slow) for one in PRINTED if one[1]],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "expected"), [one for one in PRINTED if one[1]])
 def test_the_page_runs_as_printed(name, expected):
     """In a process of its own, as a user does; a GOSPA within a metre, since sets have another order each time."""
     done = process(ROOT / "docs" / "stonesoup" / f"{name}.py", PYTHONPATH=ROOT)

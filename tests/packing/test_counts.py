@@ -153,6 +153,7 @@ def test_axial_packings_and_problems_without_dummies():
         assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
+@pytest.mark.slow
 @compiled
 def test_fewer_nodes_are_needed_where_the_gap_is_wide():
     packing, duals, bound = ghosts(20, 2018)

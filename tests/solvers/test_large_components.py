@@ -12,6 +12,7 @@ from assoc.packing.run import Run
 from assoc.solvers.exact.regions import close_by_regions
 from assoc.solvers.exact.search import search_to_the_end
 from experiments.common.instances.synthetic import wide_gates
+from tests.sizes import sample
 from tests.solvers.pieces import with_greedy_cover
 
 
@@ -22,7 +23,7 @@ def test_a_scene_that_is_one_component_is_proved():
     assert answer.status == "optimal" and answer.cost == pytest.approx(other.cost, rel=1e-8)
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@sample("seed", [1, 3], every=2)
 def test_a_large_component_is_proved_without_its_linear_program(seed, monkeypatch):
     """Its inverses would take 600 MB. Memory is said to be short: the system is not asked for what small parts take."""
     monkeypatch.setattr(memory, "fits", lambda needed: needed < 20e6)

@@ -124,7 +124,7 @@ def test_misses_and_detections_count_by_range(at_once):
 
 
 def test_right_declarations_are_left_as_they_are():
-    for seed in range(3):
+    for seed in range(2):
         tracker = tracked(scene_of(radars(), seed), radars())
         # these targets fly straight: quiet flight may be quieter than declared
         told = in_use(tracker.settings, tracker.state.estimates._replace(manoeuvres=1.0))

@@ -23,9 +23,9 @@ WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    recording = simulate_recording("rotating-radar", 4, aircraft=8, duration=1_200.0).recording
+    recording = simulate_recording("rotating-radar", 4, aircraft=8, duration=850.0).recording
     # tracks end, and others begin
-    half = (recording.azimuths > 0) == (recording.times < 300.0)
+    half = (recording.azimuths > 0) == (recording.times < 250.0)
     write_plots("plots.csv", recording.take(half))
     return tmp_path
 
@@ -36,7 +36,7 @@ def test_rows_are_those_of_a_whole_table(here):
         assert track.main(["plots.csv", *words, *WORDS]) == 0
     texts = {"mode3_oct": str, "address_hex": str, "target": str}
     found, expected = (pd.read_csv(name, dtype=texts) for name in ("t.csv", "whole.csv"))
-    assert len(found) > 150 and found.track_id.nunique() > 5
+    assert len(found) > 80 and found.track_id.nunique() > 5
     order = ["time", "track_id"]
     again = found.sort_values(order, ignore_index=True)
     pd.testing.assert_frame_equal(again, expected.sort_values(order, ignore_index=True), check_exact=True)
@@ -44,7 +44,7 @@ def test_rows_are_those_of_a_whole_table(here):
     assert (np.diff(found.track_id) != 0).sum() == found.track_id.nunique() - 1
     assert (found.groupby("track_id").time.diff().dropna() > 0).all()
     ends = found.groupby("track_id", sort=False).time.max()
-    assert ends.iloc[0] < 700.0 and ends.iloc[-1] > 1_100.0
+    assert ends.iloc[0] < 500.0 and ends.iloc[-1] > 750.0
     assert track.main(["plots.csv", "-o", "t.parquet", *WORDS]) == 0
     table = pd.read_parquet("t.parquet")
     assert [*table.columns] == [*found.columns]
@@ -78,7 +78,7 @@ def test_tracks_are_smoothed_as_they_end(here, monkeypatch, capsys):
     assert "warning" not in capsys.readouterr().err
     assert (here / "t.csv").read_bytes() == (here / "whole.csv").read_bytes()
     assert sum(rows for rows, _ in seen[:-1]) > 30 and seen[-1][0] > 30
-    assert seen[-2][1] < 0.8 * len(taken)
+    assert seen[-2][1] < 0.9 * len(taken)
 
 
 def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
@@ -88,7 +88,7 @@ def test_nothing_half_written_takes_the_name(here, monkeypatch, capsys):
 
     def broken(*arguments, **options):
         for number, one in enumerate(plain(*arguments, **options)):
-            if number == 60:
+            if number == 40:
                 raise LimitExceededError("no more memory")
             yield one
 
