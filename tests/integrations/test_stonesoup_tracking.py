@@ -75,19 +75,6 @@ def by_distance(missed=3.0):
     return DistanceHypothesiser(PREDICTOR, UPDATER, Mahalanobis(), missed_distance=missed)
 
 
-@pytest.mark.parametrize("solver", ["exact", "milp", "aco", "lagrangian"])
-def test_as_good_as_the_global_nearest_neighbour_of_stone_soup(solver):
-    for seed in range(5):
-        tracks, detections, time = crowd(seed)
-        ours = AssignmentAssociator(by_distance(), solver=solver).associate(tracks, detections, time)
-        theirs = GNNWith2DAssignment(by_distance()).associate(tracks, detections, time)
-        assert ours.keys() == theirs.keys()
-        total = [sum(h.distance for h in one.values()) for one in (ours, theirs)]
-        assert total[0] == pytest.approx(total[1], abs=1e-9)
-        used = [h.measurement for h in ours.values() if h]
-        assert len(used) == len(set(used)) > 0
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_probabilities_against_all_joint_hypotheses(seed):
     tracks, detections, time = crowd(seed, tracks=4, detections=5)

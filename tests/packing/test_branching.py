@@ -20,7 +20,7 @@ from assoc.packing.simplex.basis import primal_values
 from assoc.packing.simplex.dual import Effort
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from tests.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
+from tests.oracles import all_solutions, brute_force, gated_problem, small_problems
 from tests.packings import all_covers, finished, is_cover, relaxed, weights_of
 
 
@@ -44,30 +44,6 @@ def test_the_optimum_is_that_of_enumeration():
         assert weight == pytest.approx(search.weight, abs=1e-9)
         assert weight + prepared.offset == pytest.approx(optimum, abs=1e-8)
         assert search.lower_bound + prepared.offset <= optimum + 1e-9
-
-
-def test_a_bound_holds_when_the_search_is_stopped_early():
-    rng = np.random.default_rng(72)
-    stopped = 0
-    for number in range(12):
-        # enough to branch on
-        sizes = (7, 7, 7)
-        problem = axial_problem(rng, sizes, 1.0, "positive") if number % 2 else gated_problem(rng, sizes, 0.3)
-        prepared = prepare(problem)
-        whole = search_of(prepared.packing)
-        whole.run(100_000)
-        assert whole.done
-        for nodes in (0, 1, 2, 5):
-            search = search_of(prepared.packing)
-            search.run(nodes)
-            stopped += not search.done
-            assert search.nodes <= nodes
-            assert search.lower_bound <= whole.weight + 1e-9
-            assert search.weight >= whole.weight - 1e-9
-            # and it goes on where it stopped
-            search.run(100_000)
-            assert search.done and search.weight == pytest.approx(whole.weight, abs=1e-9)
-    assert stopped > 12
 
 
 def test_only_better_solutions_are_looked_for():

@@ -4,11 +4,9 @@ import json
 import os
 import shutil
 import sqlite3
-import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import assoc
@@ -20,7 +18,6 @@ from assoc.sweeps.old_form import import_study
 from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import COLUMNS, DATABASE, PARAMETERS, Store
 from assoc.sweeps.worker import code_digest
-from tests.sizes import few_or_all
 
 
 def same(one, other):
@@ -128,25 +125,6 @@ def test_a_foreign_file_is_one_line(study, whole, words):
             use(whole)
             load(whole)
         assert "\n" not in str(raised.value)
-
-
-@few_or_all("count", 60, 2000)
-def test_spoiled_bytes_are_read_or_refused_in_one_line(whole, count):
-    good, refused = (whole / DATABASE).read_bytes(), 0
-    for number in range(count):
-        rng, data = np.random.default_rng(number), bytearray(good)
-        for at in rng.integers(len(data), size=int(rng.integers(1, 40))):
-            data[at] = rng.integers(256)
-        (whole / DATABASE).write_bytes(data[: int(rng.integers(1, len(data)))] if number % 5 == 0 else data)
-        started = time.process_time()
-        try:
-            load(whole)
-            load_traces(whole)
-        except InvalidInputError as error:
-            refused += 1
-            assert "\n" not in str(error) and DATABASE in str(error)
-        assert time.process_time() - started < 5.0
-    assert refused > count / 4
 
 
 def test_a_changed_design_adds(study, whole):

@@ -6,9 +6,7 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 from assoc import InvalidInputError
-from assoc.errors import AssocError
 from assoc.tracking.fusion import FusionParameters, SystemTracks, TrackFusion, fuse_tables, intersected
-from tests.reliability.mutations import spoil
 
 COVARIANCE = np.diag([50.0, 50.0, 80.0, 5.0, 5.0, 5.0]) ** 2
 
@@ -117,22 +115,6 @@ def test_tables_of_systems_become_one(tmp_path):
     assert (np.abs(last["x"] - 150.0 * last["time"]) < 40.0).all()
     # the common target is known better than the second system's own
     assert last["sigma_x"].min() < 0.9 * last["sigma_x"].max()
-
-
-def test_spoiled_tables_are_one_line(tmp_path):
-    rows = ["track_id,time,x,y,z,vx,vy,vz,sigma_x,sigma_y,sigma_z,existence,confirmed"]
-    rows += [f"{i},{1.5 * t},{1000 * i + 50 * t},{40 * t},500,30,40,1,20,21,22,0.9,True"
-             for t in range(6) for i in (1, 2)]  # fmt: skip
-    good, rng, path, refused = "\n".join(rows).encode(), np.random.default_rng(3), tmp_path / "bad.csv", 0
-    (tmp_path / "good.csv").write_bytes(good)
-    for _ in range(60):
-        path.write_bytes(spoil(rng, good, "text"))
-        try:
-            fuse_tables([path, tmp_path / "good.csv"])
-        except AssocError as error:
-            refused += 1
-            assert "\n" not in str(error)
-    assert refused > 12
 
 
 ONE = tracks_of([1], [0.0, 0.0, 0.0])

@@ -1,7 +1,9 @@
-"""What ``warm_up`` promises: no step, ranking, probability or link meets a kernel that is not loaded."""
+"""What ``warm_up`` promises: no solver, step, ranking, probability or link meets a kernel that is not loaded."""
 
 import pytest
 
+import assoc
+from assoc.errors import InvalidInputError
 from tests.running import process
 
 _PROGRAM = """
@@ -12,9 +14,19 @@ from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LatePlots
 from assoc.tracking.filter_choice import FILTERS, make_filter
 from assoc.tracking.warm_up import follow
+from experiments.common.instances import scenes as instances, synthetic
 
 warnings.simplefilter("ignore")
+problems = [assoc.build_problem(instances.ghost(20, 2), 0), assoc.build_problem(instances.gated(4, 40, 1), 0)]
+problems += [synthetic.axial_random(11, 0), synthetic.planted(5, 0)[0]]
 assoc.warm_up()
+before = loaded()[0]
+for problem in problems:
+    for solver in ("exact", "lagrangian", "aco", "genetic", "tabu", "greedy"):
+        assoc.assign(problem, solver)
+        assoc.assign(problem, solver, time_limit=60.0, seed=1)
+if loaded()[0] != before:
+    print("solvers", loaded()[0] - before)
 scenes = [
     simulate("crowd", 5, targets=40, scans=4, width=8000.0),
     simulate("crowd", 6, targets=60, scans=3, width=3000.0),
@@ -53,3 +65,8 @@ if loaded()[0] != before:
 def test_nothing_compiles_or_loads():
     done = process("-c", _PROGRAM)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
+
+
+def test_unknown_solver():
+    with pytest.raises(InvalidInputError, match="solver: unknown name 'antz'"):
+        assoc.warm_up(["antz"])
