@@ -1,13 +1,8 @@
 """Positions of tuples against a dense search of starts by scipy, for all mixes of sensors, near ones, too.
 
-    python -m tests.costs.dense_starts --count 10000 --seed 7
-
-Each case is one target seen by two to four sensors, half of them with sensors 30 m to 5 km away from it. Printed is by
-how much the chi-square value at the position found exceeds the best of all starts, where the measurements determine a
-position and the best one lies at the heights of the region.
+Each case is one target seen by two to four sensors, half of them with sensors 30 m to 5 km away from it.
 """
 
-import argparse
 import math
 from collections.abc import Iterator
 
@@ -88,22 +83,3 @@ def excess(seed: int, number: int) -> tuple[str, float] | None:
     if chi > _PLAUSIBLE or not determined(scene, one[0], where) or not -_BELOW < where[2] < 1.5 * HEIGHT:
         return None
     return kinds, ours - chi
-
-
-def main() -> None:
-    """Print how many fits are not the best, and the worst of them."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=7)
-    chosen = parser.parse_args()
-    found = [one for number in range(chosen.count) if (one := excess(chosen.seed, number)) is not None]
-    values = np.array([value for _, value in found])
-    print(f"{len(values)} of {chosen.count} tuples compared")
-    for limit in (0.04, 1.0, 3.0, 10.0):
-        print(f"chi-square more than {limit:g} above the best: {int((values > limit).sum())}")
-    for worst in np.argsort(values)[::-1][:5]:
-        print(f"{found[worst][0]}: {values[worst]:.3g}")
-
-
-if __name__ == "__main__":
-    main()

@@ -137,6 +137,25 @@ def test_parts_that_there_is_no_time_to_solve_again_stay_as_they_were(packing):
 
 
 @compiled
+def test_bounds_of_parts_hold_and_rise():
+    """From incumbents near and far, with cuts: no part that may hold the optimum is lost."""
+    made = 0
+    for seed in (16, 24, 31):
+        packing, duals, bound = ghosts(10, seed)
+        best = finished(BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))).weight
+        for incumbent in (0.95 * bound, best + 1e-3 * abs(best)):
+            one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True, splitting=ALWAYS)
+            bounds = []
+            while not one.done:
+                one.run(1)
+                bounds.append(one.lower_bound)
+            made += len(one._leaves) > 1
+            assert one.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
+            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9
+    assert made > 1
+
+
+@compiled
 def test_axial_packings_and_problems_without_dummies():
     """All columns of one size leave nothing to split; of several sizes, with rows that must be covered, they do."""
     for seed in range(4):

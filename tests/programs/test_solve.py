@@ -4,16 +4,13 @@ import csv
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 import assoc
 from assoc.simulation import simulate
-from tests.listening import wait_until_it_listens
 from tests.programs.terminal import shown
 
 
@@ -137,25 +134,6 @@ def test_time_limit_is_for_each_scan(run, tmp_path):
         assert scan["cost"] >= scan["lower_bound"] - 1e-9
     rows = table(tmp_path / "o.csv")
     assert all(row["stopped_by"] in ("time_limit", "gap") for row in rows)
-
-
-def test_interrupt_is_clean(tmp_path):
-    simulate("bearing-only", targets=70, scans=4).save(tmp_path / "s.npz")
-    endless = ["--iterations", "1000000000", "--patience", "1000000000"]
-    command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", "aco", "--json", "o.json", *endless]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
-    wait_until_it_listens(process)
-    time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=600)
-    assert process.returncode == 130
-    if err == "assoc.solve: interrupted\n":
-        # nothing was finished: a compiler does not listen
-        assert out == "" and [entry.name for entry in tmp_path.iterdir()] == ["s.npz"]
-    else:
-        scans = json.loads((tmp_path / "o.json").read_text())["scans"]
-        assert f"; {len(scans)} of 4 scans are finished and written\n" in err
-        assert sorted(entry.name for entry in tmp_path.iterdir()) == ["o.json", "s.npz"]
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")

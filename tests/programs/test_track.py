@@ -214,13 +214,6 @@ def test_too_many_tuples_is_code_3(scene_file, tmp_path, capsys):
     assert "more than max_tuples = " in capsys.readouterr().err
 
 
-def test_help_is_quick_and_lists_trackers(run):
-    done = run("assoc.track", "--help")
-    assert done.returncode == 0
-    for name in TRACKERS:
-        assert name in done.stdout
-
-
 def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
     from assoc.metrics import ct_mt_it
     from assoc.recordings import clustering_time_window, radar_of, read_plots

@@ -4,7 +4,6 @@ import contextlib
 import json
 import operator
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -14,10 +13,8 @@ import types
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from assoc._files.npz import save_npz
 from assoc._system.processes import leave, process_map, send, start_python
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.simulation import simulate
@@ -32,19 +29,6 @@ def scene_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("scenes") / "scene.npz"
     simulate("three-radar", 2, scans=4).save(path)
     return path
-
-
-def test_a_full_disk_while_an_archive_is_written(tmp_path):
-    """Closing the archive fails as well then, and what is said must be what the disk said."""
-    (tmp_path / "a.npz").write_bytes(b"old")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (300, before[1]))
-    try:
-        with pytest.raises(InvalidInputError, match=r"cannot be written \(File too large\)"):
-            save_npz(tmp_path / "a.npz", "assoc.test", 1, {"x": np.random.default_rng(0).random(10_000)})
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert os.listdir(tmp_path) == ["a.npz"] and (tmp_path / "a.npz").read_bytes() == b"old"
 
 
 def test_stdout_on_a_full_disk(scene_file):

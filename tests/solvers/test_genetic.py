@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import assoc
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from tests.solvers.pieces import (
@@ -149,14 +148,6 @@ def test_breeding_starts_from_the_best_known():
     breeding.iterate(search_of(one))
     np.testing.assert_array_equal(breeding.members[0], known)
     assert breeding.members.shape == (20, one.packing.num_rows)
-
-
-def test_breeding_alone_finds_what_greedy_does_not():
-    problem = open_problem()
-    best, greedy = assoc.assign(problem, "exact").cost, assoc.assign(problem, "greedy").cost
-    costs = [assoc.assign(problem, "genetic", seed=seed, refinement="none").cost for seed in range(2)]
-    assert greedy > best + 1.0
-    assert min(costs) == pytest.approx(best, abs=1e-6)
 
 
 def test_a_population_learns_what_others_found():

@@ -19,7 +19,7 @@ from assoc.solvers.methods import EXACT_METHODS
 from assoc.solvers.search_parameters import SearchParameters
 from tests.oracles import gated_problem, milp_optimum
 from tests.sizes import sample
-from tests.solvers.pieces import component, problems, random_covers, search_of, with_greedy_cover
+from tests.solvers.pieces import component, open_problem, problems, random_covers, search_of, with_greedy_cover
 
 PROBLEM = gated_problem(np.random.default_rng(12), (8, 8, 7), 0.5, "mixed")
 
@@ -274,3 +274,12 @@ def test_weights_that_are_all_alike_have_a_size():
     keep = np.random.default_rng(2).random(len(grid)) < 0.3
     one = component(assoc.AssignmentProblem(grid[keep], np.full(keep.sum(), -1e5), [4, 4, 4]))
     assert one.temperature == pytest.approx(0.02 * 1e5)
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_with_nothing_else_at_work_each_finds_what_greedy_does_not(solver):
+    problem = open_problem()
+    best, greedy = assoc.assign(problem, "exact").cost, assoc.assign(problem, "greedy").cost
+    assert greedy > best + 1.0
+    costs = [assoc.assign(problem, solver, seed=seed, refinement="none").cost for seed in range(2)]
+    assert min(costs) == pytest.approx(best, abs=1e-6)

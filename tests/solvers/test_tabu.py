@@ -13,7 +13,6 @@ from tests.solvers.pieces import (
     component,
     cover_of,
     is_complete,
-    open_problem,
     problems,
     reference_walk,
     rows_of,
@@ -244,10 +243,3 @@ def test_tabu_columns_are_passed_over_unless_they_lead_below_the_best():
     free = tabu.copy()
     free[heavy] = 0
     assert moved(one, [rival, third], free, tenure=0)[0] == [heavy]
-
-
-def test_moves_alone_find_what_greedy_does_not():
-    problem = open_problem()
-    best, greedy = assoc.assign(problem, "exact").cost, assoc.assign(problem, "greedy").cost
-    assert greedy > best + 1.0
-    assert assoc.assign(problem, "tabu", refinement="none").cost == pytest.approx(best, abs=1e-6)

@@ -15,7 +15,6 @@ from assoc.tracking import (
     StaticFusionTracker,
     TrackOrientedMHT,
 )
-from assoc.tracking.file import file_arrays
 from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
@@ -86,22 +85,6 @@ def test_the_order_of_the_sensors_matters_little(kind):
     sigma = np.sqrt(max(t.covariance[:3, :3].trace() for t in found))
     for other in positions[1:]:
         np.testing.assert_allclose(positions[0], other, atol=0.1 * sigma)
-
-
-@sample("kind", KINDS, every=3)
-def test_memory_does_not_grow(kind):
-    one = scene(30)
-    tracker = kind.for_scene(one)
-
-    def size():
-        return sum(value.nbytes for value in file_arrays(tracker.settings, tracker.state).values())
-
-    stepped(tracker, one, 0, 10)
-    sizes = [size()]
-    for k in range(10, 30):
-        stepped(tracker, one, k, k + 1)
-        sizes.append(size())
-    assert np.median(sizes[-10:]) < 1.5 * np.median(sizes[:10])
 
 
 @pytest.mark.parametrize("kind", KINDS)
