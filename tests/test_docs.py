@@ -339,7 +339,7 @@ def test_commands_of_the_pages_run(page, inputs, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("page", "section"),
-    [("ant_colony", "## Equations 7 to 11"), ("live", "# Live operation"), ("own_loop", "# Only the assignment")],
+    [("ant_colony", "## Equations 7 to 11"), ("own_loop", "# Only the assignment")],
 )
 def test_python_of_the_pages_runs(page, section, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

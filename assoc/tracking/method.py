@@ -22,7 +22,8 @@ from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step, decision
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import false_alarms_at, to_delete
+from assoc.tracking.stages.coverage import false_alarms_at
+from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 
 

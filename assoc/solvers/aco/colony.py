@@ -5,6 +5,7 @@ fit, and staying uncovered where the row has slack, with the probability of eq. 
 
     p_j = tau_j^alpha eta_j^beta / sum over the allowed choices,    eta_j = exp(-rc_j / T)
 
+That walk is `packing/neighbourhoods/random_cover.py`; here are the cycle and the pheromone.
 The visibility eta uses the reduced cost rc_j, which is what choosing j adds to the lower bound. T is halved from ant to
 ant, over a range of 500. Pheromone lies between tau_min and 1 and starts at 1 (hyper-cube form of eq. 9:
 tau <- rho tau + (1 - rho) [j in the best]).

@@ -35,7 +35,8 @@ from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step
 from assoc.tracking.records.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import false_alarms_at, to_delete
+from assoc.tracking.stages.coverage import false_alarms_at
+from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.tracker import Tracker
 

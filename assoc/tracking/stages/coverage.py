@@ -1,4 +1,4 @@
-"""What the dwells of sensors covered: how often in a scan, what a miss of a track says, which were missed too long.
+"""What the dwells of sensors covered: how often in a scan, what a miss of a track says.
 
 A sensor that cannot see a track has not missed it: its detection probability counts times the share of the track's
 predicted density in its view (`assoc.costs.views`).
@@ -13,7 +13,6 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.views import log_missed, places_of
-from assoc.filters import FreeFlight
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.clutter import YOUNG, ClutterMap
@@ -21,15 +20,11 @@ from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 
 _FORGETTING = 0.05
-# turns in a scan; with fewer all sensors are taken to be off, and no track is deleted
-_LEAST_TURN = 1e-3
 # a scan counts for a track if this share of it is in view of a sensor
 _COVERED = 0.5
 _HOUR = 3600.0
 # logarithm beyond which numbers of false alarms are as good as infinite
 _SURELY_FALSE = 500.0
-# standard deviations below the region's floor
-_SURELY = 3.0
 
 
 def keep_pace(progress: Progress) -> Progress:
@@ -57,11 +52,11 @@ def count_out_of_view(progress: Progress) -> Progress:
     hidden = ~(seen if sectors is None else seen & (sectors[:, 0] != sectors[:, 1])).any(axis=1)
     if not hidden.any():
         return progress
-    hidden &= _inside(settings, states, 3)
+    hidden &= inside(settings, states, 3)
     return progress.with_state(tracks=tracks.hidden_for(np.where(hidden, dt, 0.0)))
 
 
-def _inside(settings: TrackerSettings, states: Any, most: int) -> Array:
+def inside(settings: TrackerSettings, states: Any, most: int) -> Array:
     """Which tracks are inside the region along the first axes, at most so many, bool (T,)."""
     region, axes = settings.scene.region, min(most, len(settings.filter.motion.position))
     where = places_of(settings.filter, states)[0][:, :axes]
@@ -154,46 +149,3 @@ def densities_at(progress: Progress, tracks: TrackBatch, clutter: ClutterMap) ->
         for s in np.flatnonzero(crowded).tolist():
             found[:, :, s] = [values[s] for values in both]
     return found
-
-
-def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
-    """Which tracks are to be deleted after the scan, bool (T,)."""
-    settings, state, time = progress.settings, progress.state, progress.scan.time
-    # dwells are counted in scans of the sensor that turns fastest
-    most = float(state.turns.max())
-    if most < _LEAST_TURN:
-        return np.zeros(len(tracks), dtype=np.bool_)
-    # a track with a detection at this instant need not wait for one
-    patience, rows = np.full(len(tracks), np.inf), np.flatnonzero(tracks.last_detection < time)
-    if len(rows):
-        states = tracks.states[rows]
-        share = settings.views.at_means(states)
-        if settings.by_range is not None:
-            # where little is detected, tracks of false alarms would wait long for a second detection
-            usual = np.maximum(share, settings.by_range.mean(axis=1))
-            share = np.where(tracks.confirmed[rows, None] | (share == 0.0), share, usual)
-        dark = np.flatnonzero(~share.any(axis=1))
-        if len(dark):
-            # nothing is lost with a track that no sensor sees and that is tentative, or outside the region
-            share[dark] = ~(tracks.confirmed[rows[dark]] & _inside(settings, states[dark], 3))[:, None]
-        miss = log_missed(settings.terms.miss, share) * (state.turns / most)
-        patience[rows] = settings.life_cycle.patience(miss, state.pace / most)
-    gone = tracks.to_delete(settings.life_cycle, time, patience)
-    if settings.life_cycle.deletion == "time" and settings.life_cycle.deletion_time is None:
-        # a missed target that has probably left the region is not waited for, nor shown, unless a sensor that
-        # measures distances sees that far; heights may be unknown
-        left = np.flatnonzero(tracks.confirmed & (tracks.missed > 0) & (tracks.existence < 0.0))
-        if len(left):
-            seen = settings.views.at_means(tracks.states[left])[:, settings.ranging].any(axis=1)
-            gone[left] |= ~seen & ~_inside(settings, tracks.states[left], 2)
-    # what falls freely, is missed and surely below the region has come down
-    floor = settings.scene.region[2, 0]
-    if isinstance(settings.filter.motion, FreeFlight) and settings.height is None:
-        missed = np.flatnonzero(tracks.last_detection < time)
-        where, spread = places_of(settings.filter, tracks.states[missed])
-        gone[missed] |= where[:, 2] + _SURELY * np.sqrt(spread[:, 2, 2]) < floor
-    # out of view for so long that nobody knows where it is
-    hidden = np.flatnonzero(tracks.hidden > 0.0)
-    if len(hidden):
-        gone[hidden] |= ~settings.births.narrow(places_of(settings.filter, tracks.states[hidden])[1])
-    return gone
