@@ -1,3 +1,4 @@
+import itertools
 import math
 from functools import cache
 
@@ -6,7 +7,7 @@ import pytest
 
 from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.simulation import simulate
-from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
+from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle, TrackOrientedMHT
 from tests.tracking import plain
 from tests.tracking.stepping import stepped
 
@@ -123,6 +124,23 @@ def test_the_28_hypotheses_of_reids_example():
     # 0: false alarm, 1 and 2: the targets, above: a new one; no target twice
     rows = ((a, b, c) for a in (0, 1, 2, 3) for b in (0, 2, 4) for c in (0, 2, 5))
     assert sum(row.count(1) < 2 and row.count(2) < 2 for row in rows) == 28
+
+
+def test_targets_that_are_seldom_detected_are_confirmed_as_by_mht():
+    """Of three scans, hardly one detects: what the best hypothesis leaves to false alarms is not decided yet."""
+    scans = {HypothesisOrientedMHT: 0, TrackOrientedMHT: 0}
+    for kind, seed in itertools.product(scans, range(6)):
+        rng, sensor = np.random.default_rng(seed), plain.sensor(P=0.3, rate=100.0)
+        own = kind([sensor], KalmanFilter(ConstantVelocity(1.0)), region=plain.REGION, initiation=plain.INITIATION)
+        for k in range(60):
+            z = rng.uniform(*plain.REGION.T, (rng.poisson(100.0), 3))
+            if rng.random() < 0.3:
+                z = np.concatenate([z, [[20.0 * k, 500.0, 500.0] + rng.normal(0.0, 10.0, 3)]])
+            own.step(float(k), [z])
+            if any(track.confirmed for track in own.tracks):
+                break
+        scans[kind] += k
+    assert scans[HypothesisOrientedMHT] <= 1.1 * scans[TrackOrientedMHT] < 6 * 40
 
 
 def test_a_hundred_aircraft_are_confirmed_within_five_scans():

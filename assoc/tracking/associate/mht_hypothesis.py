@@ -41,6 +41,9 @@ from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.tracker import Tracker
 
+_MANY = 0.25
+"""Share of new targets, see `ClusteredHypotheses._seldom`."""
+
 
 class Hypotheses(NamedTuple):
     """Clusters and window of B branches, without their scores and states."""
@@ -139,7 +142,7 @@ class ClusteredHypotheses(DeferringMethod):
         known = np.union1d(known, tracks.track_id[tracks.confirmed])
         final: tuple[Decision, ...] = ()
         if len(hypotheses.window.times) == self.depth:
-            tracks, hypotheses = _kept(tracks, hypotheses, _agreeing(tracks, hypotheses))
+            tracks, hypotheses = _kept(tracks, hypotheses, _agreeing(tracks, hypotheses, self._seldom(progress)))
             final = (hypotheses.window.decision(self.depth - 1, scan, tracks, hypotheses.best),)
             hypotheses = hypotheses._replace(window=hypotheses.window.closed())
         # a track is deleted if all its branches are to be deleted, or that of the best hypothesis
@@ -151,6 +154,12 @@ class ClusteredHypotheses(DeferringMethod):
         ended = np.setdiff1d(known, tracks.track_id)
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
         return progress.with_state(tracks=tracks, method_state=hypotheses)._replace(step=step)
+
+    def _seldom(self, progress: Progress) -> bool:
+        """Whether many new targets are detected less than twice in the window: it says nothing of them."""
+        P = np.array([sensor.detection_probability for sensor in progress.settings.sensors])
+        once = 1.0 + self.depth * (P / (1.0 - P)).sum()
+        return bool(once * np.prod(1.0 - P) ** self.depth > _MANY)
 
     def renamed(self, state: TrackerState, ids: Array, names: Array) -> TrackerState:
         """The state with these names (K,) in place of ids (K,); tracks that had these names end."""
@@ -249,10 +258,18 @@ def _without(tracks: TrackBatch, hypotheses: Hypotheses, gone: Array) -> tuple[T
     return _kept(tracks, hypotheses, [without(group, gone[group.branches]) for group in left])
 
 
-def _agreeing(tracks: TrackBatch, hypotheses: Hypotheses) -> list[Cluster]:
-    """Clusters without the hypotheses that disagree with the best one about the oldest scan of the window."""
-    history = hypotheses.window.history[:, -hypotheses.window.sizes.shape[1] :].astype(np.int64)
-    owner = np.where(history > 0, tracks.track_id[:, None] * (history.max(initial=0) + 1) + history, 0)
+def _agreeing(tracks: TrackBatch, hypotheses: Hypotheses, seldom: bool) -> list[Cluster]:
+    """Clusters without the hypotheses that disagree with the best one about the oldest scan of the window.
+
+    What the best one leaves to false alarms may yet be of a target that is `seldom` detected, if no confirmed track of
+    the cluster has to do with it: nothing is decided then.
+    """
+    ids, history = tracks.track_id, hypotheses.window.history[:, -hypotheses.window.sizes.shape[1] :].astype(np.int64)
+    owner = np.where(history > 0, ids[:, None] * (history.max(initial=0) + 1) + history, 0)
+    best = np.isin(ids, ids[hypotheses.best])
+    for group in hypotheses.clusters:
+        if seldom and not tracks.confirmed[group.branches].any():
+            owner[group.branches[~best[group.branches]]] = 0
     decided = np.asarray(owner.any(axis=1))
     return [
         agreeing(group, owner[group.branches]) if decided[group.branches].any() else group
