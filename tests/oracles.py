@@ -14,7 +14,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common.checking import check_answer
 from experiments.common.peers import by_milp
-from tests.reliability.exact import coverings, exact_optimum, masks
+from tests.reliability.exact import coverings, exact_optimum, masks, unit_of
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,8 @@ def all_solutions(problem: AssignmentProblem, limit: int = 300_000) -> list[Rank
     MemoryError
         There are more than ``limit``: the problem is too large for this oracle.
     """
-    covering, to_cover, unit = coverings(problem)
+    unit = unit_of(problem)
+    covering, to_cover = coverings(problem, unit)
     key = dict(zip(masks(problem), map(tuple, problem.tuples.tolist()), strict=True))
     found: list[Ranked] = []
 

@@ -14,6 +14,7 @@ from assoc._system.interrupts import interruptible
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.shown import Shown
 from assoc._types import Array, Floats, Ints
+from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
@@ -22,6 +23,8 @@ from assoc.ranking.distinct import distinct
 from assoc.ranking.sampler import estimates
 from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
 from assoc.ranking.sweep import Graph
+from assoc.solvers.exact.parameters import ExactParameters
+from assoc.solvers.exact.solve import solve as exact
 from assoc.solvers.greedy.solve import greedy_choice
 from assoc.solvers.methods import EXACT_METHODS
 
@@ -34,6 +37,8 @@ _EXACT = 1e-8
 """What rounding may change of a sum that is called exact."""
 _FOR_PRICES, _FOR_SUMS = 0.3, 0.5
 """Shares of the time limit: for multipliers, and for these and the sums together."""
+_FOR_CHAINS = 0.8
+"""Share of the time left that a search for a good solution leaves to the chains that begin with it."""
 _UNDERFLOW = 745.0
 """A tuple whose reduced cost is above this weighs nothing."""
 
@@ -157,12 +162,20 @@ def _of_columns(
         if start is None and not run.should_stop():
             raise infeasible(prepare(problem).packing, run)
         if start is not None:
-            best = column[prepare(problem).packing.origin[start]]
+            best = column[prepare(problem).packing.origin[_improved(prepare(problem).packing, start, run)]]
             found = estimates(columns, open_[:num], open_[num:], best[best >= 0], run, length)
             if found is not None:
                 probability[open_] = found[0]
                 error[open_] = np.minimum(np.maximum(found[1], rounding[open_]), 1.0)
     return np.clip(probability, 0.0, 1.0), error, exact
+
+
+def _improved(packing: Packing, start: Ints, run: Run) -> Ints:
+    """Columns of the best solution that `exact` finds with next to no branching; the start without time."""
+    limit = None if run.time_limit is None else run.time_limit - _FOR_CHAINS * run.remaining()
+    part = run.part(0, limit)
+    part.start = part.fallback = start
+    return start if part.should_stop() else exact(packing, ExactParameters(nodes=1), part).columns
 
 
 def _graph(columns: AllColumns) -> Graph:

@@ -1,11 +1,11 @@
 """Estimates of the probability of each tuple by Gibbs sampling: solutions drawn one from the other.
 
-A move chooses up to three measurements near each other, takes the tuples that contain them apart, and draws tuples for
+A move chooses up to five measurements near each other, takes the tuples that contain them apart, and draws tuples for
 them anew, from all combinations that the rest of the solution allows, each with its conditional probability.
-Insertions, ejections and exchanges between two or three tuples are such moves. Which measurements are chosen does not
-depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). Some chains start
-from a good solution, others from random ones; how far apart their frequencies are says how far the estimates can be
-trusted.
+Insertions, ejections and exchanges between some tuples are such moves. Which measurements are chosen does not
+depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). Half of the chains
+start from a good solution, the others from random ones, up to as far from it as costs go; how far apart their
+frequencies are says how far the estimates can be trusted.
 
 References
 ----------
@@ -30,16 +30,20 @@ from assoc.solvers.greedy.solve import greedy_choice
 
 _CHAINS = 8
 # moves of a chain: a few, some more for each measurement, and at most; those between two checks of the time
-_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 400, 400_000, 5_000
+_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 400, 400_000, 1_000
+# columns that all chains look at, after which they end: at most, and so many more for each measurement
+_LOOKS, _MORE_LOOKS = 300_000_000, 300_000
+# what a step from one combination to the next counts for, by its time
+_STEP = 3
 # share of the moves that a chain forgets
 _FORGOTTEN = 0.2
-# combinations of a move; where there are more, the solution stays
-_ROOM = 1024
-# measurements that a move takes
-_TAKEN = 3
+# combinations of a move of several measurements; where there are more, fewer are taken
+_ROOM = 256
+# measurements that a move takes at most; each one more half as often
+_TAKEN = 5
 # a tuple is followed to the next measurement with its weight, relative to the best solution's, to this power
 _FLATNESS = 0.3
-# mean of what is added to reduced costs where a chain begins with columns drawn, and how many of them are tried
+# least mean of what is added to reduced costs where a chain begins with columns drawn, and how many of them are tried
 _SPREAD, _DRAWN = 3.0, 50_000
 
 
@@ -64,6 +68,8 @@ class _Chain(NamedTuple):
     """The move that chose each column that is chosen."""
     spent: Floats
     """Moves for which each column was chosen before."""
+    moved: NDArray[np.bool_]
+    """Whether the column of each row ever changed."""
 
 
 def estimates(
@@ -72,33 +78,36 @@ def estimates(
     """Probabilities of the chosen n columns, and of the chosen m rows to be in none, and standard errors, (2, n + m).
 
     ``which`` (N,) and ``rows`` (R,) choose whole clusters. Of the chains, every other one begins with the solution
-    ``best`` (columns), the others, where rows may stay alone, with columns drawn at random. ``length`` multiplies the
-    number of moves. None without time.
+    ``best`` (columns), the others with columns drawn at random, each less by their costs than the one before.
+    ``length`` multiplies the number of moves. None without time.
     """
     number = np.cumsum(rows) - 1
     cols = np.where(columns.rows >= 0, number[columns.rows], -1)[which].astype(np.int32)
     problem = _problem(cols, columns.weights[which], columns.reduced[which], ~columns.slack[rows])
     size, own = int(rows.sum()), np.cumsum(which) - 1
     moves = int(length * min(max(_LEAST, _MOVES * size), _MOST))
+    begun = np.full((_CHAINS, size), -1, dtype=np.int32)
     chains = []
-    for c in range(_CHAINS):
-        owner = np.full(size, -1, dtype=np.int32)
+    for c, owner in enumerate(begun):
         start: Array | list[int] = own[best[which[best]]]
         if c % 2:
-            rng = np.random.default_rng(c)
-            other = _completed(columns, run, rng) if problem.must.any() else None
-            if other is not None:
+            rng, spread = np.random.default_rng(c), _spread(columns.reduced[which], c)
+            if not problem.must.any():
+                # the last one with nothing, which is far from all that is likely
+                start = _drawn(cols, columns.reduced[which], spread, rng) if c < _CHAINS - 1 else []
+            elif (other := _completed(columns, run, spread, rng)) is not None:
                 start = own[other[which[other]]]
-            elif not problem.must.any():
-                start = _drawn(cols, columns.reduced[which], rng)
         for j in start:
             owner[cols[j][cols[j] >= 0]] = j
-        chains.append(_Chain(owner, np.array([c << 32], dtype=np.uint64), np.zeros(len(cols)), np.zeros(len(cols))))
-    made = forgotten = 0
-    while made < moves and not run.should_stop():
+        since, spent = np.zeros((2, len(cols)))
+        counter, moved = np.array([c << 32], dtype=np.uint64), np.zeros(size, dtype=np.bool_)
+        chains.append(_Chain(owner.copy(), counter, since, spent, moved))
+    made = forgotten = looks = 0
+    most_looks = length * (_LOOKS + _MORE_LOOKS * size)
+    while made < moves and looks < most_looks and not run.should_stop():
         ahead = min(_AT_ONCE, moves - made)
         for chain in chains:
-            _walk(problem, chain, made, made + ahead)
+            looks += _walk(problem, chain, made, made + ahead)
         made += ahead
         if forgotten == 0 and made >= _FORGOTTEN * moves:
             forgotten = made if made < moves else 0
@@ -113,25 +122,50 @@ def estimates(
     column, sensor = np.nonzero(cols >= 0)
     alone = np.ones((size, _CHAINS))
     np.subtract.at(alone, cols[column, sensor], share.T[column])
-    return np.array(_with_errors(np.concatenate([share, np.clip(alone.T, 0.0, 1.0)], axis=1)))
+    share = np.concatenate([share, np.clip(alone.T, 0.0, 1.0)], axis=1)
+    seen = np.any([chain.moved for chain in chains], axis=0) | (begun != begun[0]).any(axis=0)
+    ends = np.concatenate([cols, np.column_stack([np.arange(size), np.full((size, cols.shape[1] - 1), -1)])])
+    return np.array([share.mean(axis=0), _errors(share, ends, seen, _CHAINS * (made - forgotten))])
 
 
-def _with_errors(share: Floats) -> tuple[Floats, Floats]:
-    """Mean and standard error of frequencies in C chains, (C, n).
+def _errors(share: Floats, ends: Ints, seen: NDArray[np.bool_], moves: int) -> Floats:
+    """Standard errors of the mean frequencies ``share`` (C, n) of C chains; ``ends`` (n, S) are the rows of each.
 
     The spread of few chains may be small by chance, and that of a rare tuple is 0: errors are at least those of as many
-    independent solutions as the spread of all tuples together says the chains are worth.
+    independent solutions as the chains are worth, by the spread of all tuples together and by that of the tuples of
+    each row alone, since some rows mix later than others, and no more than there were ``moves``. Of rows that no chain
+    changed, and that all began with the same column (not ``seen``), nothing is known: that chains agree there is no
+    sign of anything.
     """
     chains = len(share)
     mean, square = share.mean(axis=0), share.var(axis=0, ddof=1) / chains
-    worth = chains if not square.any() else max(float((mean * (1.0 - mean)).sum() / square.sum()), 1.0)
-    near = (mean * worth + 1.0) / (worth + 2.0)
-    return mean, np.sqrt(np.maximum(square, near * (1.0 - near) / worth))
+    single = mean * (1.0 - mean)
+    worth = max(float(single.sum() / square.sum()), 1.0) if square.any() else float(chains)
+    worth = min(worth, float(moves))
+    which, sensor = np.nonzero(ends >= 0)
+    row = ends[which, sensor]
+    over, under = (np.bincount(row, part[which], seen.size) for part in (single, square))
+    of_row = np.divide(over, under, out=np.full(seen.size, worth), where=under > 0.0).clip(1.0, worth)
+    least = np.full(len(ends), worth)
+    np.minimum.at(least, which, of_row[row])
+    near = (mean * least + 1.0) / (least + 2.0)
+    error = np.sqrt(np.maximum(square, near * (1.0 - near) / least))
+    error[which[~seen[row]]] = 1.0
+    return np.asarray(error)
 
 
-def _drawn(cols: Ints, reduced: Floats, rng: np.random.Generator) -> list[int]:
+def _spread(reduced: Floats, chain: int) -> float:
+    """Mean of what is added to reduced costs where a chain begins: from a little to the size of the costs themselves.
+
+    Chains that began near each other, in a hollow that none can leave, would agree on what is wrong.
+    """
+    top = max(float(reduced.max(initial=0.0)) / _SPREAD, 1.0)
+    return _SPREAD * top ** (chain / (_CHAINS - 1))
+
+
+def _drawn(cols: Ints, reduced: Floats, spread: float, rng: np.random.Generator) -> list[int]:
     """Columns without common rows, cheap ones more likely."""
-    key = reduced + rng.exponential(_SPREAD, len(reduced))
+    key = reduced + rng.exponential(spread, len(reduced))
     used, chosen = np.zeros(int(cols.max(initial=-1)) + 2, dtype=np.bool_), []
     for j in np.argsort(key, kind="stable")[:_DRAWN].tolist():
         at = cols[j][cols[j] >= 0]
@@ -141,12 +175,12 @@ def _drawn(cols: Ints, reduced: Floats, rng: np.random.Generator) -> list[int]:
     return chosen
 
 
-def _completed(columns: AllColumns, run: Run, rng: np.random.Generator) -> Array | None:
+def _completed(columns: AllColumns, run: Run, spread: float, rng: np.random.Generator) -> Array | None:
     """Columns of a solution where rows must be covered, cheap ones more likely; None if none is found in the time.
 
     Chains may not pass from one solution to all others there: their spread shows it if they begin apart.
     """
-    prices = columns.reduced + rng.exponential(_SPREAD, len(columns.reduced))
+    prices = columns.reduced + rng.exponential(spread, len(columns.reduced))
     packing = assemble(columns.rows, prices, columns.slack, np.arange(len(prices), dtype=np.int32))
     chosen = greedy_choice(packing, run.part(0, run.time_limit))
     return None if chosen is None else packing.origin[chosen].astype(np.int64)
@@ -166,37 +200,27 @@ def _problem(cols: NDArray[np.int32], weights: Floats, reduced: Floats, must: ND
 
 
 @njit
-def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> None:
-    """Make the moves from this one to before that one."""
+def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> int:
+    """Make the moves from this one to before that one; return at how many columns they looked."""
     cols, owner, num_sensors = problem.cols, chain.owner, problem.cols.shape[1]
     block, freed, old = np.empty(_TAKEN, np.int64), np.empty(_TAKEN * num_sensors, np.int64), np.empty(_TAKEN, np.int64)
-    choice, value = np.empty((_ROOM, _TAKEN), np.int64), np.empty(_ROOM)
+    # a measurement alone can always be covered anew
+    most = np.diff(problem.row_ptr).max()
+    room = max(_ROOM, most + 1)
+    choice, value, fitting = np.empty((room, _TAKEN), np.int64), np.empty(room), np.empty((_TAKEN, most), np.int64)
+    looks = 0
     for move in range(first, last):
-        taken = _take(problem, chain.counter, owner.size, block)
-        num_old = num_freed = 0
-        for i in range(taken):
-            j = owner[block[i]]
-            if j < 0:
-                # freed with a column, or alone
-                seen = False
-                for f in range(num_freed):
-                    seen = seen or freed[f] == block[i]
-                if not seen:
-                    freed[num_freed] = block[i]
-                    num_freed += 1
-                continue
-            old[num_old] = j
-            num_old += 1
-            for s in range(num_sensors):
-                if cols[j, s] >= 0:
-                    owner[cols[j, s]] = -1
-                    freed[num_freed] = cols[j, s]
-                    num_freed += 1
-        count = _combinations(problem, owner, block[:taken], freed[:num_freed], choice, value)
-        if count > _ROOM:
+        taken = _take(problem, chain.counter, owner.size, block) + 1
+        count, num_old = room + 1, 0
+        # how many measurements are taken follows from those chosen and from the tuples that stay: it would be the same
+        # on the way back
+        while count > room:
             for i in range(num_old):
                 _put(cols, owner, old[i], old[i])
-            continue
+            taken -= 1
+            num_old, num_freed = _free(cols, owner, block[:taken], old, freed)
+            count, seen = _combinations(problem, owner, block[:taken], freed[:num_freed], choice, value, fitting)
+            looks += seen
         top, total = -np.inf, 0.0
         for i in range(count):
             top = max(top, value[i])
@@ -210,11 +234,43 @@ def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> None:
             drawn += 1
         for i in range(num_old):
             chain.spent[old[i]] += move - chain.since[old[i]]
+            chain.since[old[i]] = -1.0
         for i in range(taken):
             j = choice[drawn, i]
             if j >= 0:
                 _put(cols, owner, j, j)
+                if chain.since[j] != -1.0:
+                    _put(cols, chain.moved, j, True)
                 chain.since[j] = move
+        for i in range(num_old):
+            if chain.since[old[i]] == -1.0:
+                _put(cols, chain.moved, old[i], True)
+    return looks
+
+
+@inner_njit
+def _free(cols: Ints, owner: Ints, block: Ints, old: Ints, freed: Ints) -> tuple[int, int]:
+    """Take the columns of the rows of the block away; lists them and all rows that are free then, returns how many."""
+    num_old = num_freed = 0
+    for r in block:
+        j = owner[r]
+        if j < 0:
+            # freed with a column, or alone
+            free = False
+            for f in range(num_freed):
+                free = free or freed[f] == r
+            if not free:
+                freed[num_freed] = r
+                num_freed += 1
+            continue
+        old[num_old] = j
+        num_old += 1
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                owner[cols[j, s]] = -1
+                freed[num_freed] = cols[j, s]
+                num_freed += 1
+    return num_old, num_freed
 
 
 @inner_njit
@@ -240,7 +296,9 @@ def _take(problem: _Problem, counter: NDArray[np.uint64], rows: int, block: Ints
     """Choose measurements near each other, whatever the solution; return how many."""
     block[0] = min(int(_random(counter) * rows), rows - 1)
     taken = 1
-    for _ in range(int(_random(counter) * _TAKEN)):
+    for _ in range(_TAKEN - 1):
+        if _random(counter) < 0.5:
+            break
         r = block[taken - 1]
         for _ in range(2):
             low, high = problem.row_ptr[r], problem.row_ptr[r + 1]
@@ -264,22 +322,43 @@ def _take(problem: _Problem, counter: NDArray[np.uint64], rows: int, block: Ints
 
 
 @inner_njit
-def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choice: Ints, value: Floats) -> int:
+def _fitting(problem: _Problem, owner: Ints, block: Ints, level: int, fitting: Ints) -> int:
+    """List the columns of a row of the block that the rest of the solution allows; return how many."""
+    cols, count = problem.cols, 0
+    for x in range(problem.row_ptr[block[level]], problem.row_ptr[block[level] + 1]):
+        j, free = problem.row_cols[x], True
+        for s in range(cols.shape[1]):
+            free = free and (cols[j, s] < 0 or owner[cols[j, s]] < 0)
+            # rows before that are uncovered stay so: their own turn listed what covers them
+            for i in range(level):
+                free = free and cols[j, s] != block[i]
+        if free:
+            fitting[level, count] = j
+            count += 1
+    return count
+
+
+@inner_njit
+def _combinations(
+    problem: _Problem, owner: Ints, block: Ints, freed: Ints, choice: Ints, value: Floats, fitting: Ints
+) -> tuple[int, int]:
     """List what can cover the rows of the block: columns or -1, and the logarithm of their weight.
 
-    Returns how many; one more than there is room for where they are too many.
+    Returns how many, one more than there is room for where they are too many; and at how many columns it looked.
     """
-    cols, row_ptr, row_cols = problem.cols, problem.row_ptr, problem.row_cols
-    num_sensors, taken, count = cols.shape[1], block.size, 0
-    entry, chosen = np.empty(_TAKEN, np.int64), np.full(_TAKEN, -1, np.int64)
+    cols, num_sensors, taken, count = problem.cols, problem.cols.shape[1], block.size, 0
+    entry, chosen, fits = np.full(_TAKEN, -1, np.int64), np.full(_TAKEN, -1, np.int64), np.zeros(_TAKEN, np.int64)
+    looks = 0
+    for level in range(taken):
+        fits[level] = _fitting(problem, owner, block, level, fitting)
+        looks += problem.row_ptr[block[level] + 1] - problem.row_ptr[block[level]]
     level = 0
-    entry[0] = -1
     while level >= 0:
         if level == taken and count == choice.shape[0]:
             for i in range(taken):
                 if chosen[i] >= 0:
                     _put(cols, owner, chosen[i], -1)
-            return count + 1
+            return count + 1, looks
         if level == taken:
             complete, total = True, 0.0
             for f in freed:
@@ -293,25 +372,21 @@ def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choi
                 count += 1
             level -= 1
             continue
-        r = block[level]
         if chosen[level] >= 0:
             _put(cols, owner, chosen[level], -1)
             chosen[level] = -1
         x = entry[level]
         entry[level] += 1
+        looks += _STEP
         if x < 0:
             # uncovered, or covered by a column of a row before
-            if owner[r] >= 0:
-                entry[level] = row_ptr[r + 1] - row_ptr[r]
-        elif x < row_ptr[r + 1] - row_ptr[r]:
-            j = row_cols[row_ptr[r] + x]
-            fits = True
+            if owner[block[level]] >= 0:
+                entry[level] = fits[level]
+        elif x < fits[level]:
+            j, free = fitting[level, x], True
             for s in range(num_sensors):
-                fits = fits and (cols[j, s] < 0 or owner[cols[j, s]] < 0)
-                # rows before that are uncovered stay so: their own turn listed what covers them
-                for i in range(level):
-                    fits = fits and cols[j, s] != block[i]
-            if not fits:
+                free = free and (cols[j, s] < 0 or owner[cols[j, s]] < 0)
+            if not free:
                 continue
             chosen[level] = j
             _put(cols, owner, j, j)
@@ -321,4 +396,4 @@ def _combinations(problem: _Problem, owner: Ints, block: Ints, freed: Ints, choi
         level += 1
         if level < taken:
             entry[level] = -1
-    return count
+    return count, looks

@@ -8,9 +8,11 @@ import pytest
 import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
+from assoc.ranking import sampler
 from assoc.ranking.marginals import marginals, weighed
 from tests.oracles import all_solutions, gated_problem, small_problems
 from tests.reliability.exact import exact_marginals
+from tests.reliability.problems import draw
 from tests.sizes import few_or_all
 
 
@@ -62,6 +64,49 @@ def test_where_chains_cannot_pass_between_solutions_they_say_so():
         truth = np.array([true[tuple(row)] for row in found.tuples.tolist()])
         held += (np.abs(found.probability - truth) <= 4.0 * found.error + 1e-8).tolist()
     assert len(held) > 300 and np.mean(held) > 0.99
+
+
+def _far_off(seed, number, length=0.05, errors=4.0):
+    """Tuples of a random problem whose probability is further from the truth than so many told errors."""
+    problem = draw(seed, number).problem
+    truth = exact_marginals(problem)
+    found = weighed(problem, None, 0, length)
+    true = np.array([truth.get(tuple(row), np.nan) for row in found.tuples.tolist()])
+    return found.tuples[np.abs(found.probability - true) > errors * found.error + 1e-8].tolist()
+
+
+def test_chains_that_stay_where_they_began_do_not_agree_on_what_is_wrong():
+    """Costs of 1e4 in an axial problem, and of 1e5 less than alone: no move leads from one solution to the other."""
+    assert _far_off(8300, 1775) == [] == _far_off(8300, 1775, length=1.0)
+    assert _far_off(8300, 1764) == []
+
+
+def test_of_what_no_chain_ever_left_nothing_is_known():
+    """One cover of what must be covered: nothing shows that it is the only one."""
+    only = AssignmentProblem([[1, 1, 1], [2, 2, 2], [1, 2, 1]], [0.0, 0.0, -50.0], (2, 2, 2), dummy=False)
+    found = weighed(only, None, 0, 0.05)
+    assert (found.error == 1.0).all()
+    assert marginals(only).error.max() == 0.0
+
+
+def test_chains_end_by_what_they_looked_at():
+    """Five sensors and all tuples: a move looks at a thousand columns; no round begins once all were looked at."""
+    looked = []
+
+    def counted(*arguments):
+        looked.append(walk(*arguments))
+        return looked[-1]
+
+    walk = sampler._walk
+    rng = np.random.default_rng(3)
+    problem = gated_problem(rng, (3, 3, 3, 3, 2), 1.0, "mixed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampler, "_walk", counted)
+        patch.setattr(sampler, "_LOOKS", 3_000_000)
+        patch.setattr(sampler, "_MORE_LOOKS", 0)
+        found = weighed(problem, None, 0)
+    assert sum(looked[:-8]) < 3_000_000 <= sum(looked)
+    assert np.isfinite(found.error).all() and (found.error > 0.0).all()
 
 
 def test_clusters_are_independent():

@@ -277,12 +277,13 @@ def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) 
     # nan fails every comparison; a bound may be -inf where nothing is known
     if not answer.lower_bound <= answer.cost:
         yield f"has the bound {answer.lower_bound!r} above its cost {answer.cost!r}"
-    if answer.lower_bound > -math.inf:
+    # a bound of up to the optimum's nearest float is at most half a unit in the last place above it
+    if answer.lower_bound > float(optimum):
         over = Fraction(answer.lower_bound) - optimum
         # a cost is the nearest float to the exact sum: half a unit in the last place may lie above it
         if over > abs(optimum) / 2**53 and over > magnitude(problem, optimum) / 10**17 + abs(optimum) / 2**53:
             yield f"has a bound {float(over):.3g} above the optimum {float(optimum)!r}"
-    if answer.status == "optimal":
+    if answer.status == "optimal" and answer.cost > float(optimum):
         excess = cost - optimum
         if excess > Fraction(1.01 * OPTIMALITY_TOLERANCE) * max(1, abs(cost)):
             yield f"says optimal, {float(excess):.3g} above the optimum {float(optimum):.6g}"

@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.compile_time import compile_seconds
 from assoc._types import Array
 from assoc.errors import AssocError
 from assoc.scene import Scene
@@ -188,7 +189,8 @@ class Watch:
         self.resident: list[float] = []
         self.objects: list[int] = []
         self.pace: list[float] = []
-        self._steps = self._unchanging = 0.0
+        self._steps = self._unchanging = self._compiled = 0.0
+        self._last = self._of_kernels = 0
 
     def add(self, number: int, seconds: float = 0.0) -> bool:
         """Count step ``number`` (from 1) and its processor time; True where it was time for a look."""
@@ -198,7 +200,12 @@ class Watch:
         if number % self.every:
             return False
         gc.collect()
-        self.objects.append(len(gc.get_objects()))
+        # a kernel that is compiled or loaded late stays, with what numba knows of it: some hundred objects, once
+        count, compiled = len(gc.get_objects()), compile_seconds()
+        if compiled != self._compiled:
+            self._of_kernels += count - self._last
+        self._last, self._compiled = count, compiled
+        self.objects.append(count - self._of_kernels)
         with open("/proc/self/statm", encoding="ascii") as file:
             self.resident.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20)
         self.pace.append(self._steps / self._unchanging)
@@ -216,7 +223,7 @@ class Watch:
 
         found = [
             _limited(f"{name}: growth of resident memory from the second tenth", grown(self.resident), growth, "MB"),
-            _limited(f"{name}: growth of Python's objects", grown(self.objects), 1_000.0),
+            _limited(f"{name}: growth of Python's objects but for new kernels", grown(self.objects), 1_000.0),
         ]
         if any(self.pace):
             # the first look has what was compiled and imported on the way

@@ -24,16 +24,22 @@ def exact_ranks(problem: AssignmentProblem, k: int) -> list[Fraction]:
     InfeasibleError
         The problem has no solution.
     """
-    ranks = [Fraction(0)]
+    ranks, unit = [0], unit_of(problem)
     for _, part in _parts(problem):
-        own = ranks_of_part(part, k)
-        ranks = heapq.nsmallest(k, (one + other for one in ranks for other in own))
-    return ranks
+        own = ranks_of_part(part, k, unit)
+        # of two ascending lists the i-th and j-th are among the k least sums only if i j <= k
+        ranks = heapq.nsmallest(k, (one + other for i, one in enumerate(ranks, 1) for other in own[: k // i]))
+    return [Fraction(rank, unit) for rank in ranks]
 
 
-def ranks_of_part(problem: AssignmentProblem, k: int) -> list[Fraction]:
-    """Costs of the k best solutions of a problem with few measurements."""
-    covering, to_cover, unit = coverings(problem)
+def unit_of(problem: AssignmentProblem) -> int:
+    """All costs are whole numbers of one part in so many: sums of these are exact and quick."""
+    return max((cost.as_integer_ratio()[1] for cost in problem.costs.tolist()), default=1)
+
+
+def ranks_of_part(problem: AssignmentProblem, k: int, unit: int) -> list[int]:
+    """Costs, in units, of the k best solutions of a problem with few measurements."""
+    covering, to_cover = coverings(problem, unit)
     memo: dict[int, list[int]] = {}
 
     def rest(covered: int) -> list[int]:
@@ -49,7 +55,7 @@ def ranks_of_part(problem: AssignmentProblem, k: int) -> list[Fraction]:
 
     if not rest(0):
         raise InfeasibleError("no solution")
-    return [Fraction(answer, unit) for answer in rest(0)]
+    return rest(0)
 
 
 def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
@@ -97,7 +103,8 @@ def _parts(problem: AssignmentProblem) -> list[tuple[list[int], AssignmentProble
 
 def marginals_of_part(problem: AssignmentProblem) -> list[float]:
     """Probability of each tuple of a problem with few measurements."""
-    covering, to_cover, unit = coverings(problem)
+    unit = unit_of(problem)
+    covering, to_cover = coverings(problem, unit)
     # for each set of covered measurements: the least cost of the rest, the weight of all rests relative to that
     memo: dict[int, tuple[int, float] | None] = {}
 
@@ -160,25 +167,27 @@ def masks(problem: AssignmentProblem) -> list[int]:
     return [sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i) for row in problem.tuples.tolist()]
 
 
-def coverings(problem: AssignmentProblem) -> tuple[list[list[tuple[int, int]]], int, int]:
-    """For each measurement that must be covered the tuples that begin in it, as bits and cost; cost unit last."""
+def coverings(problem: AssignmentProblem, unit: int) -> tuple[list[list[tuple[int, int]]], int]:
+    """For each measurement that must be covered the tuples that begin in it, as bits and cost in units; how many."""
     _, to_cover = _offsets(problem)
-    # all costs as whole numbers of the smallest unit among them: sums are exact and quick
-    ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
-    unit = max((denominator for _, denominator in ratios), default=1)
     covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
     best: dict[int, int] = {}
-    for mask, (numerator, denominator) in zip(masks(problem), ratios, strict=True):
-        price = numerator * (unit // denominator)
+    for mask, price in zip(masks(problem), _in_units(problem.costs.tolist(), unit), strict=True):
         if mask not in best or price < best[mask]:
             best[mask] = price
     for mask, price in best.items():
         low = (mask & -mask).bit_length() - 1
         if low < to_cover:
             covering[low].append((mask, price))
-    return covering, to_cover, unit
+    return covering, to_cover
+
+
+def _in_units(costs: list[float], unit: int) -> list[int]:
+    return [numerator * (unit // denominator) for numerator, denominator in map(float.as_integer_ratio, costs)]
 
 
 def exact_cost(problem: AssignmentProblem, indices: NDArray[np.intp]) -> Fraction:
     """Cost of a choice of tuples in exact arithmetic."""
-    return sum((Fraction(cost) for cost in problem.costs[indices].tolist()), Fraction(0))
+    chosen = problem.costs[indices].tolist()
+    unit = max((cost.as_integer_ratio()[1] for cost in chosen), default=1)
+    return Fraction(sum(_in_units(chosen, unit)), unit)

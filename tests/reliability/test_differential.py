@@ -1,5 +1,7 @@
 """Every way to an answer, on random problems against exact arithmetic; `make fuzz` runs thousands."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,14 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
-from tests.reliability.exact import exact_marginals, exact_optimum, exact_ranks, marginals_of_part, ranks_of_part
+from tests.reliability.exact import (
+    exact_marginals,
+    exact_optimum,
+    exact_ranks,
+    marginals_of_part,
+    ranks_of_part,
+    unit_of,
+)
 from tests.reliability.problems import STRUCTURES, Case, draw, make, many_parts
 from tests.reliability.tempers import TEMPERS
 from tests.sizes import few_or_all, sample
@@ -84,10 +93,10 @@ def test_parts_are_counted_as_the_whole_is():
     for number in range(40):
         problem = draw(9, number, *FIRST).problem
         try:
-            optimum = ranks_of_part(problem, 1)[0]
+            ranks = [Fraction(rank, unit_of(problem)) for rank in ranks_of_part(problem, 50, unit_of(problem))]
         except InfeasibleError:
             continue
-        assert exact_optimum(problem) == optimum
+        assert exact_ranks(problem, 50) == ranks and exact_optimum(problem) == ranks[0]
         whole = marginals_of_part(problem)
         found = exact_marginals(problem)
         assert [found[tuple(row)] for row in problem.tuples.tolist()] == pytest.approx(whole, abs=1e-12)
