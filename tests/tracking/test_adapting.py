@@ -248,7 +248,7 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
 
 
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
-    """Eleven tracks of twelve targets miss seldom, and leave plots over: neither is the sensor's."""
+    """Eleven tracks of twelve targets are missed seldom, and leave plots over: neither is of the sensor."""
     sensor, plots = group(3, 120.0, 60.0, 50.0, scans=60)
     tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=True, initiation=Initiation(speed=120.0))
     taken = []
@@ -260,6 +260,17 @@ def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
     shown = sum(track.reported for track in tracker.tracks)
     assert np.concatenate(taken).sum() / (shown * 50) > 0.92
     assert learnt.dwells.sum() < 5 and (learnt.used == [[1.0, 0.9, 5.0]]).all()
+
+
+def test_noise_is_learnt_in_formations():
+    """Whose plot is whose does not matter so much there: all are farther off than declared."""
+    sensor, plots = group(3, 120.0, 150.0, 50.0, scans=40)
+    tracker = TRACKERS["multi-sensor"](
+        [replace(sensor, noise=[20.0, 20.0])], planar(1.0), adapt=True, initiation=Initiation(speed=120.0)
+    )
+    for k, z in enumerate(plots):
+        tracker.step(float(k), [z])
+    assert tracker.state.estimates.used[0, 0] > 3.0
 
 
 def test_targets_that_fly_together_are_confirmed_as_without_the_map():

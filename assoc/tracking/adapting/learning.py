@@ -102,7 +102,6 @@ def learn(progress: Progress) -> Progress:
     if len(tracks):
         _seek(progress, late, rows, dwelled)
     contested, doubtful = _contested(progress, late)
-    rows[contested], dwelled[contested] = 0, False
     if progress.shared is not None:
         hidden = progress.shared.hidden(tracks.track_id)
         rows[hidden], dwelled[hidden] = 0, False
@@ -111,6 +110,7 @@ def learn(progress: Progress) -> Progress:
     plain &= ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)
     hits = (rows > 0) & plain[:, None]
     dwelled = hits | (dwelled & plain[:, None])
+    sure = hits & ~contested
     turns = _turns(progress)
     # where false alarms are dense they are no part of the usual ones
     usual = zip(step.confirmed, progress.dense, doubtful, strict=True)
@@ -121,7 +121,7 @@ def learn(progress: Progress) -> Progress:
         estimates = estimates.heard(declared, alarms, turns)
     where = places_of(settings.filter, late.states)[0]
     bands = np.stack([bands_of(sensor, where) for sensor in settings.sensors], axis=1)
-    estimates = estimates.counted(declared, tracks.track_id, dwelled, hits, bands)
+    estimates = estimates.counted(declared, tracks.track_id, dwelled & ~contested, sure, bands)
     fresh = np.flatnonzero((tracks.missed == 0) & hits.any(axis=1))
     # in turns, if there are many: these are enough
     fresh = np.roll(fresh, -_MOST * state.scan)[:_MOST]
@@ -187,7 +187,7 @@ def _rows(progress: Progress, ids: Array) -> Array:
 
 
 def _contested(progress: Progress, late: TrackBatch) -> tuple[Array, list[Array]]:
-    """Whose plot is whose cannot be told of tracks whose gates overlap: they take those of targets without a track.
+    """Who was missed cannot be told of tracks whose gates overlap: they take the plots of targets without a track.
 
     Their dwells, bool (T, S), and the measurements in their gates, bool (n_s,) of each sensor. Both are known before
     the scan, so that what is left is no choice among detections and misses.
