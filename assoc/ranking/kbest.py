@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,7 +88,7 @@ def kbest(problem: AssignmentProblem | ArrayLike, k: int, *, time_limit: float |
     with interruptible():
         for version in with_capped_costs(problem):
             run = clock.part(0, clock.time_limit)
-            found = [version.restored(problem, solution) for solution in rank(version.problem, k, None, run).solutions]
+            found = [version.restored(problem, solution) for solution in rank(version.problem, k, run)]
             listed = {solution.tuples.tobytes() for solution in known}
             new = [solution for solution in found if solution.tuples.tobytes() not in listed]
             # up to the first with a lowered cost; when time is over, that one is better than nothing
@@ -106,26 +106,11 @@ def _at_rank(solution: Solution, number: int) -> Solution:
     return solution if parameters == solution.parameters else replace(solution, parameters=parameters)
 
 
-@dataclass(frozen=True, slots=True)
-class Ranking:
-    """The k best solutions and a bound on all others."""
-
-    solutions: list[Solution]
-    """See ``kbest``."""
-    rest: float
-    """Lower bound on the cost of all other solutions; ``inf`` if there is no other."""
-    columns: AllColumns
-    """The columns and their prices."""
-
-
-def rank(
-    problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None, budget: int = FIRST_BUDGET
-) -> Ranking:
-    """Return the k best and a bound on the rest; a given run brings its own time limit.
+def rank(problem: AssignmentProblem, k: int, run: Run, budget: int = FIRST_BUDGET) -> list[Solution]:
+    """The k best solutions of a problem without costs that are far too large, see `kbest`.
 
     A component is branched on after ``budget`` decisions of enumeration beyond one for each row.
     """
-    run = run or Run(0, time_limit=checked_time_limit(time_limit), methods=EXACT_METHODS)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
     prepared = prepare(problem)
@@ -140,14 +125,15 @@ def rank(
         found = Deepening(columns, most, run, ahead, budget).run()
     if len(found.chosen) == most < k and found.rest < np.inf:
         run.stopped_by = run.stopped_by or "memory_limit"
+    # no other solution costs less
     rest = found.rest + columns.offset
     rest -= _rounding(columns, prepared, found.rest)
     if not found.chosen:
         rest = max(rest, ahead.bound + columns.offset - _rounding(columns, prepared, ahead.bound))
-        return Ranking([_unproved(problem, rest, k, run, columns, found.known)], rest, columns)
+        return [_unproved(problem, rest, k, run, columns, found.known)]
     answers = _in_order(problem, [columns.indices(chosen) for chosen in found.chosen])
     runtime, compile_time = run.runtime(), run.compile_time()
-    solutions = [
+    return [
         Solution(
             tuples=problem.tuples[indices],
             indices=indices,
@@ -162,7 +148,6 @@ def rank(
         )
         for index, (cost, indices) in enumerate(answers)
     ]
-    return Ranking(solutions, rest, columns)
 
 
 def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:

@@ -19,7 +19,6 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
-from assoc.ranking.distinct import distinct
 from assoc.ranking.sampler import estimates
 from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
 from assoc.ranking.sweep import Graph
@@ -115,7 +114,7 @@ def weighed(
 ) -> Marginals:
     """`marginals` with at most ``widest`` measurements open in sums, and chains ``length`` times as long as usual."""
     run = Run(0, time_limit=time_limit, methods=EXACT_METHODS)
-    tuples, index = distinct(problem.tuples)
+    tuples, index = _distinct(problem.tuples)
     count = len(tuples)
     probability, error, exact = np.full(count, 0.5), np.ones(count), np.zeros(count, dtype=np.bool_)
     if not run.should_stop():
@@ -127,6 +126,16 @@ def weighed(
         where = index[np.append(columns.origin, columns.single)]
         probability[where], error[where], exact[where] = (part[: len(where)] for part in found)
     return Marginals(tuples.astype(np.int32), probability, error, exact)
+
+
+def _distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
+    """The distinct tuples in lexicographic order, and the index of each tuple among them."""
+    order = np.lexsort(tuples.T[::-1])
+    new = np.ones(len(tuples), dtype=np.bool_)
+    new[1:] = (tuples[order[1:]] != tuples[order[:-1]]).any(axis=1)
+    index = np.empty(len(tuples), dtype=np.int64)
+    index[order] = np.cumsum(new) - 1
+    return tuples[order[new]], index
 
 
 def _of_columns(

@@ -17,9 +17,8 @@ from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
-from assoc.ranking.distinct import distinct
 from assoc.ranking.kbest import kbest
-from assoc.ranking.marginals import marginals
+from assoc.ranking.marginals import _distinct, marginals
 from assoc.solvers.assign import assign
 from tests.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
@@ -134,6 +133,6 @@ def test_distinct_tuples():
     wide = np.random.default_rng(2).integers(1, 50_000, (9, 6))
     many = [AssignmentProblem(wide[[0, 0, *range(9)]], np.zeros(11), [50_000] * 6, dummy=False)]
     for problem in [*small_problems(60, seed=71), ghosts(60, 3000), ghosts(60, 9000), *many]:
-        tuples, place = distinct(problem.tuples)
+        tuples, place = _distinct(problem.tuples)
         assert np.array_equal(tuples, np.unique(problem.tuples, axis=0))
         assert np.array_equal(tuples[place], problem.tuples)

@@ -30,14 +30,6 @@ def ascending(values: Floats) -> NDArray[np.int32]:
     return _by_digits((values + 0.0).view(np.int64))
 
 
-def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return a stable argsort of integers >= 0."""
-    if values.size < _FEW:
-        return np.argsort(values, kind="stable").astype(np.int32)
-    # as floats, these bits have the same order
-    return _by_digits(np.ascontiguousarray(values))
-
-
 def _order_by_numpy(values: Array) -> Any:
     return np.argsort(values, kind="stable")
 
