@@ -95,8 +95,8 @@ ON_A_SHIP = dataclasses.replace(SENSORS[1], platform=Platform([0.0, 1.0], [[0.0]
         ({"states": Gaussian(np.zeros((2, 4)), np.stack([np.eye(4)] * 2))}, "states: expected states of 6 components"),
         ({"existence": [0.5, 0.0]}, "existence: expected probabilities above 0"),
         ({"existence": [0.5, 0.5, 0.5]}, "existence: expected one number, or one for each of 2 tracks"),
-        ({"measurements": [[[1.0, 2.0, 3.0]]]}, "measurements: expected those of 2 sensors"),
-        ({"measurements": [[[1.0, 2.0]], []]}, "measurements of sensor 1: expected finite numbers"),
+        ({"measurements": [[[1.0, 2.0, 3.0]]]}, "measurements of 1 sensors, expected 2"),
+        ({"measurements": [[[1.0, 2.0]], []]}, "measurements of sensor 0 must have shape"),
     ],
 )
 def test_bad_arguments_are_refused(change, text):

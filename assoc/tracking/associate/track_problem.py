@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assoc._system.wrong_types import explains_wrong_types
-from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks.scores import existence_gain, score_terms
@@ -22,6 +21,7 @@ from assoc.filters.imm import InteractingMultipleModel, Mixture
 from assoc.problem import AssignmentProblem
 from assoc.sensors import Sensor
 from assoc.sensors.arrays import numbers
+from assoc.tracking.stages.checking import checked_measurements
 
 
 @explains_wrong_types
@@ -83,7 +83,8 @@ def track_problem(
                                 f"got shape {chance.shape}")  # fmt: skip
     if not ((chance > 0.0) & (chance <= 1.0)).all():
         raise InvalidInputError("existence: expected probabilities above 0 and at most 1")
-    scan = _checked_scan(sensors, measurements)
+    _check_sensors(sensors)
+    scan = checked_measurements(list(measurements), sensors)
     terms = score_terms(sensors)
     missed = log_missed(terms.miss, Views(sensors, filter.motion.position).shares(states))
     tuples = grow_track_tuples(
@@ -107,20 +108,9 @@ def _check_states(filter: Filter[Any], states: Any) -> None:
         raise InvalidInputError(f"states: expected states of {filter.motion.dim} components as the filter makes them")
 
 
-def _checked_scan(sensors: Sequence[Sensor], measurements: Sequence[ArrayLike]) -> list[Array]:
-    """The measurements of sensors that stand, (n_s, d_s)."""
+def _check_sensors(sensors: Sequence[Sensor]) -> None:
     if not len(sensors):
         raise InvalidInputError("sensors: expected at least one")
     for s, sensor in enumerate(sensors):
         if sensor.platform is not None:
             raise InvalidInputError(f"sensors: number {s + 1} is on a platform, expected one that stands at a position")
-    if len(sensors) != len(measurements):
-        raise InvalidInputError(f"measurements: expected those of {len(sensors)} sensors, got {len(measurements)}")
-    scan: list[Array] = []
-    for s, (sensor, values) in enumerate(zip(sensors, measurements, strict=True)):
-        z = numbers(values, f"measurements of sensor {s + 1}")
-        scan.append(z.reshape(0, sensor.dim) if z.size == 0 else z)
-        if scan[-1].ndim != 2 or scan[-1].shape[1] != sensor.dim or not np.isfinite(scan[-1]).all():
-            raise InvalidInputError(f"measurements of sensor {s + 1}: expected finite numbers of shape "
-                                    f"(n, {sensor.dim}), got shape {z.shape}")  # fmt: skip
-    return scan

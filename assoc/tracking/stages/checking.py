@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def checked_time(time: object, last: float | None) -> float:
     return when
 
 
-def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor]) -> list[Array]:
+def checked_measurements(measurements: Sequence[Any], sensors: Sequence[Sensor]) -> list[Array]:
     """Measurements as float64 arrays (n_s, d_s), checked against what their sensors can measure.
 
     Messages name the sensor and the measurement, and say what was expected.
