@@ -259,7 +259,8 @@ def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedT
     import numpy as np
 
     from assoc.tracking.offline.ended_smoothing import EndedSmoothing
-    from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of, may_return
+    from assoc.tracking.offline.plots import FORGET, TakenPlots, follow, known_of
+    from assoc.tracking.state import may_return
 
     takers, ends, sizes = TakenPlots(stored.survey.named, stored.addressed), list[float](), list[int]()
     smoothing = EndedSmoothing(tracker, given["origin"]) if given["smooth"] else None
@@ -273,7 +274,7 @@ def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedT
         ends.append(float(followed.step.time))
         sizes.append(len(followed.window))
         if len(ends) % FORGET == 0:
-            living = may_return(tracker)
+            living = may_return(tracker.state)
             takers.keep(living)
             if smoothing is None:
                 table.end(living)

@@ -93,6 +93,12 @@ def first_state(settings: TrackerSettings) -> TrackerState:
     )
 
 
+def may_return(state: TrackerState) -> set[int]:
+    """Ids of the tracks that live, in the best hypothesis or another one, or that may be taken up again."""
+    batches = [state.tracks, state.lost, *([state.starter.state.tracks] if state.starter is not None else [])]
+    return {track for batch in batches for track in batch.track_id.tolist()}
+
+
 def rng_of(settings: TrackerSettings) -> Any:
     """State of the filter's random generator; None where it has none."""
     rng = getattr(settings.filter, "rng", None)

@@ -16,6 +16,7 @@ from assoc.tracking.filter_choice import make_filter
 from assoc.tracking.offline import plots
 from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.offline.ended_tracks import EndedTracks
+from assoc.tracking.state import may_return
 
 WORDS = ["-q", "--range-noise", "300", "--bearing-noise", "0.1", "--rotation", "9.5"]
 
@@ -141,5 +142,5 @@ def test_a_track_that_may_return_has_not_ended():
         assert not listed & ended
         left |= before - listed
         seen |= listed
-        ended |= seen - plots.may_return(tracker)
+        ended |= seen - may_return(tracker.state)
     assert left - ended and ended

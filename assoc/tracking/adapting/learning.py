@@ -24,6 +24,7 @@ from assoc.tracking.records.biases import CLOCK
 from assoc.tracking.records.clutter import ONE_SAYS, YOUNG
 from assoc.tracking.records.estimates import ALARMS, NOISE, declared_values
 from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.track import taken_by
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import densities_at, dwells
 
@@ -98,7 +99,7 @@ def learn(progress: Progress) -> Progress:
     late, clutter = _late(progress, tracks), progress.clutter
     used = densities_at(progress, late, state.clutter)[0] > 0.0
     dwelled = dwells(progress, late.states)
-    rows = _rows(progress, tracks.track_id)
+    rows = taken_by(tracks.track_id, step.assigned)[:-1]
     if len(tracks):
         _seek(progress, late, rows, dwelled)
     contested, doubtful = _contested(progress, late)
@@ -173,17 +174,6 @@ def _turns(progress: Progress) -> Array:
     if sectors is None:
         return np.ones(len(progress.settings.sensors))
     return np.asarray((sectors[:, 1] - sectors[:, 0]) / FULL_TURN)
-
-
-def _rows(progress: Progress, ids: Array) -> Array:
-    """1-based measurements of tracks with these ids, ascending, 0 for none, int (T, S)."""
-    assert progress.step is not None
-    rows = np.zeros((len(ids), len(progress.settings.sensors)), dtype=np.int64)
-    for s, taken in enumerate(progress.step.assigned if len(ids) else ()):
-        index = np.minimum(np.searchsorted(ids, taken), len(ids) - 1)
-        known = np.flatnonzero(ids[index] == taken)
-        rows[index[known], s] = known + 1
-    return rows
 
 
 def _contested(progress: Progress, late: TrackBatch) -> tuple[Array, list[Array]]:

@@ -27,7 +27,7 @@ from assoc.tracking.records.track import Decision, Step, Track
 from assoc.tracking.records.track_batch import ID, PARENT, TrackBatch
 from assoc.tracking.stages.checking import checked_measurements
 from assoc.tracking.stages.starter import current
-from assoc.tracking.state import TrackerState
+from assoc.tracking.state import TrackerState, may_return
 from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0
@@ -320,7 +320,8 @@ class LatePlots:
         done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
         final = tuple(self._decided.pop(scan)[1] for scan in done)
         if len(self.names) > self._most:
-            living = set().union(*(_ids(state) for state in (self.tracker.state, *(past.before for past in self.past))))
+            states = self.tracker.state, *(past.before for past in self.past)
+            living = set().union(*map(may_return, states))
             self.names = {inner: outer for inner, outer in self.names.items() if inner in living}
             self._most = self._many + 2 * len(self.names)
         return replace(step, final=final, late=late, refused=refused)
@@ -358,12 +359,6 @@ class LatePlots:
         return tuple(
             np.array([self._name(i) if i else 0 for i in ids.tolist()], dtype=np.int64).reshape(-1) for ids in assigned
         )
-
-
-def _ids(state: TrackerState) -> set[int]:
-    """Ids of the tracks that live or may be taken up again, those in the starter included."""
-    ids = set(state.tracks.track_id.tolist()) | set(state.lost.track_id.tolist())
-    return ids if state.starter is None else ids | set(state.starter.state.tracks.track_id.tolist())
 
 
 def _tentative(state: TrackerState) -> set[int]:

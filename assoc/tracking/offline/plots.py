@@ -16,6 +16,7 @@ from assoc.recordings import Recording, Window
 from assoc.tracking.offline.ended_smoothing import EndedSmoothing
 from assoc.tracking.quality import Qualities
 from assoc.tracking.records.track import Step, TrackColumns
+from assoc.tracking.state import may_return
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
@@ -187,7 +188,7 @@ def follow(tracker: Tracker, windows: Iterable[Window], *, forget: bool = False)
         sure = np.concatenate(step.confirmed)[order]
         yield Followed(tracker, window, step, np.where(ids > 0, ids, -1), sure, *scan, altitudes, qualities)
         if forget and (number + 1) % FORGET == 0:
-            living = may_return(tracker)
+            living = may_return(tracker.state)
             qualities.keep(living)
             for gone in altitudes.keys() - living:
                 del altitudes[gone]
@@ -201,13 +202,6 @@ def known_of(window: Window) -> Array:
     """Aircraft, code and address of each plot, (n, 3)."""
     sources = np.full(len(window), UNKNOWN) if window.sources is None else window.sources
     return np.stack([sources, window.identities, window.addresses], axis=1)
-
-
-def may_return(tracker: Tracker) -> set[int]:
-    """Ids of the tracks that live, in the best hypothesis or another one, or that may be taken up again."""
-    state = tracker.state
-    batches = [state.tracks, state.lost, *([state.starter.state.tracks] if state.starter is not None else [])]
-    return {track for batch in batches for track in batch.track_id.tolist()}
 
 
 class TakenPlots:

@@ -21,6 +21,7 @@ from assoc._types import Array
 from assoc.costs.views import BANDS, reach
 from assoc.sensors import Sensor
 from assoc.tracking.records.prequential import gain_of_rates, gain_of_shares, mean_evidence, trusted
+from assoc.tracking.records.track import rows_of_ids
 
 KEEP = 0.98
 """Share of a sum that is kept from turn to turn."""
@@ -156,10 +157,8 @@ class Estimates(NamedTuple):
         `dwells` and `hits` (T, S) say which sensors could see each track, and detected it; `bands` (T, S) is the
         track's band of range from each.
         """
-        row = np.searchsorted(self.ids, ids)
-        known = np.append(self.ids, -1)[row] == ids
-        open_hits, open_dwells = np.zeros((2, len(ids), len(self.hits)))
-        open_hits[known], open_dwells[known] = self.open_hits[row[known]], self.open_dwells[row[known]]
+        rows, nobody = rows_of_ids(self.ids, ids), np.zeros((1, len(self.hits)))
+        open_hits, open_dwells = (np.append(each, nobody, axis=0)[rows] for each in (self.open_hits, self.open_dwells))
         again = hits.any(axis=1)
         shape = self.hits.shape
         cell = (np.arange(shape[0]) * shape[1] + bands[again]).ravel()

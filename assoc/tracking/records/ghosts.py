@@ -14,6 +14,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.tracking.records.life_cycle import OVERLOOKED
+from assoc.tracking.records.track import rows_of_ids
 
 
 class Unseen(NamedTuple):
@@ -37,9 +38,7 @@ class Unseen(NamedTuple):
         """
         order = np.argsort(ids)
         known = np.append(self.misses, np.zeros((1, self.misses.shape[1])), axis=0)
-        rows = np.searchsorted(self.ids, ids)
-        same = np.append(self.ids, -1)[rows] == ids
-        before = known[np.where(same, rows, len(self.ids))]
+        before = known[rows_of_ids(self.ids, ids)]
         misses = np.where(covered, (before + 1.0) * (1.0 - detected), before)
         return Unseen(ids[order], misses[order])
 

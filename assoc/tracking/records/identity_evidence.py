@@ -25,6 +25,7 @@ import numpy as np
 from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.tracking.records.track import rows_of_ids
 
 CODES, ADDRESSES = 2**12, 2**24
 """Numbers of Mode 3/A codes and of addresses."""
@@ -113,10 +114,8 @@ class Identities(NamedTuple):
 
     def _of(self, track_id: Array) -> Array:
         """Codes and addresses of tracks' last plots, (K, MEMORY, 2)."""
-        rows = np.searchsorted(self.ids, track_id)
-        found = np.append(self.ids, -1)[rows] == track_id
         last = np.concatenate([self.last, np.zeros((1, MEMORY, 2), dtype=np.int64)])
-        return last[np.where(found, rows, len(self.ids))]
+        return np.asarray(last[rows_of_ids(self.ids, track_id)])
 
     def arrays(self) -> dict[str, Array]:
         """The state as arrays; `restored` reads it."""

@@ -215,6 +215,24 @@ def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
     return found
 
 
+def rows_of_ids(ids: Array, wanted: Array) -> Array:
+    """Rows of some ids (K,) among those of T tracks, ascending (T,); T where there is none."""
+    rows = np.searchsorted(ids, wanted)
+    return np.where(np.append(ids, -1)[rows] == wanted, rows, len(ids))
+
+
+def taken_by(ids: Array, assigned: Sequence[Array]) -> Array:
+    """1-based measurements of tracks by their ascending ids (T,), 0: none, int64 (T + 1, S); the last row is nobody's.
+
+    The reverse of `owners`.
+    """
+    rows = np.zeros((len(ids) + 1, len(assigned)), dtype=np.int64)
+    for s, taken in enumerate(assigned):
+        rows[rows_of_ids(ids, taken), s] = np.arange(len(taken)) + 1
+    rows[-1] = 0
+    return rows
+
+
 def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: Array) -> Decision:
     """Make a decision from track ids and the ids of confirmed tracks."""
     ids = tuple(np.asarray(array, dtype=np.int64) for array in assigned)

@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.sensors import Radar2D, Radar3D
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.echoes import AZIMUTH, CHANCE, FRESH, HITS, MISSES, RANGE, SQUARE, STRAYS, Echoes
-from assoc.tracking.records.track import Step
+from assoc.tracking.records.track import Step, rows_of_ids, taken_by
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import dwells
 
@@ -43,7 +43,7 @@ def hide_echoes(progress: Progress) -> Progress:
     tracks, before = settings.method.current(state), state.echoes
     known = progress.association.tracks
     echoes = _living(before, state.tracks.track_id, known.track_id[known.confirmed])
-    plots, seen = _plots(step, tracks.track_id), dwells(progress, tracks.states)
+    plots, seen = taken_by(tracks.track_id, step.assigned), dwells(progress, tracks.states)
     if len(echoes.ids):
         echoes = _counted(progress, echoes, tracks, plots, seen)
     for s in radars:
@@ -64,21 +64,6 @@ def _living(echoes: Echoes, ids: Array, shown: Array) -> Echoes:
     return echoes.of(np.asarray(left.all(axis=1)))._replace(short=short)
 
 
-def _plots(step: Step, ids: Array) -> Array:
-    """1-based measurements of tracks by their ascending ids, 0: none, int64 (T + 1, S); the last row is nobody's."""
-    plots = np.zeros((len(ids) + 1, len(step.assigned)), dtype=np.int64)
-    for s, taken in enumerate(step.assigned):
-        plots[_at(ids, taken), s] = np.arange(len(taken)) + 1
-    plots[-1] = 0
-    return plots
-
-
-def _at(ids: Array, wanted: Array) -> Array:
-    """Rows of ids in the ascending ones; their number where there is none."""
-    at = np.searchsorted(ids, wanted)
-    return np.where(np.append(ids, -1)[at] == wanted, at, len(ids))
-
-
 def _apart(progress: Progress, s: int, first: Array, second: Array) -> tuple[Array, Array]:
     """Differences of ranges and azimuths of plots of one sensor (K, 2), and their standard deviations (2,)."""
     sensor, z = progress.settings.sensors[s], progress.scan.measurements[s]
@@ -88,7 +73,7 @@ def _apart(progress: Progress, s: int, first: Array, second: Array) -> tuple[Arr
 def _counted(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, seen: Array) -> Echoes:
     """Count the scan's detections of pairs."""
     counts, (s, axis) = echoes.counts.copy(), echoes.kinds.T
-    echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
+    echo, target = (rows_of_ids(tracks.track_id, ids) for ids in echoes.ids.T)
     covered = np.append(seen, np.zeros((1, seen.shape[1]), dtype=np.bool_), axis=0)
     ours, theirs = plots[echo, s], plots[target, s]
     tied = np.zeros(len(s), dtype=np.bool_)
@@ -118,7 +103,7 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
     z, sensor = progress.scan.measurements[s], progress.settings.sensors[s]
     low, width = sensor.field_of_view[:2, 0], np.diff(sensor.field_of_view[:2], axis=1)[:, 0]
     expected, tied = echoes.expected.copy(), np.zeros(len(tracks) + 1)
-    np.maximum.at(tied, _at(tracks.track_id, echoes.ids[:, 0]), echoes.counts[:, HITS])
+    np.maximum.at(tied, rows_of_ids(tracks.track_id, echoes.ids[:, 0]), echoes.counts[:, HITS])
     # detections before that no pair explains, but for those when the other was not yet tracked
     alone = np.maximum(tracks.hits - _UNTRACKED - tied[:-1], 0.0)
     for axis in (RANGE, AZIMUTH):
@@ -191,12 +176,12 @@ def _log_odds(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Array:
     settings, (s, _) = progress.settings, echoes.kinds.T
     P = np.array([sensor.detection_probability for sensor in settings.sensors])[s]
     share: Any = np.append(settings.views.at_means(tracks.states), np.ones((1, len(settings.sensors))), axis=0)
-    return echoes.log_odds(P * share[_at(tracks.track_id, echoes.ids[:, 0]), s])
+    return echoes.log_odds(P * share[rows_of_ids(tracks.track_id, echoes.ids[:, 0]), s])
 
 
 def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
     """Decide which tracks are hidden, and forget pairs that are decided."""
-    echo, target = (_at(tracks.track_id, ids) for ids in echoes.ids.T)
+    echo, target = (rows_of_ids(tracks.track_id, ids) for ids in echoes.ids.T)
     odds, confirmed = _log_odds(progress, echoes, tracks), np.append(tracks.confirmed, False)
     above = (odds > _HIDDEN) & confirmed[target] & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden))
     # echoes have no echoes of their own; the surest first
