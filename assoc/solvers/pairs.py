@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,15 +53,9 @@ def proved_pairs(problem: AssignmentProblem, run: Run, parameters: Any) -> Solut
     )
 
 
-class _Answer(NamedTuple):
-    """Tuples of a problem and what proves them."""
-
-    indices: NDArray[Any]
-    """Of the chosen tuples among the problem's, in the lexicographic order of these, (K,)."""
-    duals: tuple[Floats, Floats]
-    """Multipliers of the measurements of both lists, (n_1,) and (n_2,)."""
-    bound: float
-    """No solution costs less."""
+_Answer = tuple[NDArray[Any], tuple[Floats, Floats], float]
+"""The chosen tuples among the problem's, in the lexicographic order of these, (K,); multipliers of the measurements of
+both lists, (n_1,) and (n_2,); and what no solution costs less than."""
 
 
 def _of_matrix(matrix: Floats) -> _Answer | None:
@@ -74,7 +68,7 @@ def _of_matrix(matrix: Floats) -> _Answer | None:
     if found is None:
         return None
     edges = found.row_edge
-    return _Answer(np.sort(edges % m * n + edges // m) if upright else edges, _duals(found, upright), found.bound)
+    return np.sort(edges % m * n + edges // m) if upright else edges, _duals(found, upright), found.bound
 
 
 def _of_tuples(problem: AssignmentProblem) -> _Answer | None:
@@ -97,7 +91,7 @@ def _of_tuples(problem: AssignmentProblem) -> _Answer | None:
         chosen = np.concatenate([single[n:][free], chosen])
     elif upright:
         chosen = chosen[np.argsort(problem.tuples[chosen, 0])]
-    return _Answer(chosen, _duals(found, upright), found.bound)
+    return chosen, _duals(found, upright), found.bound
 
 
 def _slacks(n: int, m: int) -> tuple[Floats, Floats]:

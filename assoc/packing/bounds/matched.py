@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,28 +11,18 @@ from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.packing import Packing, PackingArrays
 
 
-class Matched(NamedTuple):
-    """An optimal cover and its multipliers."""
-
-    weight: float
-    """Its weight; ``inf`` if there is no cover, and the arrays mean nothing."""
-
-    owner: NDArray[np.int32]
-    """Column of each row, -1 for none, (R,)."""
-    duals: Floats
-    """Optimal multipliers of the rows, (R,)."""
-
-
-def matched(packing: Packing) -> Matched | None:
+def matched(packing: Packing) -> tuple[float, NDArray[np.int32], Floats] | None:
     """Solve a packing by one matching; None unless each column has one row, or one of each of two sides.
 
-    Two lists of measurements are such a packing, and so is what is left of three where two decide.
+    Two lists of measurements are such a packing, and so is what is left of three where two decide. Returns the weight
+    of the best cover, its column of each row, -1 for none, (R,), and optimal multipliers (R,); if there is no cover the
+    weight is ``inf``, and the arrays mean nothing.
     """
     owner, duals = np.full(packing.num_rows, -1, dtype=np.int32), np.zeros(packing.num_rows)
     side = np.empty(packing.num_rows, dtype=np.int64)
     if not _sides(packing.arrays, side):
         return None
-    return Matched(float(_match(packing.arrays, side, owner, duals)), owner, duals)
+    return float(_match(packing.arrays, side, owner, duals)), owner, duals
 
 
 @njit

@@ -221,22 +221,24 @@ def _by_matching(packing: Packing, run: Run) -> Outcome | None:
     found = matched(packing)
     if found is None:
         return None
-    if found.weight == math.inf:
+    weight, owner, duals = found
+    if weight == math.inf:
         raise infeasible(packing)
-    bound = certified_bound(packing, found.duals)
-    if found.weight - bound > TOLERANCE * max(1.0, abs(bound)):
+    bound = certified_bound(packing, duals)
+    if weight - bound > TOLERANCE * max(1.0, abs(bound)):
         return None
-    run.record(1, found.weight, bound)
-    return Outcome(chosen_columns(packing.arrays.cols, found.owner), 1, bound, found.duals)
+    run.record(1, weight, bound)
+    return Outcome(chosen_columns(packing.arrays.cols, owner), 1, bound, duals)
 
 
 def _match(component: Component) -> bool:
     """Close a component whose columns join two sides; return whether it is closed."""
     if not component.closed:
         found = matched(component.packing)
-        if found is not None and found.weight < math.inf:
-            component.adopt_if_better(found.duals)
-            component.offer(found.owner, found.weight)
+        if found is not None and found[0] < math.inf:
+            weight, owner, duals = found
+            component.adopt_if_better(duals)
+            component.offer(owner, weight)
     return component.closed
 
 
