@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from assoc.costs.build import build_problem, positions_and_covariances, tuple_costs
+from assoc.costs.build import build_problem, emission_times, positions_and_covariances, tuple_costs
 
-__all__ = ["build_problem", "positions_and_covariances", "tuple_costs"]
+__all__ = ["build_problem", "emission_times", "positions_and_covariances", "tuple_costs"]

@@ -13,6 +13,8 @@ from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, sensor_arrays, unmissed
+from assoc.costs.arrivals.fit import any_arrivals
+from assoc.costs.arrivals.search import grow_arrivals
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import fitting
@@ -54,6 +56,10 @@ def build_problem(
 
     Measurements with their own times are compared through the target's predicted motion: straight flight, velocities of
     the prior `speed`; gates are those of a measurement given the previous ones.
+
+    Of arrival times (`assoc.sensors.ArrivalTimeSensor`) a candidate has as many as determine a position in the region
+    and the time of emission, four or three in a plane, and one degree of freedom less. With more than eight receivers
+    not all parts are listed of what is heard of an emission, but those alone whose rest may be another's.
 
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
@@ -127,6 +133,11 @@ def _gated_problem(
     if blind is not None and blind.any():
         misses = np.log1p([-sensor.detection_probability for sensor in scene.sensors])
         sensors = unmissed(sensors, misses, blind)
+    if any_arrivals(scene):
+        tuples, costs = grow_arrivals(scene, sensors, scan, probability, prior, most)
+        if blind is not None and blind.any():
+            costs = costs - np.where(blind & (tuples == 0), misses, 0.0).sum(axis=1)
+        return AssignmentProblem(tuples, costs, scan.sizes)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
@@ -171,7 +182,9 @@ def _whole_grid(
     # the first of the grid is the tuple without measurements, which no problem has
     tuples = np.ascontiguousarray(np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:])
     costs = tuple_costs(scene, chosen, tuples, speed=speed, target_density=density)
-    return AssignmentProblem(tuples, costs, chosen.sizes)
+    # too few arrival times are no position
+    known = costs < math.inf
+    return AssignmentProblem(tuples[known], costs[known], chosen.sizes)
 
 
 @explains_wrong_types
@@ -241,9 +254,35 @@ def positions_and_covariances(
     return timed_positions(scene, chosen, tuples, speed)
 
 
+@explains_wrong_types
+def emission_times(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
+    """When targets emitted what receivers heard (`assoc.sensors.ArrivalTimeSensor`), at their most likely positions.
+
+    Parameters
+    ----------
+    scene, scan, tuples
+        See `tuple_costs`.
+
+    Returns
+    -------
+    ndarray (K,)
+        Seconds, since what arrival times count from.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`, or the scene has no arrival times.
+    """
+    if not any_arrivals(scene):
+        raise InvalidInputError("scene: its sensors measure no arrival times")
+    scene, chosen = _by_pose(scene, scan)
+    return np.asarray(positions.fitted_arrivals(scene, chosen, tuples)[1][1])
+
+
 def _by_pose(scene: Scene, scan: int | Scan) -> tuple[Scene, Scan]:
     """Sensors as they stand at the scan's time, and the scan as they measure it."""
     chosen = scan_of(scene, scan)
+    any_arrivals(scene)  # refuses what these cannot be mixed with
     return scene.at(chosen.time), chosen.aligned(scene.sensors)
 
 

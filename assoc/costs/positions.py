@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.arrivals.fit import any_arrivals, arrival_costs, fit_arrivals, receivers_of, times_of
 from assoc.costs.estimation import Fit, fit
 from assoc.costs.own_sensors import any_own, fit_own, flat_scan
 from assoc.costs.prices import position_prior, prices, with_prior
@@ -31,6 +32,9 @@ def tuple_costs(
     """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
     prior = position_prior(scene, sensor_arrays(scene), target_density)
     sensors = with_prior(sensor_arrays(scene), prior)
+    if any_arrivals(scene):
+        times, fitted = fitted_arrivals(scene, scan, tuples)
+        return arrival_costs(scene, sensors, times, prior, fitted)
     flat, rows, chi, positions, covariances = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
     if rates is not None or prior is not None:
@@ -42,8 +46,18 @@ def tuple_costs(
 
 def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:
     """Maximum-likelihood positions of measurements of one time; see `assoc.costs.positions_and_covariances`."""
+    if any_arrivals(scene):
+        _, (_, _, positions, covariances) = fitted_arrivals(scene, scan, tuples)
+        return positions, covariances
     positions, covariances = _fit_tuples(scene, scan, tuples)[3:]
     return positions, covariances
+
+
+def fitted_arrivals(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, tuple[Array, ...]]:
+    """Arrival times (K, S) of tuples, and what is fitted to them."""
+    chosen = scan_of(scene, scan)
+    times = times_of(chosen, checked_tuples(tuples, chosen.sizes))
+    return times, fit_arrivals(receivers_of(scene, sensor_arrays(scene)), times)
 
 
 def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.kernels.gaussian import GIVEN, LINEAR, PLAIN
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import checked_covariance, finite
+from assoc.sensors.arrival_time import refuse_arrival_times
 from assoc.sensors.base import Sensor
 from assoc.sensors.codes import CODES, POSITION, RADAR3D
 
@@ -194,6 +195,7 @@ def _velocity_columns(motion: Motion) -> Array:
 def observation(measurement: Measurement, motion: Motion, kind: int = PLAIN) -> Observation:
     """Put a measurement model in the form that the kernels take, for states of a motion model."""
     if isinstance(measurement, Sensor):
+        refuse_arrival_times([measurement], "a filter")
         columns = np.array(motion.position, dtype=np.int64)
         code = CODES.get(type(measurement))
         if code == POSITION and measurement.dim > len(columns):

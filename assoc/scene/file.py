@@ -16,14 +16,16 @@ from assoc.errors import InvalidInputError
 from assoc.sensors import KINDS, Platform, Sensor
 
 FORMAT = "assoc.scene"
-VERSION = 5
+VERSION = 6
 # bytes, a quarter of its memory: its content counts as well
 _OF_A_SCAN = 120
 # a resolution that was not said; components that part no targets
 _UNSAID, _NEVER = -1.0, -2.0
 # fields of later versions, latest first; a scene without them is written as version 1
-_LATER = {"sensor_resolution": 5, "sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3, "measurement_times": 2,
-          "sectors": 2}  # fmt: skip
+_LATER = {
+    "sensor_wave_speed": 6, "sensor_resolution": 5, "sensor_folding": 4, "sensor_notch": 4, "sensor_platform": 3,
+    "measurement_times": 2, "sectors": 2,
+}  # fmt: skip
 
 _METADATA = {
     "origin": Field("float", 1, required=False),
@@ -49,6 +51,7 @@ _FIELDS = {
     "sensor_folding": Field("float", 1, required=False),
     "sensor_notch": Field("float", 1, required=False),
     "sensor_resolution": Field("float", 1, required=False),
+    "sensor_wave_speed": Field("float", 1, required=False),
     "measurement_values": Field("float", 1),
     "measurement_offsets": Field("int", 2),
     "measurement_sources": Field("int", 1, required=False),
@@ -103,7 +106,7 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         "measurement_values": np.concatenate([z.ravel() for block in blocks for z in block]),
         "measurement_offsets": np.concatenate([np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1),
     }
-    for name in ("folding", "notch"):
+    for name in ("folding", "notch", "wave_speed"):
         values = [getattr(sensor, name, None) or 0.0 for sensor in sensors]
         values = [value if math.isfinite(value) else -1.0 for value in values]
         if any(values):
@@ -199,7 +202,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         raise InvalidInputError("the field 'sensor_kind' is empty, expected at least one sensor")
     for name in ("sensor_name", "sensor_dim", "sensor_detection_probability", "sensor_false_alarm_rate"):
         _check_shape(arrays, name, (count,))
-    for name in ("sensor_folding", "sensor_notch"):
+    for name in ("sensor_folding", "sensor_notch", "sensor_wave_speed"):
         if name in arrays:
             _check_shape(arrays, name, (count,))
     _check_shape(arrays, "sensor_position", (count, 3))
@@ -219,7 +222,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
             raise InvalidInputError(
                 f"the field 'sensor_kind' has {kind[:40]!r} for sensor {s}, expected one of {', '.join(KINDS)}"
             )
-        known = [name for name in ("folding", "notch") if f"sensor_{name}" in arrays]
+        known = [name for name in ("folding", "notch", "wave_speed") if f"sensor_{name}" in arrays]
         rates = {name: float(arrays[f"sensor_{name}"][s]) for name in known if arrays[f"sensor_{name}"][s] != 0.0}
         if rates.get("folding") == -1.0:
             rates["folding"] = math.inf

@@ -60,7 +60,7 @@ def _complaint(sensor: Sensor, axis: int, values: Array, sigma: float) -> str:
         outside = (values < low) | (values > high)
     share = float(outside.mean())
     plural = name if isinstance(sensor, PositionSensor) else f"{name}s"
-    unit = "rad" if name in ANGLES else "m/s" if name == "range rate" else "m"
+    unit = "rad" if name in ANGLES else {"range rate": "m/s", "arrival time": "s"}.get(name, "m")
     if (enough and share > _MANY) or (name == "range" and _is_seen(values, _BEYOND * high, sigma)):
         return (
             f"{100 * share:.0f} % of its {plural} ({seen} {unit}) lie outside of its field of view "

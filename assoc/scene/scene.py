@@ -283,7 +283,7 @@ class Scene:
 
     def _repr_html_(self) -> str:
         """HTML for notebooks and reports: one row a sensor."""
-        rows, units = [], {"range rate": "m/s"}
+        rows, units = [], {"range rate": "m/s", "arrival time": "s"}
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
             position = ", ".join(f"{x:g}" for x in sensor.position)

@@ -16,7 +16,7 @@ from assoc.sensors.arrays import finite_array, numbers
 from assoc.sensors.platform import Platform
 
 ANGLES = ("azimuth", "elevation")
-"""Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
+"""Components that are angles, in radians; others are in metres, but range rates in m/s and arrival times in s."""
 
 LARGEST_ANGLE_NOISE = 0.3
 """Standard deviation of an angle (rad, 17 degrees) from which a warning suggests degrees."""

@@ -11,6 +11,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
+from assoc.sensors.arrival_time import ArrivalTimeSensor
 from assoc.sensors.base import Sensor, wrap_angle
 from assoc.simulation.memory import require_scene_memory
 
@@ -26,6 +27,7 @@ def observe(
     region: Array | None = None,
     name: str = "",
     velocities: Sequence[Array] | None = None,
+    emission_times: Sequence[Array] | None = None,
 ) -> Scene:
     """Let sensors observe targets.
 
@@ -49,6 +51,8 @@ def observe(
     velocities : sequence over scans of arrays (T_k, 3), optional
         Of the targets, m/s, for sensors that measure range rate. Left out, they are differences of a target's
         positions from scan to scan, 0 of one that is seen in a single scan.
+    emission_times : sequence over scans of arrays (T_k,), optional
+        When the targets emit what an `ArrivalTimeSensor` hears, seconds; left out, at 0.
 
     Returns
     -------
@@ -68,13 +72,17 @@ def observe(
     _require_rows(positions, target_ids, "positions")
     if velocities is not None:
         _require_rows(velocities, target_ids, "velocities")
+    if emission_times is not None and [len(part) for part in emission_times] != [len(ids) for ids in target_ids]:
+        raise InvalidInputError("emission_times: expected one for each target of each scan")
     measurements: list[list[Array]] = []
     sources: list[list[Array]] = []
     if velocities is None and any(sensor.measures_velocity for sensor in sensors):
         velocities = velocities_from(times, target_ids, positions)
     moving = velocities if velocities is not None else [np.zeros((len(ids), 3)) for ids in target_ids]
-    for time, ids, points, speeds in zip(np.asarray(times).tolist(), target_ids, positions, moving, strict=True):
-        seen = np.asarray(ids), np.asarray(points), np.asarray(speeds)
+    emitted = emission_times if emission_times is not None else [np.zeros(len(ids)) for ids in target_ids]
+    stamps = np.asarray(times).tolist()
+    for time, ids, points, speeds, waves in zip(stamps, target_ids, positions, moving, emitted, strict=True):
+        seen = np.asarray(ids), np.asarray(points), np.asarray(speeds), np.asarray(waves)
         scan = [_on_board(sensor, time, *_report(sensor.at(time), *seen, rng)) for sensor in sensors]
         measurements.append([values for values, _ in scan])
         sources.append([source for _, source in scan])
@@ -154,11 +162,13 @@ def resolved(sensor: Sensor, exact: Array, when: Array, turn: float, rng: np.ran
 
 
 def _report(
-    sensor: Sensor, ids: Array, positions: Array, velocities: Array, rng: np.random.Generator
+    sensor: Sensor, ids: Array, positions: Array, velocities: Array, emitted: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Measurements (n, d) of one sensor in one scan, and the source (n,) of each."""
     points = positions.reshape(-1, 3)
     exact = sensor.measure(points, velocities.reshape(-1, 3)) if sensor.measures_velocity else sensor.measure(points)
+    if isinstance(sensor, ArrivalTimeSensor):
+        exact = exact + emitted[:, None]
     detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.sees(exact)
     factor = np.linalg.cholesky(sensor.covariance)
     hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T

@@ -20,6 +20,7 @@ from assoc.filters.base import Filter
 from assoc.filters.state import Gaussian
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
+from assoc.sensors.arrival_time import refuse_arrival_times
 from assoc.tracking import file
 from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.adapting.speeds import speed_of_tracks
@@ -120,6 +121,7 @@ class Tracker:
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         scene = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
+        refuse_arrival_times(scene.sensors, "a tracker")
         if registration not in (None, "online"):
             raise InvalidInputError(f"registration: expected 'online', got {registration!r}")
         settings = TrackerSettings(

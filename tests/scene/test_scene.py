@@ -134,7 +134,7 @@ def test_bad_files_name_path_and_field(tmp_path):
         ),
         "truth_ids": (np.zeros(0, int), "'truth_ids' has shape"),
         "times": (np.array([0.0, 1, 2, 3]), "'measurement_offsets' has shape"),
-        "version": (np.array(6), "has version 6"),
+        "version": (np.array(7), "has version 7"),
     }
     for name, (value, words) in changes.items():
         np.savez(path, **(good | {name: value}))

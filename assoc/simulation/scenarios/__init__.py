@@ -23,6 +23,7 @@ _MODULES = {
     "bearing-only": "assoc.simulation.scenarios.bearing_only",
     "dubins-uav": "assoc.simulation.scenarios.dubins_uav",
     "rotating-radars": "assoc.simulation.scenarios.rotating_radars",
+    "arrival-times": "assoc.simulation.scenarios.arrival_times",
     "from-tracks": "assoc.simulation.scenarios.from_tracks",
 }
 # the same for those that make a recording of plots, each with its own time, and not a scene
