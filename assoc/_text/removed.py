@@ -60,6 +60,7 @@ REMOVED: dict[str, str] = {
     "assoc.track --scheduler": _ONE_PROCESS,
     "assoc.sweep --plot": "write --heatmap FILE.png --convergence FILE.png",
     "--all-sensors": "joint-probabilistic takes one sensor after the other; multi-sensor takes all at once",
+    "aco(nodes)": 'use tuples, "useful" or "all"; nodes are those of branch and bound',
     "marginals(k)": "nothing is listed; probabilities are exact sums or sampled, and say their error",
     "marginals(method)": "sums where these are short, else samples; see Marginals.exact and Marginals.error",
     "Marginals.lower": _STANDARD,

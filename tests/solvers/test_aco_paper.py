@@ -25,7 +25,7 @@ SETTINGS = [
     {"alpha": 2.0, "beta": 1.0, "rho": 0.3},
     {"alpha": 1.0, "beta": 3.0, "rho": 0.6, "ants": 7, "visibility": "shifted", "scale": 4.0},
     {"alpha": 0.0, "beta": 1.5, "rho": 0.5, "ants": 40, "scale": 3.0},
-    {"alpha": 2.0, "beta": 1.0, "rho": 0.3, "start_on": "any", "nodes": "all"},
+    {"alpha": 2.0, "beta": 1.0, "rho": 0.3, "start_on": "any", "tuples": "all"},
 ]
 
 
@@ -85,7 +85,7 @@ def test_cycle_by_cycle(name, setting):
     problem, parameters = PROBLEMS[name], SETTINGS[setting]
     seen = []
     solution = assoc.assign(problem, "aco", seed=setting, mode="paper", iterations=12, watch=seen.append, **parameters)
-    packing = prepare(problem, every_tuple="nodes" in parameters).packing
+    packing = prepare(problem, every_tuple="tuples" in parameters).packing
     expected = list(reference(packing, parameters, setting, 12))
     assert solution.iterations == len(expected) == len(seen)
     alone = packing.num_rows if packing.slack.all() else 0
@@ -107,9 +107,9 @@ def test_cycle_by_cycle(name, setting):
 def test_all_tuples_of_the_problem_can_be_nodes():
     problem = assoc.build_problem(simulate("three-radar", 0, scans=1), 0, all_tuples=True)
     best = assoc.assign(problem)
-    for nodes, count in (("useful", 17), ("all", problem.num_tuples)):
-        history = assoc.solvers.pheromone(problem, mode="paper", nodes=nodes)
-        assert len(history.tuples) == count, nodes
+    for tuples, count in (("useful", 17), ("all", problem.num_tuples)):
+        history = assoc.solvers.pheromone(problem, mode="paper", tuples=tuples)
+        assert len(history.tuples) == count, tuples
         assert history.solution.cost == pytest.approx(best.cost)
         assert history.solution.lower_bound <= best.cost
     assert {*map(tuple, history.tuples.tolist())} == {*map(tuple, problem.tuples.tolist())}

@@ -9,7 +9,7 @@ whatever order, or after ``iterations`` cycles; the answer is the cheapest tour 
 
 Eq. 7 needs positive costs, but eq. 5 also gives negative ones: c is replaced by a positive transform that keeps the
 order, selected by the parameter ``visibility``; L_k is the sum of the transformed costs of a tour.
-Costs are relative to the false alarms: tuples that cost no less than their singletons are nodes if ``nodes`` is "all".
+Costs are relative to the false alarms: tuples that cost no less than their singletons are nodes if ``tuples`` is "all".
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class AcoParameters(SearchParameters):
         The transform's scale, in units of cost.
     start_on : str
         Mode paper: on a point of whose last tour an ant starts: its "own", or that of "any" ant, drawn at random.
-    nodes : str
+    tuples : str
         Mode paper: the tuples that ants may visit beside false alarms: "useful", which cost less than their
         measurements as false alarms, or "all" of the problem.
     """
@@ -53,8 +53,9 @@ class AcoParameters(SearchParameters):
     )
     scale: float = field(default=10.0, metadata={"help": "mode paper: scale of the visibility transform"})
     start_on: str = field(default="own", metadata={"help": "mode paper: whose last tour an ant starts on: own or any"})
-    nodes: str = field(
-        default="useful", metadata={"help": "mode paper: useful tuples (cheaper than false alarms) or all as nodes"}
+    tuples: str = field(
+        default="useful",
+        metadata={"help": "mode paper: tuples that ants visit: useful (cheaper than false alarms) or all"},
     )
 
     def __post_init__(self) -> None:
@@ -67,12 +68,12 @@ class AcoParameters(SearchParameters):
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
         self._number("scale", above=0.0)
         self._require(self.start_on in ("own", "any"), "start_on", "own or any")
-        self._require(self.nodes in ("useful", "all"), "nodes", "useful or all")
+        self._require(self.tuples in ("useful", "all"), "tuples", "useful or all")
 
     @property
     def every_tuple(self) -> bool:
         """Whether ants are to see tuples, too, that cost no less than false alarms."""
-        return self.mode == "paper" and self.nodes == "all"
+        return self.mode == "paper" and self.tuples == "all"
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """Mode paper: the ants' tours, and the owners of rows from which they are made."""

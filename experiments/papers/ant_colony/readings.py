@@ -64,7 +64,7 @@ READINGS = (
 )
 BY_SOLVER = {
     "as in the package (noise of 50 m, exponential of scale 10, own tour)": {},
-    "all tuples of the grid, scale 1, start on any ant's tour": {"nodes": "all", "scale": 1.0, "start_on": "any"},
+    "all tuples of the grid, scale 1, start on any ant's tour": {"tuples": "all", "scale": 1.0, "start_on": "any"},
 }
 """Readings that the solver has, and its parameters."""
 
