@@ -93,6 +93,20 @@ def test_what_is_wrong_is_told_once_and_the_tracker_goes_on(scene):
     assert tracker.counts["unusable"] == 4 * rounds
 
 
+@pytest.mark.parametrize("turns", [TURNS, None])
+def test_a_plot_comes_again_over_another_line(scene, turns):
+    """Some ms later it is the same plot, if the antenna turns; a sensor that does not may measure the same again."""
+    plots = list(replayed(scene, 0.0))
+    again = [plot._replace(time=plot.time + 0.02) for plot in plots[::3]]
+    tracker, told = live(scene, turns=turns)
+    pictures = fed(tracker, sorted([*plots, *again], key=lambda plot: plot.time))
+    assert tracker.counts["repeated"] == (len(again) if turns else 0)
+    assert tracker.counts["plots"] == len(plots) + (0 if turns else len(again))
+    assert len(told) == (1 if turns else 0) and all("20 ms from it: left out" in line for line in told)
+    if turns:
+        assert max(found(pictures, scene)) < 300.0 and len(pictures[-1].tracks) == 4
+
+
 def test_late_plots_are_put_in_their_place(scene):
     rng = np.random.default_rng(0)
     plots = list(replayed(scene, 0.0))

@@ -17,6 +17,7 @@ from assoc._text.times import moment
 from assoc._types import Array
 from assoc.costs.positions import positions_of_scan
 from assoc.errors import AssocError, InvalidInputError
+from assoc.recordings.cleaning import TWIN
 from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -47,8 +48,9 @@ class LiveTracker:
     """Takes plots one by one, in nearly any order; gives a picture for each interval.
 
     Plots that cannot be used are counted, and the first of each kind is reported in one line: unknown sensors, wrong
-    components, repeated plots, plots that are too old. A plot far ahead of all others in time waits until others agree
-    with it. A sensor that sends nothing for long is treated as switched off: its silence does not count as misses.
+    components, repeated plots (of antennas that turn also those some ms later), plots that are too old. A plot far
+    ahead of all others in time waits until others agree with it. A sensor that sends nothing for long is treated as
+    switched off: its silence does not count as misses.
 
     Parameters
     ----------
@@ -219,6 +221,12 @@ class LiveTracker:
         if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
             self.leave_out("repeated", f"{where} repeats a plot of {moment(time)}: left out", s)
             return []
+        turn, twin = self.settings.turn_of(s), state.placed.get((s, plot.key[2]), math.inf)
+        if turn is not None and abs(time - twin) <= min(TWIN, 0.5 * turn):
+            # the same plot over another line of the feed
+            later = f"{1e3 * abs(time - twin):.0f} ms from it"
+            self.leave_out("repeated", f"{where} repeats a plot of {moment(twin)}, {later}: left out", s)
+            return []
         return self._timed(plot)
 
     def take_own_position(
@@ -276,6 +284,7 @@ class LiveTracker:
         self._drop_ahead()
         state.behind.clear()
         state.recent[plot.key] = None
+        state.placed[plot.sensor, plot.key[2]] = time
         self.counts["plots"] += 1
         self._note_antenna(plot)
         pictures = []
@@ -388,7 +397,7 @@ class LiveTracker:
             self.leave_out("steps failed", f"the plots up to {moment(end)} could not be processed: {error}")
         self.seconds.append(clock.perf_counter() - begin)
         too_old = end - settings.horizon - interval
-        state.recent = {key: None for key in state.recent if key[1] >= too_old}
+        state.forget(too_old)
         living = state.tracker.tracks
         # late plots may bring tracks back until then
         self._kept.settle({track.track_id for track in living}, too_old)

@@ -88,6 +88,16 @@ class LiveState:
     """Consecutive plots that were too old."""
     recent: dict[PlotKey, None] = field(default_factory=dict)
     """Plots so recent that a repetition must be recognised."""
+    placed: dict[tuple[int, bytes], float] = field(init=False)
+    """Sensor and values of these -> time of the last one."""
+
+    def __post_init__(self) -> None:
+        self.forget(-math.inf)
+
+    def forget(self, before: float) -> None:
+        """Keep as recent the plots since a time, seconds."""
+        self.recent = {key: None for key in self.recent if key[1] >= before}
+        self.placed = {(s, values): time for s, time, values in self.recent}
 
     @contextmanager
     def under_way(self, settings: LiveSettings) -> Iterator[Scene]:
