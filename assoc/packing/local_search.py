@@ -57,12 +57,17 @@ class LocalSearch:
     def _late(self) -> bool:
         return self.run.remaining() < 0.0
 
-    def offer_greedy(self) -> None:
-        """Offer the greedy cover by reduced cost, improved by insertion."""
+    def greedy(self) -> Owner:
+        """Return the greedy cover by reduced cost, improved by insertion."""
         cover = Cover.empty(self.component.packing)
         cover.add_greedily(ascending(self.component.reduced))
         self.insert(cover.owner)
-        self.component.offer(cover.owner, cover.weight)
+        return cover.owner
+
+    def offer_greedy(self) -> None:
+        """Offer the greedy cover."""
+        owner = self.greedy()
+        self.component.offer(owner, self.component.weight_of(owner))
 
     def offer_start(self) -> None:
         """Offer the run's start, restricted to this component."""

@@ -27,6 +27,8 @@ from assoc.solvers.search_parameters import SearchParameters
 
 # covers from elsewhere with which a search begins
 _FIRST = 3
+# rows up to which the linear program bounds a component in time: an exchange of its basis takes the square of them
+_PROGRAM = 2000
 # components of fewer rows are bounded before the search, too: it takes less time than an iteration, and the search
 # can stop at a proved optimum
 _SMALL = 30
@@ -82,7 +84,7 @@ def _first_covers(search: LocalSearch, share: Run) -> bool:
         search.offer_start()
     if component.closed:
         return False
-    if bound is not None and not share.should_stop():
+    if bound is not None and component.packing.num_rows <= _PROGRAM and not share.should_stop():
         bound(component, share)
     for number in range(_FIRST):
         # the first one in any case: it gains more than all later ones

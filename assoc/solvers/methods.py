@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
 from assoc.packing.branching.search import BranchAndBound, first_solution
 from assoc.packing.component import Component
 from assoc.packing.local_search import LocalSearch
@@ -14,24 +18,56 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
-# rounds of exact sub-steps on the first cover, at most
-_ROUNDS = 10
+# rows from which tabu search begins with the greedy cover
+_FAR = 150
+# iterations for which a move rests at the most that gained nothing
+_REST = 16
 
 
 class IncumbentSearch:
-    """Improves the incumbent of `exact`: tabu search and breeding in turns, as they get stuck in different places."""
+    """Improves the incumbent of `exact` by the moves of metaheuristics, as they get stuck in different places.
+
+    A move that gains nothing rests for one iteration, then for two, four and so on, until it gains: time goes to what
+    gains, and as rests are counted, not timed, the same seed gives the same answer.
+    """
 
     def __init__(self, component: Component, run: Run) -> None:
-        self._search = LocalSearch(component, run, clusters=TabuParameters.clusters)
-        self._searchers = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+        self._component = component
+        search = LocalSearch(component, run, clusters=TabuParameters.clusters)
+        tabu, breeding = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+        if component.packing.num_rows >= _FAR:
+            # from the rounded multipliers exact sub-steps reach less, and what is better of them is kept in any case
+            tabu.owner = search.greedy()
+        self._moves = _Move(partial(tabu.iterate, search)), _Move(partial(breeding.iterate, search))
+        self._sub_steps = _Move(search.refine)
         self._iterations = 0
 
     def iterate(self) -> None:
-        """Do one iteration of the next one, and exact sub-steps on the incumbent."""
-        if self._iterations:
-            self._searchers[0 if self._iterations % 4 else 1].iterate(self._search)
-        self._search.refine(1 if self._iterations else _ROUNDS)
+        """Do the move that is due first, and exact sub-steps on the incumbent if these are due."""
+        now = self._iterations
+        if self._do(min(self._moves, key=lambda move: move.due), now):
+            self._sub_steps.due = now
+        if self._sub_steps.due <= now:
+            self._do(self._sub_steps, now)
         self._iterations += 1
+
+    def _do(self, move: _Move, now: int) -> bool:
+        """Do a move; returns whether it gained."""
+        before = self._component.weight
+        move.make()
+        gained = self._component.weight < before - self._component.tolerance
+        move.rest = 1 if gained else min(2 * move.rest, _REST)
+        move.due = now + move.rest
+        return gained
+
+
+@dataclass(slots=True)
+class _Move:
+    """A move, the iteration in which it is due, and the iterations that it rests."""
+
+    make: Callable[[], object]
+    due: int = 0
+    rest: int = 1
 
 
 EXACT_METHODS = Methods(

@@ -40,7 +40,7 @@ _HARD = 500
 _DENSE = 15
 # columns per row up to which a component is nearly decided: branching goes first
 _THIN = 4
-# rows from which a component may keep the gap that the caller allows
+# rows from which a component may keep the gap that the caller allows, and is improved before it is bounded
 _VAST = 2000
 
 
@@ -255,9 +255,12 @@ def _bound_better(component: Component, searches: _Searches) -> list[Component]:
         component.offer(cover.owner, cover.weight)
         if searches.good_enough(component):
             return [component]
-    component.adopt_if_better(dual_bound(component.packing, run=run))
     # a large one first gets a better cover, in turns: that leaves so few columns that the rest is quick
     deferred = _is_large(component, run) and not searches.may_keep_gap(component)
+    if deferred and component.packing.num_rows >= _VAST and run.methods.improver is not None:
+        # the bound takes longer than the first iteration, which gains most
+        run.methods.improver(component, run).iterate()
+    component.adopt_if_better(dual_bound(component.packing, run=run))
     return [component] if deferred else _by_regions(component, searches)
 
 
