@@ -137,8 +137,10 @@ class TimedScan:
                 z = np.ascontiguousarray(self.measurements[s][rows[here, s] - 1])
                 done = self.filter.update(moved, z, sensor)
                 when[here] = now
-                rest = np.setdiff1d(np.arange(len(track)), here)
-                states = placed(len(track), [(rest, states[rest]), (here, done.state)])
+                others = np.ones(len(track), dtype=np.bool_)
+                others[here] = False
+                rest = np.flatnonzero(others)
+                states = placed(len(track), [(rest, states[rest]), (here, done.state)]) if len(rest) else done.state
                 log_likelihood[here] += done.log_likelihood
                 if self.clutter is not None:
                     log_likelihood[here] -= self.clutter[s][rows[here, s] - 1]
