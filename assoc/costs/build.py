@@ -57,9 +57,8 @@ def build_problem(
     Measurements with their own times are compared through the target's predicted motion: straight flight, velocities of
     the prior `speed`; gates are those of a measurement given the previous ones.
 
-    Of arrival times (`assoc.sensors.ArrivalTimeSensor`) a candidate has as many as determine a position in the region
-    and the time of emission, four or three in a plane, and one degree of freedom less. With more than eight receivers
-    not all parts are listed of what is heard of an emission, but those alone whose rest may be another's.
+    Of arrival times (`assoc.sensors.ArrivalTimeSensor`) a candidate has four or, in a plane, three, and one degree of
+    freedom less; with more than eight receivers only parts of an emission whose rest may be another's are listed.
 
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
