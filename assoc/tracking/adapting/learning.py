@@ -213,9 +213,10 @@ def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> 
             continue
         gate, periods = gate_of(sensor, settings.gate_probability), periods_of(sensor)
         expected = settings.filter.expected(late.states[missed], sensor)
-        size = np.sqrt(np.linalg.det(expected.covariance)) * (2.0 * np.sqrt(gate)) ** sensor.dim
-        most = _FALSE * sensor.volume / (sensor.false_alarm_rate * size)
-        wider = np.minimum(_WIDER, most ** (1.0 / sensor.dim))
+        # in logarithms: determinants of covariances that floats can hold may be none that they can
+        size = 0.5 * np.linalg.slogdet(expected.covariance)[1] + sensor.dim * np.log(2.0 * np.sqrt(gate))
+        most = np.log(_FALSE * sensor.volume / sensor.false_alarm_rate) - size
+        wider = np.exp(np.minimum(np.log(_WIDER), most / sensor.dim))
         wide = Expected(expected.mean, expected.covariance * (wider**2)[:, None, None])
         track, found = near_pairs(wide, z[free], periods, gate)
         off = sensor.residual(z[free[found]], expected.mean[track])

@@ -93,11 +93,12 @@ def _of_starts(progress: Progress, prior: float) -> float:
     first, second, third = (places_of(settings.filter, part.states)[0][:, :axes] for part in parts)
     step = (second[None] - first[:, None]).reshape(-1, axes)
     long = np.linalg.norm(step, axis=1)
-    speed = long / (when[1] - when[0])
-    fast = (speed > _EXCLUDED * prior * math.sqrt(axes)) & (speed < _ESCAPE)
+    # not divided before: what is far beyond all speeds may be beyond floats
+    apart = when[1] - when[0]
+    fast = (long > _EXCLUDED * prior * math.sqrt(axes) * apart) & (long < _ESCAPE * apart)
     i, j = (index[fast] for index in np.divmod(np.arange(len(step)), len(second)))
-    step, long, speed = step[fast], long[fast], speed[fast]
-    ahead = second[j] + step * (when[2] - when[1]) / (when[1] - when[0])
+    step, long = step[fast], long[fast]
+    ahead = second[j] + step * (when[2] - when[1]) / apart
     off = np.linalg.norm(third[None] - ahead[:, None], axis=2)
     rows, ends = np.nonzero(off < _OFF * long[:, None])
     volume = float(np.prod(np.maximum(np.diff(settings.scene.region[:axes], axis=1), 1.0)))
@@ -106,4 +107,4 @@ def _of_starts(progress: Progress, prior: float) -> float:
     count = min(len(np.unique(column)) for column in (i[rows], j[rows], ends))
     if count < 2 or chance**count > _CHANCE * math.factorial(count):
         return 0.0
-    return float(np.sqrt((speed[rows] ** 2).mean() / axes))
+    return float(np.sqrt(((long[rows] / apart) ** 2).mean() / axes))
