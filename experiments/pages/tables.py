@@ -337,6 +337,9 @@ TABLES: dict[str, Callable[[], str]] = {
     "large-components": partial(
         _plain, "large_components", "problems", ("tuples", "exact, s", "slowest, s", "others / exact", "least ratio")
     ),
+    "anytime": partial(
+        _plain, "anytime", "problem, solver", ("behind after 1 s", "behind after 5 s", "area", "gap")
+    ),
     "scale-scans": scale_scans,
     "scale-trackers": scale_trackers,
     "probabilities": partial(
