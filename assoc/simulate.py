@@ -25,6 +25,7 @@ _PURPOSE = {
     "bearing-only": "bearing sensors only, with many ghosts (false intersections of bearings)",
     "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
     "rotating-radars": "airliners under three radars that turn at their own paces; each plot has its own time",
+    "arrival-times": "waves that stations hear at times of which the emission is not known",
     "from-tracks": "recorded trajectories (CSV), measured by simulated radars",
     "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or two close aircraft",
 }

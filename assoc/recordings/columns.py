@@ -54,6 +54,7 @@ _ALIASES = {
     "nm": "nmi", "meters": "m", "metres": "m", "degrees": "deg", "radians": "rad", "feet": "ft", "octal": "oct",
     "sec": "s", "seconds": "s", "msec": "ms", "milliseconds": "ms", "°": "deg",
 }  # fmt: skip
+_LEVEL = re.compile(r"FL *(\d+)", re.IGNORECASE)
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:\.\d{1,9})?)\Z")
 
 
@@ -157,6 +158,12 @@ def number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(text)
     return value
+
+
+def level(text: str, unit: float) -> float:
+    """Read an altitude in a unit of so many metres; ``FL298`` is a flight level in any."""
+    found = _LEVEL.fullmatch(text)
+    return float(found[1]) * FLIGHT_LEVEL / unit if found else number(text)
 
 
 def code(text: str, base: float) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, islice
 from pathlib import Path
@@ -16,14 +15,13 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.cleaning import ADDRESS, AIRCRAFT, DOUBTFUL, LINE, MODE3, WIDTH
-from assoc.recordings.columns import BLANKS, COLUMNS, FLIGHT_LEVEL, code, number, seconds, whole
+from assoc.recordings.columns import BLANKS, COLUMNS, code, level, number, seconds, whole
 from assoc.recordings.recording import UNDECODED
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _BLANKS = frozenset(BLANKS)
-_FL = re.compile(r"FL *(\d+)", re.IGNORECASE)
 
 
 class TableRows:
@@ -170,9 +168,7 @@ class TableRows:
                 raise ValueError(text)
             self.clock = clock
             return value
-        if meaning == "altitude" and (level := _FL.fullmatch(text)):
-            return float(level[1]) * FLIGHT_LEVEL / self.scale["altitude"]
-        return number(text)
+        return level(text, self.scale["altitude"]) if meaning == "altitude" else number(text)
 
     def _expected(self, meaning: str) -> str:
         if meaning == "time":

@@ -82,6 +82,17 @@ def test_json_by_the_names_of_recordings():
     assert plot.values == pytest.approx([18520.0, -np.pi / 2])
 
 
+def test_flight_levels_in_letters_and_words_for_nothing(tmp_path):
+    found = read_radars(described(tmp_path))
+    form = form_of(found)
+    assert parse_line("radar,time,range_nmi,bearing,altitude_m,squawk", found.scene, form) is None
+    level = parse_line("north,3,20,90,FL298,7700", found.scene, form)
+    assert level == parse_line("north,3,20,90,9083.04,7700", found.scene, form)
+    # as no cell at all, and the rest of the line is used
+    none = parse_line("north,3,20,90,N/A,NaN", found.scene, form)
+    assert none == parse_line("north,3,20,90,,", found.scene, form) and none.values != level.values
+
+
 def test_a_plain_header_in_any_order():
     scene = Scene(
         [

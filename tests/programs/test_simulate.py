@@ -5,7 +5,7 @@ from assoc.recordings import read_plots
 from tests.sizes import sample
 
 
-@sample("scenario", ["three-radar", "crowd", "bearing-only"], every=3)
+@sample("scenario", ["three-radar", "crowd", "bearing-only", "arrival-times"], every=3)
 def test_same_seed_same_bytes(run, tmp_path, scenario):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         done = run("assoc.simulate", scenario, "-o", tmp_path / f"{name}.npz", "--seed", seed, "--scans", 2)
@@ -15,6 +15,13 @@ def test_same_seed_same_bytes(run, tmp_path, scenario):
     assert a == b
     assert a != c
     assert assoc.Scene.load(tmp_path / "a.npz").num_scans == 2
+
+
+def test_every_scenario_is_one_of_the_program(run):
+    from assoc.simulation import names
+
+    listed = run("assoc.simulate", "--help").stdout
+    assert all(f"\n  {name} " in listed for name in names())
 
 
 def test_from_tracks(run, tmp_path):

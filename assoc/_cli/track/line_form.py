@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.recordings.columns import COLUMNS, UNITS, choose, code, number, plain_name, seconds
+from assoc.recordings.columns import BLANKS, COLUMNS, UNITS, choose, code, level, number, plain_name, seconds
 from assoc.recordings.flights.positions import NAMES
 from assoc.recordings.flights.table import ENDINGS
 from assoc.recordings.on_earth import USUAL_ALTITUDE, Bias, azimuths_in_plane
@@ -106,18 +106,20 @@ class LineForm:
 
         def value(meaning: str) -> float:
             cell = cells[columns[meaning]] if meaning in columns else None
-            if cell is None or (isinstance(cell, str) and not cell.strip()):
+            text, unit = "" if cell is None else str(cell).strip(), _factor(meaning, units)
+            if text in BLANKS:
                 return math.nan
-            return (number(cell.strip()) if isinstance(cell, str) else float(cell)) * _factor(meaning, units)
+            return (level(text, unit) if meaning == "altitude" else number(text)) * unit
 
         altitude = value("altitude")
         z = np.array([[value("range"), math.pi / 2 - value("bearing")]])
         found["values"] = self._in_scene(s, z, np.array([altitude]))[0].tolist()
         if sensor.components[sensor.dim - 1] == "height":
             found["values"].append("" if math.isnan(altitude) else altitude)
-        dialled = cells[columns["mode3"]] if "mode3" in columns else ""
+        cell = cells[columns["mode3"]] if "mode3" in columns else None
+        dialled = "" if cell is None else str(cell).strip()
         try:
-            bits = code(str(dialled).strip(), _factor("mode3", units))
+            bits = code("" if dialled in BLANKS else dialled, _factor("mode3", units))
         except (ValueError, OverflowError):
             bits = -1
         found["mode3"] = int(f"{bits:o}") if 0 <= bits <= 0o7777 else -1
