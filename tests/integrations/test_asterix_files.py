@@ -200,3 +200,36 @@ def test_garbage_is_not_tried_in_all_editions_for_ever(tmp_path, monkeypatch):
             read(tmp_path, b"".join(blocks))
         took.append(sum(tried))
     assert took[1] - took[0] < 1.1 * 300 * 12_000
+
+
+def test_an_edition_that_is_not_known_is_refused_in_one_line(recorded, tmp_path, capsys):
+    """Tracks of edition 0.17 of category 062, by hand: 010, 070, 040, 105 (24 bits), 060, then 136; other places."""
+    blocks = []
+    for k in range(20):
+        record = bytes([0b10111011, 0b00100000, 1, 2])
+        record += ((40_000 + k) * 128).to_bytes(3, "big") + (100 + k).to_bytes(2, "big")
+        record += round(47 / 180 * 2**23).to_bytes(3, "big") + round(8 / 180 * 2**23).to_bytes(3, "big")
+        record += (0o4521).to_bytes(2, "big") + (1400).to_bytes(2, "big")
+        blocks.append(b"\x3e" + (len(record) * 2 + 3).to_bytes(2, "big") + record * 2)
+    (tmp_path / "old.ast").write_bytes(b"".join(blocks))
+    assert asterix2csv.main([str(tmp_path / "old.ast")]) == 2
+    told = capsys.readouterr()
+    assert not told.out and told.err.count("\n") == 1
+    assert "20 data blocks of category 062 that cannot be decoded" in told.err
+    # among others it is counted, and these are read
+    (tmp_path / "old.ast").write_bytes(b"".join([*blocks, *recorded[0]]))
+    notes = {}
+    assert {row["category"] for row in read_records(tmp_path / "old.ast", notes)} == {48}
+    assert notes["data blocks of category 062 that cannot be decoded"] == 20
+
+
+def test_edition_1_of_adsb_has_its_items_where_edition_2_has_them(tmp_path):
+    """A report of edition 1.8 by hand: 010, 040, 161, 131; 080, 073; 210, 070, 145."""
+    record = bytes([0b11100011, 0b00011001, 0b00011010, 1, 2, 1, 0, 0, 7])
+    record += round(47 / 180 * 2**30).to_bytes(4, "big") + round(8 / 180 * 2**30).to_bytes(4, "big")
+    record += bytes.fromhex("3c4591") + (40_000 * 128).to_bytes(3, "big") + bytes([2]) + (0o4521).to_bytes(2, "big")
+    record += (1400).to_bytes(2, "big")
+    (tmp_path / "a.ast").write_bytes(b"\x15" + (len(record) + 3).to_bytes(2, "big") + record)
+    [row] = read_records(tmp_path / "a.ast")
+    assert (row["time"], row["mode3_oct"], row["address_hex"], row["altitude_fl"]) == (40_000, "4521", "3C4591", 350)
+    assert (row["latitude_deg"], row["longitude_deg"]) == pytest.approx((47, 8), abs=1e-6)
