@@ -3,7 +3,9 @@
 import importlib
 import inspect
 import warnings
+from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 import assoc
@@ -91,6 +93,29 @@ def test_one_wrong_argument(name, argument, value, scene):
     good = {"problem": assoc.build_problem(scene, 0)} if problem else {"scene": scene}
     good |= {"assoc.kbest": {"k": 2}, "assoc.build_problem": {"scan": 0}}.get(name, {})
     assert argument in complaint(target(name), **{**good, argument: value})
+
+
+@pytest.mark.parametrize(
+    ("kind", "fit", "unfit"),
+    [
+        ("int", (3, np.int64(3)), (True, 2.5, 3.0, "3", None)),
+        ("float", (3, 2.5, np.float32(1.0)), (True, "2.5", 1j, None)),
+        ("bool", (True, np.bool_(False)), (1, "yes", None)),
+        ("str | None", ("a", None), (b"a", 3)),
+        (Sequence[int], ([], (1, 2)), (3, "12", [1, 2.5])),
+    ],
+)
+def test_what_fits_an_annotation(kind, fit, unfit):
+    def function(value):
+        raise TypeError("deep inside")
+
+    function.__annotations__["value"] = kind
+    explaining = wrong_types.explains_wrong_types(function)
+    for value in fit:
+        with pytest.raises(TypeError, match="deep inside"):
+            explaining(value)
+    for value in unfit:
+        assert complaint(explaining, value).startswith(f"value: expected {kind}, got "), value
 
 
 def test_the_line_names_the_argument(scene):

@@ -101,6 +101,20 @@ def test_numbers_too_large_for_any_estimate_are_named(field, tmp_path):
         TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
 
 
+@pytest.mark.parametrize("field", ["estimates.ids", "unresolved.confirmed", "echoes.hidden"])
+def test_ids_that_do_not_ascend_are_named(field, tmp_path):
+    """They are searched for by halving."""
+    tracker = TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True)
+    stepped(tracker, SCENE, 0, SCANS)
+    arrays = {key: np.array(value) for key, value in arrays_of(tracker).items()}
+    ids = arrays[field] if len(arrays[field]) > 1 else np.array([1, 2])
+    save_npz(tmp_path / "good.npz", FORMAT, VERSION, {**arrays, field: ids})
+    TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "good.npz")
+    save_npz(tmp_path / "bad.npz", FORMAT, VERSION, {**arrays, field: ids[::-1].copy()})
+    with pytest.raises(InvalidInputError, match=f"'{field}'.*expected ids that ascend"):
+        TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize(
     "make",
     [
