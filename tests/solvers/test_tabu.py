@@ -1,9 +1,8 @@
-"""Tabu search against a plain one, move by move, same random numbers; tenure and aspiration on problems by hand."""
+"""Tabu search against a plain one, move by move, same random numbers."""
 
 import numpy as np
 import pytest
 
-import assoc
 from assoc._system.compiled import draws
 from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.solvers.tabu.moves import TabuSearch, _moves, _Rules
@@ -197,49 +196,3 @@ def test_iteration_by_iteration(name):
         np.testing.assert_array_equal(search.until, expected.until)
         assert (search.clock, search.restarts) == (expected.clock, expected.restarts)
     assert search.restarts >= 3, "a restart from a new cover was not seen"
-
-
-def two_rivals():
-    """Two tuples for one pair, and far away a third for another: the first ejected may not come back at once."""
-    problem = assoc.AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-5.0, -4.0, -3.0], [2, 2])
-    return component(problem)
-
-
-def moved(one, start, until, tenure, moves=1):
-    """Columns after some moves, and the best."""
-    owner = cover_of(one.packing, start)
-    best = owner.copy()
-    _moves(
-        search_arrays(one.packing),
-        owner,
-        best,
-        until,
-        _Rules(1, moves, tenure, -1),
-        draws(np.random.default_rng(0)),
-        np.inf,
-    )
-    return columns_of(owner), columns_of(best)
-
-
-def test_what_is_ejected_stays_out_for_its_tenure():
-    one = two_rivals()
-    heavy, rival, third = (int(np.flatnonzero(one.packing.weights == w)[0]) for w in (-5.0, -4.0, -3.0))
-    # the best insertion makes the cover worse by 1, and opens the row that the third needs
-    until = np.zeros(3, dtype=np.int64)
-    columns, best = moved(one, [heavy], until, tenure=5)
-    assert columns == sorted([rival, third]) == best
-    # clock 2, tenure 5, and up to as many again
-    assert 2 + 5 <= until[heavy] <= 2 + 10
-
-
-def test_tabu_columns_are_passed_over_unless_they_lead_below_the_best():
-    one = two_rivals()
-    heavy, rival, third = (int(np.flatnonzero(one.packing.weights == w)[0]) for w in (-5.0, -4.0, -3.0))
-    tabu = np.full(3, 100, dtype=np.int64)
-    # from nothing every insertion is better than the best known: aspiration
-    columns, best = moved(one, [], tabu.copy(), tenure=0)
-    assert columns == best == [heavy]
-    # from the cover of both, the heavy tuple would lose 2: tabu holds it back, and all moves are at random
-    free = tabu.copy()
-    free[heavy] = 0
-    assert moved(one, [rival, third], free, tenure=0)[0] == [heavy]
