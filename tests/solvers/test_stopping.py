@@ -1,102 +1,17 @@
-"""What must not change the answer: order, constant shifts, units, repetition; and that solvers stop when told."""
+"""What is common to all solvers: one seed one answer, and that they stop when told and say why."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from assoc.costs import build_problem
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
 from assoc.solvers.assign import assign
-from tests.oracles import axial_problem, brute_force, check_answer, gated_problem
+from tests.oracles import check_answer, gated_problem
 from tests.sizes import sample
 from tests.solvers.test_against_brute_force import installed
 
 QUICK = [name for name in installed() if name != "milp"]
-
-
-@st.composite
-def problems(draw):
-    """A random problem of two to five sensors, with or without dummies."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    sizes = tuple(draw(st.lists(st.integers(1, 4), min_size=2, max_size=4)))
-    style = draw(st.sampled_from(["mixed", "positive", "negative", "ties"]))
-    if draw(st.booleans()):
-        return gated_problem(rng, sizes, 0.6, style, listed_singletons=0.5, duplicates=0.1)
-    return axial_problem(rng, sizes, 1.0, style)
-
-
-def optimum(problem):
-    """Cost by the exact solver, which has proved it."""
-    solution = assign(problem, "exact")
-    assert solution.status == "optimal"
-    assert check_answer(problem, solution.tuples) == pytest.approx(solution.cost)
-    return solution.cost
-
-
-@given(problems(), st.integers(0, 2**32 - 1))
-def test_renumbering_measurements(problem, seed):
-    rng = np.random.default_rng(seed)
-    tuples = problem.tuples.copy()
-    for s, n in enumerate(problem.sizes):
-        tuples[:, s] = np.concatenate([[0], rng.permutation(n) + 1])[tuples[:, s]]
-    other = AssignmentProblem(tuples, problem.costs, problem.sizes, dummy=problem.dummy)
-    assert optimum(other) == pytest.approx(optimum(problem), abs=1e-9)
-
-
-@given(problems(), st.randoms(use_true_random=False))
-def test_order_of_sensors_and_of_tuples(problem, random):
-    order = list(range(problem.num_sensors))
-    random.shuffle(order)
-    rows = list(range(problem.num_tuples))
-    random.shuffle(rows)
-    other = AssignmentProblem(
-        problem.tuples[rows][:, order], problem.costs[rows], problem.sizes[order], dummy=problem.dummy
-    )
-    assert optimum(other) == pytest.approx(optimum(problem), abs=1e-9)
-
-
-@given(problems(), st.integers(0, 2**32 - 1), st.floats(0.1, 100.0))
-def test_adding_multipliers_shifts_all_solutions_alike(problem, seed, size):
-    """A constant for each measurement that every solution uses."""
-    rng = np.random.default_rng(seed)
-    costs = problem.costs.copy()
-    total = 0.0
-    for s, n in enumerate(problem.sizes):
-        if problem.dummy or n == problem.sizes.min():
-            shift = rng.normal(0.0, size, n)
-            costs += np.concatenate([[0.0], shift])[problem.tuples[:, s]]
-            total += shift.sum()
-    other = AssignmentProblem(problem.tuples, costs, problem.sizes, dummy=problem.dummy)
-    assert optimum(other) == pytest.approx(optimum(problem) + total, abs=1e-8)
-
-
-@given(problems(), st.integers(-6, 6))
-def test_units_of_costs(problem, exponent):
-    scale = 10.0**exponent
-    other = AssignmentProblem(problem.tuples, problem.costs * scale, problem.sizes, dummy=problem.dummy)
-    solution = assign(other, "exact")
-    # below the tolerances a small scale makes differences vanish; the bound stays valid
-    allowed = 2e-6 * max(1.0, abs(solution.cost)) / scale if scale < 1.0 else 1e-6
-    assert check_answer(problem, solution.tuples) <= brute_force(problem) + allowed
-    assert solution.lower_bound / scale <= brute_force(problem) + 1e-9
-
-
-@given(problems())
-def test_a_tuple_more_never_makes_it_worse(problem):
-    rng = np.random.default_rng(problem.num_tuples)
-    least = 0 if problem.dummy else 1
-    extra = [rng.integers(least, n + 1) for n in problem.sizes]
-    if not any(extra):
-        return
-    other = AssignmentProblem(
-        np.concatenate([problem.tuples, [extra]]),
-        np.append(problem.costs, rng.normal(-3.0, 4.0)),
-        problem.sizes,
-        dummy=problem.dummy,
-    )
-    assert optimum(other) <= optimum(problem) + 1e-9
 
 
 @pytest.mark.parametrize("name", installed())
