@@ -89,17 +89,6 @@ def test_metaheuristics_find_most_optima_of_small_problems(count, name):
     assert missed <= len(problems) // 20
 
 
-@pytest.mark.parametrize("name", installed())
-def test_textbook(name):
-    problem = blackman_popoli()
-    solution = assign(problem, name)
-    check(problem, solution, -34.7)
-    if name != "greedy":
-        assert solution.cost == pytest.approx(-34.7, abs=1e-9)
-        assert solution.tuples.tolist() == [[1, 1, 1], [2, 2, 2]]
-        assert solution.status == "optimal"
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_exact_on_problems_too_large_for_enumeration(seed):
     """Many competing tuples of nearly equal cost, so that branching is needed; against MILP."""
