@@ -1,6 +1,5 @@
 import itertools
 import math
-from functools import cache
 
 import numpy as np
 import pytest
@@ -11,44 +10,11 @@ from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle, TrackOr
 from tests.tracking import plain
 from tests.tracking.stepping import stepped
 
-SEEDS = (0, 4)
-
-
-@cache
-def enumerated(seed):
-    times, z = plain.small_scans(np.random.default_rng(seed))
-    everything = plain.enumerate_hypotheses(times, z, plain.sensor())
-    return times, z, sorted(everything, key=lambda one: -one[0])[:60]
-
 
 def tracker(**options):
     options = {"max_hypotheses": 5000, "depth": 8, "hypothesis_drop": 1e6, **options}
     options |= {"life_cycle": LifeCycle(missed_probability=1e-12), "initiation": plain.INITIATION}
     return plain.tracker_of(HypothesisOrientedMHT, [plain.sensor()], **options)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_all_hypotheses_of_two_scans_and_their_probabilities(seed):
-    times, scans = plain.small_scans(np.random.default_rng(seed))
-    own = tracker()
-    for time, z in zip(times[:2], scans[:2], strict=True):
-        own.step(time, [z])
-    everything = plain.enumerate_hypotheses(times[:2], scans[:2], plain.sensor())
-    weights = np.sort([score for score, _ in everything])[::-1]
-    assert len(own.probabilities) == len(weights)
-    p = np.exp(weights - weights[0])
-    np.testing.assert_allclose(own.probabilities, p / p.sum(), atol=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_best_of_three_scans(seed):
-    times, scans, best = enumerated(seed)
-    own = tracker(max_hypotheses=60)
-    for time, z in zip(times, scans, strict=True):
-        own.step(time, [z])
-    assert sum(track.score for track in own.tracks) == pytest.approx(best[0][0], abs=1e-6)
-    assert len(own.tracks) == len(best[0][1])
 
 
 def test_equation_2_1():
