@@ -1,14 +1,10 @@
-"""Files that are small and want much memory, and how much of it a program takes for them.
-
-python -m tests.files.hostile [NAME ...]        a table: the file, its size, the peak, how the program ended
-"""
+"""Files that are small and want much memory, and how much of it a program takes for them."""
 
 import lzma
 import os
 import sqlite3
 import subprocess
 import sys
-import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -230,13 +226,3 @@ def run(case: Hostile, folder: Path) -> Outcome:
         done = subprocess.run(command, stdin=stdin, capture_output=True, text=True, timeout=600)
     *said, peak = done.stderr.strip().splitlines()
     return Outcome(done.returncode, 1024 * int(peak.split()[1]), "\n".join(said))
-
-
-if __name__ == "__main__":
-    for one in HOSTILE:
-        if len(sys.argv) == 1 or one.name in sys.argv[1:]:
-            with tempfile.TemporaryDirectory() as place:
-                found = run(one, Path(place))
-                size = (Path(place) / one.name).lstat().st_size
-                figures = f"{size / 1e3:.0f} kB | {found.peak / 1e6:.0f} MB | {found.code}"
-                print(f"| {one.name} | {figures} | {found.said[-150:]} |", flush=True)

@@ -1,7 +1,6 @@
 """What a program shows a user who sits before it."""
 
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -29,31 +28,6 @@ def shown(
     status = process.wait(600)
     assert status == 0
     return seen
-
-
-def shown_at(widths: Sequence[int], words: Sequence[object], *, status: int = 0, **options: object) -> dict[int, str]:
-    """Show the program ``words`` on terminals of several widths; one process, without what moves the cursor."""
-    program, *rest = map(str, words)
-    code = (
-        f"import os, importlib; main = importlib.import_module({program!r}).main\n"
-        f"for width in {[*widths]}:\n"
-        "    os.environ['COLUMNS'] = str(width)\n"
-        "    print('=' * 9, width, flush=True)\n"
-        f"    code = main({rest!r})\n"
-        f"    if code != {status}:\n"
-        "        raise SystemExit(f'exit code {code}')"
-    )
-    main, side = os.openpty()
-    command = [sys.executable, "-c", code]
-    environment = {**os.environ, "TERM": "xterm"}
-    process = subprocess.Popen(command, stdout=side, stderr=subprocess.PIPE, env=environment, **options)
-    os.close(side)
-    text = _read(main)
-    _, errors = process.communicate()
-    assert process.returncode == 0, errors
-    text = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", text.replace("\r\n", "\n"))
-    parts = re.split(r"^=========\s(\d+)\n", text, flags=re.MULTILINE)
-    return {int(width): part for width, part in zip(parts[1::2], parts[2::2], strict=True)}
 
 
 def _read(main: int) -> str:
