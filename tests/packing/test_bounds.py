@@ -7,11 +7,10 @@ import pytest
 from scipy.sparse import csr_array
 
 from assoc.errors import InfeasibleError
-from assoc.packing.bounds.dual_ascent import certified_bound, component_bounds, dual_bound
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.program import all_allowed, certified, program_of
-from assoc.problem import AssignmentProblem
 from tests.oracles import axial_problem, brute_force, gated_problem, small_problems
 from tests.packings import by_highs
 from tests.sizes import few_or_all
@@ -93,10 +92,3 @@ def test_the_sum_of_many_multipliers_is_a_bound_to_the_last_digit():
         most = math.fsum(duals)
         for bound in (certified_bound(packing, duals), certified(program, allowed, duals)):
             assert most + 2e-15 * most <= bound <= most
-
-
-def test_component_without_cover_is_unbounded():
-    """If a measurement that must be used is in no tuple, the bound shows that there is no solution."""
-    problem = AssignmentProblem([[1, 1]], [1.0], [2, 2], dummy=False)
-    packing = prepare(problem).packing
-    assert np.isposinf(component_bounds(packing, np.zeros(packing.num_rows))).any()

@@ -77,20 +77,6 @@ def test_dives_are_near_the_bound(priced):
     assert np.median(left) < 0.5 * np.median(greedy)
 
 
-def test_what_is_drawn_is_fixed(plain):
-    """Fixed columns keep the value 1 in all later programs, and those that share a row with them the value 0."""
-    at, rng = _Descent(plain._core, plain._program, plain._relaxed, np.inf), np.random.default_rng(1)
-    steps = 0
-    while at.open_columns().size:
-        before = at.open_rows
-        assert at.fix(rng.permutation(at.open_columns()), 3.0, np.inf)
-        assert at.open_rows < before, "each step fixes more rows"
-        assert at.relaxed.primal[at.fixed] == pytest.approx(1.0, abs=1e-6)
-        assert at.relaxed.primal[~np.logical_and.reduce([_left(plain._core, j) for j in at.fixed])].max() < 1e-6
-        steps += 1
-    assert steps > 2
-
-
 def test_pheromone_and_values_decide(priced, plain):
     """The first draw has the probabilities of the module's docstring: counted over many draws."""
     diver = plain
@@ -115,16 +101,6 @@ def test_pheromone_and_values_decide(priced, plain):
     chance /= chance.sum()
     among = np.array([(second == j).mean() for j in open_columns])
     assert (np.abs(among - chance) <= 5.0 * np.sqrt(chance / second.size) + 2e-3).all()
-
-
-def test_dives_fix_what_has_pheromone(priced, plain):
-    """Whatever the program's values are: each open column in turn has all of it."""
-    found = []
-    for j in (opened := plain._core.origin[plain._relaxed.primal % 1.0 > 0.1]):
-        trail = np.zeros(priced.packing.num_columns)
-        trail[j] = 1.0
-        found.append(j in columns_of(plain.dive(trail, 4.0, np.random.default_rng(0), np.inf, np.inf)))
-    assert len(opened) > 5 and all(found)
 
 
 def test_a_dive_ends_at_its_cutoff(priced, plain):
