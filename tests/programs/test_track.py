@@ -138,16 +138,6 @@ def test_no_track_starts_in_areas_that_the_user_draws(scene_file, tmp_path, caps
         assert line in said and len(said.splitlines()) == 1
 
 
-@pytest.mark.parametrize("name", ["kalman", "ukf", "modified-ekf", "enkf", "imm", "fuzzy", "ekf"])
-def test_every_filter(name, scene_file, tmp_path, capsys):
-    code = track.main([str(scene_file), "--filter", name, "-o", str(tmp_path / "tracks.csv")])
-    captured = capsys.readouterr()
-    if name == "kalman":
-        assert code == 2 and "sensor must be linear for a Kalman filter" in captured.err
-    else:
-        assert code == 0 and "3 confirmed tracks" in captured.out
-
-
 @pytest.mark.parametrize("window", ["ctw", "ctw-time", "none"])
 @pytest.mark.parametrize("name", ["mht", "nearest-neighbour"])
 def test_plots_from_csv(window, name, tmp_path, capsys):

@@ -67,17 +67,6 @@ def test_tracks_are_those_of_measurements_in_order(scene, kind):
     assert states(late.tracks).keys() == found.keys()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_without_late_measurements_nothing_changes(scene, kind):
-    plain, wrapped = TRACKERS[kind].for_scene(scene), LatePlots(TRACKERS[kind].for_scene(scene))
-    stepped(plain, scene, 0, 10, times=True)
-    final = [one for step in stepped(wrapped, scene, 0, 10, times=True) for one in step.final]
-    mine, theirs = sorted(states(plain.tracks).values(), key=list), sorted(states(wrapped.tracks).values(), key=list)
-    np.testing.assert_array_equal(mine, theirs)
-    final += wrapped.flush()
-    assert [one.scan for one in final] == list(range(10))
-
-
 def test_what_is_too_old_is_refused_and_counted(scene):
     late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), horizon=6.0)
     stepped(late, scene, 0, 10, times=True)

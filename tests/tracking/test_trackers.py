@@ -153,14 +153,6 @@ def test_any_filter(kind, name, filter_, tmp_path):
     assert all(np.array_equal(a, t.mean) for a, t in zip(ends, again.tracks, strict=True))
 
 
-@pytest.mark.parametrize("solver", ["greedy", "aco", "genetic", "tabu", "lagrangian", "milp"])
-def test_any_solver(solver):
-    one = scene(4)
-    tracker = MultiSensorTracker.for_scene(one, solver=solver)
-    stepped(tracker, one)
-    assert sum(t.confirmed for t in tracker.tracks) == 3
-
-
 def test_planar_states():
     view = [[-2e4, 2e4], [-2e4, 2e4]]
     sensor = PositionSensor(
