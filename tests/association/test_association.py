@@ -76,15 +76,6 @@ def test_each_scan_has_random_numbers_of_its_own():
     assert len(set(drawn)) == 6
 
 
-def test_processes_do_not_change_the_answer():
-    scene = simulate("three-radar", scans=6)
-    one, two = (associate(scene, "aco", seed=1, jobs=jobs, mode="paper") for jobs in (1, 2))
-    for a, b in zip(one.scans, two.scans, strict=True):
-        assert a.scan == b.scan and np.array_equal(a.solution.tuples, b.solution.tuples)
-        assert a.solution.cost == b.solution.cost and a.solution.lower_bound == b.solution.lower_bound
-        assert np.array_equal(a.positions, b.positions)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -76,19 +76,6 @@ def test_two_settings_are_compared(whole, run, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_same_command_again_runs_nothing_and_a_larger_grid_the_rest(whole, run, scene_file):
-    folder, _ = whole
-    before = load(folder)
-    done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder)
-    assert "0 new, 48 there before" in done.stdout and load(folder).equals(before)
-    done = run(
-        "assoc.sweep", scene_file, "--solver", "greedy", "aco", *GRID[2:], "beta=1,2", "--scans", "0:3", "-o", folder
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "27 runs in" in done.stdout and "15 new, 12 there before" in done.stdout
-
-
-@pytest.mark.slow
 def test_a_study_from_a_file(run, scene_file, tmp_path):
     (tmp_path / "study.toml").write_text(
         f'files = "{scene_file}"\noutput = "study"\nrepeats = 2\nscans = "0:2"\n'

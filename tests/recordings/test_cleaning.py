@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from assoc import track
-from assoc.errors import AssocWarning
 from assoc.recordings import read_plots
 from tests.recordings.common import circling
 
@@ -128,18 +127,6 @@ def test_columns_that_are_not_read_are_named(rows, tmp_path):
     found = read(tmp_path, table([(*row, 1, 2) for row in rows], "time,range,bearing,squawk,flightlvel,speed,site"))
     assert found.notes == {"columns not read (flightlvel (flight_level?), speed, site)": 3}
     assert "columns not read" in found.summary()
-
-
-def test_codes_that_are_not_octal_are_warned_of(rows, tmp_path):
-    with pytest.warns(AssocWarning, match="column 'Mode3A': 2 codes have an 8 or 9, .* mode3_dec"):
-        found = read(
-            tmp_path,
-            table(
-                [(*row[:3], code) for row, code in zip(rows, (4021, 1893, 980), strict=False)],
-                "time,range,bearing,Mode3A",
-            ),
-        )
-    assert found.identities.tolist() == [0o4021, 0, 0]
 
 
 def test_the_kind_of_a_file_is_found_by_its_content(rows, tmp_path):
