@@ -2,7 +2,6 @@
 
 import html
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from assoc.simulation import simulate
 from tests.plotting.pages import EVIL, figures_of, parsed, step_of, text_of
-from tests.running import here
 
 
 @pytest.fixture(scope="module")
@@ -121,14 +119,3 @@ def test_a_hundred_scans_stay_below_nine_megabytes(tmp_path):
     path = tmp_path / "out.html"
     write_association_report(path, assoc.associate(scene, "greedy"), scene)
     assert path.stat().st_size < 9_000_000
-
-
-def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association, monkeypatch):
-    monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(ImportError, match=r"python -m pip install 'assoc\[report\]'"):
-        write_association_report(tmp_path / "out.html", association, scene)
-    scene.save(tmp_path / "scene.npz")
-    done = here("assoc.solve", "scene.npz", "--report", "out.html", "--csv", "out.csv", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
-    assert "pip install 'assoc[report]'" in done.stderr
-    assert not (tmp_path / "out.html").exists() and not (tmp_path / "out.csv").exists()

@@ -144,13 +144,6 @@ def test_an_ending_that_promises_something_else_is_refused(here, capsys, main, w
     assert {*os.listdir(here)} == before
 
 
-def test_tracks_as_parquet(here):
-    pytest.importorskip("pyarrow")
-    assert track.main(["s.npz", "-o", "t.csv", "-q"]) == 0
-    assert track.main(["s.npz", "-o", "t.parquet", "-q"]) == 0
-    pd.testing.assert_frame_equal(pd.read_parquet("t.parquet"), pd.read_csv("t.csv"))
-
-
 EXTRAS = [
     (solve.main, ["s.npz", "--report", "r.html"], "plotly", "report"),
     (track.main, ["s.npz", "-o", "t.csv", "--report", "r.html"], "plotly", "report"),

@@ -49,24 +49,3 @@ def test_rotating_radar(run, tmp_path):
     done = run("assoc.simulate", "rotating-radar", "-o", tmp_path / "plots.npz", *words)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "expected a name that ends in .csv" in done.stderr
-
-
-@sample(
-    "words,message",
-    [
-        ([], "SCENARIO"),
-        (["five-radar", "-o", "x.npz"], "unknown scenario 'five-radar'; did you mean three-radar?"),
-        (["crowd"], "-o/--output"),
-        (["crowd", "-o", "x.npz", "--noise", "-1"], "noise: expected a number above 0, got -1.0"),
-        (["crowd", "-o", "x.npz", "--sensor", "sonar"], "expected one of position, radar"),
-        (["crowd", "-o", "x.npz", "--colour", "red"], "unrecognized arguments: --colour red"),
-        (["crowd", "-o", "no/such/x.npz"], "does not exist"),
-    ],
-    every=3,
-)
-def test_bad_input(run, tmp_path, words, message):
-    done = run("assoc.simulate", *words, cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1 and message in done.stderr
-    assert list(tmp_path.iterdir()) == []

@@ -201,18 +201,3 @@ def test_bad_files_are_one_line(scene_file, tmp_path, monkeypatch, capsys, text,
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1 and "s.toml: " in captured.err and message in captured.err
     assert not (tmp_path / "study").exists()
-
-
-def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeypatch, capsys):
-    from assoc.sweep import main
-
-    monkeypatch.chdir(tmp_path)
-    for package, words, extra in (
-        ("distributed", ["--scheduler", "tcp://127.0.0.1:9"], "assoc[dask]"),
-        ("optuna", ["--tune", "2"], "assoc[tune]"),
-        ("matplotlib", ["--heatmap", "h.png", "--scans", "0"], "assoc[plot]"),
-    ):
-        with monkeypatch.context() as patch:
-            patch.setitem(sys.modules, package, None)
-            assert main([str(scene_file), "--solver", "aco", "-o", "study", *words]) == 2
-        assert f"pip install '{extra}'" in capsys.readouterr().err
