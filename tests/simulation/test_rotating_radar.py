@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError
-from assoc.recordings import GARBLED_CODES, clustering_time_window, estimate_rotation, radar_of
+from assoc.recordings import GARBLED_CODES
 from assoc.simulation import simulate_recording
 
 NMI = 1852.0
@@ -64,21 +64,6 @@ def test_plots_lie_where_the_aircraft_are(several):
             assert abs(np.linalg.norm(place) - recording.ranges[k]) <= 0.5 * NMI + 1e-6
             turn = math.atan2(place[1], place[0]) - recording.azimuths[k]
             assert abs(math.remainder(turn, 2 * math.pi)) <= math.radians(0.5 * 1440 / 4095) + 1e-9
-
-
-def test_windows_and_the_radar_are_recovered(several):
-    for one in several:
-        recording = one.recording
-        assert estimate_rotation(recording) == pytest.approx(9.5, rel=1e-4)
-        windows = clustering_time_window(recording)
-        assert 118 <= len(windows) <= 120
-        repeated = 0
-        for w in windows:
-            real = recording.sources[w.rows][recording.sources[w.rows] >= 0]
-            repeated += len(real) - len(np.unique(real))
-        # once in a while an aircraft crosses the cut against the antenna
-        assert repeated <= 3
-        assert radar_of(recording).noise == pytest.approx([NMI / 12**0.5, math.radians(1440 / 4095) / 12**0.5])
 
 
 @pytest.mark.parametrize(
