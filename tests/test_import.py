@@ -20,8 +20,13 @@ def test_import_loads_nothing_slow():
 
 @pytest.mark.parametrize("module", ["assoc.simulate", "assoc.solve", "assoc.solvers"])
 def test_programs_and_registry_load_no_compiler(module):
-    code = f"import {module}, sys\nimport assoc.solvers as s\n"
-    code += "for name in s.names(): s.parameters(name)\nprint(*sys.modules)"
+    code = f"import {module}, contextlib, io, sys\nimport assoc.solvers as s\n"
+    code += "for name in s.names(): s.parameters(name)\n"
+    if module == "assoc.solve":
+        # with the options of a solver, which come from its parameters
+        code += "with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.suppress(SystemExit):\n"
+        code += "    assoc.solve.main(['--solver', 'aco', '--help'])\nassert '--alpha' in said.getvalue()\n"
+    code += "print(*sys.modules)"
     loaded = {name.split(".")[0] for name in printed("-W", "error", "-c", code).split()}
     assert not loaded & {"numba", "scipy", "pandas", "ortools", "rich"}
 

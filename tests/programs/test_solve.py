@@ -4,8 +4,6 @@ import csv
 import json
 import os
 import re
-import subprocess
-import sys
 
 import pytest
 
@@ -104,22 +102,6 @@ def test_numbers_of_a_file_are_refused_by_its_name(scene_file, tmp_path, capsys,
     assert solve.main([str(scene_file), "--config", str(tmp_path / "c.toml")]) == 2
     error = capsys.readouterr().err
     assert f"{tmp_path / 'c.toml'}: {message}" in error and error.count("\n") == 1
-
-
-def test_help_is_silent_and_loads_nothing_slow(run):
-    done = run("assoc.solve", "--help")
-    assert (done.returncode, done.stderr) == (0, "")
-    for name in assoc.solvers.names():
-        assert name in done.stdout
-    done = run("assoc.solve", "--solver", "aco", "--help")
-    assert (done.returncode, done.stderr) == (0, "")
-    for flag in ("--alpha", "--beta", "--rho", "--ants", "--mode", "--time-limit", "--config"):
-        assert flag in done.stdout
-    traced = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "assoc.solve", "--help"], capture_output=True, text=True, check=True
-    )
-    loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in traced.stderr.splitlines()}
-    assert "argparse" in loaded and not loaded & {"numba", "scipy", "pandas", "ortools", "rich"}
 
 
 @pytest.mark.slow

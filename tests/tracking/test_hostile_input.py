@@ -24,6 +24,8 @@ HOSTILE = {
     "measurements of sensor 1 must be finite": with_row(1, [np.nan, 0.3, 0.1]),
     "measurements of sensor 2 must be an array of shape .n, 3., got None": [*SCENE.scan(1).measurements[:2], None],
     "measurements of sensor 0 .* rows of several lengths": [[[1.0, 2.0], [3.0]], *SCENE.scan(1).measurements[1:]],
+    "measurements of 2 sensors, expected 3": SCENE.scan(1).measurements[:2],
+    "measurements of sensor 1 must have shape .2, 3.": [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros((0, 3))],
     "measurements must be one array for each of 3 sensors, got None": None,
     "measurements must be one array for each of 3 sensors, got int": 5,
 }
@@ -37,8 +39,13 @@ def test_a_scan_that_is_refused_changes_nothing(name, filter):
         for message, z in HOSTILE.items():
             with pytest.raises(InvalidInputError, match=message):
                 own.step(SCENE.times[k], z)
+        for time in ("1", np.nan):
+            with pytest.raises(InvalidInputError, match="time must be a finite number"):
+                own.step(time, SCENE.scan(k).measurements)
         # a step in time that no filter survives
         if k:
+            with pytest.raises(InvalidInputError, match="time must not run backwards: got -1 s after"):
+                own.step(-1.0, SCENE.scan(k).measurements)
             with pytest.raises(InvalidInputError, match="numbers out of range"):
                 own.step(1e150, SCENE.scan(k).measurements)
         steps = [one.step(SCENE.times[k], SCENE.scan(k).measurements) for one in (own, other)]

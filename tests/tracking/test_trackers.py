@@ -168,28 +168,6 @@ def test_planar_states():
         np.testing.assert_allclose(track.velocity, [100, 0, 0], atol=2)
 
 
-NONE = np.zeros((0, 3))
-
-
-@pytest.mark.parametrize(
-    ("time", "measurements", "message"),
-    [
-        (4.0, [NONE] * 3, "time must not run backwards: got 4 s after 5 s"),
-        ("1", [NONE] * 3, "time must be a finite number"),
-        (np.nan, [NONE] * 3, "time must be a finite number"),
-        (6.0, [NONE] * 2, "measurements of 2 sensors, expected 3"),
-        (6.0, [NONE, np.zeros((2, 2)), NONE], r"measurements of sensor 1 must have shape \(2, 3\)"),
-        (6.0, [np.full((1, 3), np.nan), NONE, NONE], "measurements of sensor 0 must be finite"),
-    ],
-)
-def test_bad_steps_are_refused_and_change_nothing(time, measurements, message):
-    tracker = MultiSensorTracker.for_scene(scene())
-    tracker.step(5.0, [NONE] * 3)
-    with pytest.raises(InvalidInputError, match=message):
-        tracker.step(time, measurements)
-    assert tracker.num_steps == 1
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
