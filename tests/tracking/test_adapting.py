@@ -287,6 +287,19 @@ def test_targets_that_fly_together_are_confirmed_as_without_the_map():
         assert shown[0] == shown[1] > 6
 
 
+def test_no_doubt_where_tracks_predict_well_from_the_first():
+    """Four abreast on each of three heights are as dense as a place of clutter, but each is near its own track."""
+    times = 4.0 * np.arange(3)
+    row = np.stack([np.arange(12) % 4 * 350.0, np.zeros(12), 3e3 * (np.arange(12) // 4 + 1.0)], axis=1)
+    paths = list(row + times[:, None, None] * [0.0, 200.0, 0.0])
+    for seed in range(4):
+        scene = observe(radars(), times, [np.arange(12)] * 3, paths, np.random.default_rng(seed), region=REGION)
+        tracker = TRACKERS["multi-sensor"].for_scene(scene, adapt=True)
+        stepped(tracker, scene)
+        # one may be new; without the map 12
+        assert sum(track.reported for track in tracker.tracks) >= 11
+
+
 @pytest.mark.parametrize("bias", [0.0, 1.0])
 def test_estimates_are_used_while_they_predict_better(bias):
     """Right declarations are hardly ever left; wrong ones are."""

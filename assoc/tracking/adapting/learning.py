@@ -57,6 +57,8 @@ def use_estimates(progress: Progress) -> Progress:
     settings = in_use(progress.settings, estimates)
     # units of noise as declared: places are kept in them
     densities, crowds = clutter.used_and_found(progress.settings.sensors, progress.scan)
+    # in doubt nothing is taken from scores yet
+    densities = tuple(found * (turns >= YOUNG) for found, turns in zip(densities, clutter.clock, strict=True))
     shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
     densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
     dense = tuple(found > 0.0 for found in densities)
@@ -143,15 +145,16 @@ def learn(progress: Progress) -> Progress:
 def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> list[Array]:
     """How much better places predicted each measurement than predicted tracks did, (n_s,) for each sensor.
 
-    Differences of log likelihoods, limited; 0 outside of places, and in the first turns, before tracks could. Both
-    are intensities of Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
+    Differences of log likelihoods, limited; 0 outside of places, but for the first turns. Both are intensities of
+    Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
     """
     settings, clutter = progress.settings, progress.state.clutter
     assert clutter is not None
     votes = [np.zeros(len(z)) for z in progress.crowds]
     for s, (sensor, found) in enumerate(zip(settings.sensors, progress.crowds, strict=True)):
-        rows = np.flatnonzero(found)
-        if clutter.clock[s] < YOUNG - 1.0 or not len(rows):
+        # in the first turns tracks may well predict what no place does yet
+        rows = np.flatnonzero(found) if clutter.clock[s] >= YOUNG - 1.0 else np.arange(len(found))
+        if not len(rows):
             continue
         dense, z = np.zeros(len(rows)), scan.measurements[s][rows]
         if len(tracks):
@@ -163,7 +166,8 @@ def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> 
             size = np.sqrt(np.linalg.det(2.0 * np.pi * expected.covariance))[track]
             density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
             np.add.at(dense, near, density * np.exp(-0.5 * square) / size)
-        more = (sensor.detection_probability * there[:, s].sum() - len(rows)) / len(rows)
+        crowd = np.count_nonzero(found)
+        more = (found[rows] > 0.0) * (sensor.detection_probability * there[:, s].sum() / max(crowd, 1) - 1.0)
         votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -ONE_SAYS, ONE_SAYS)
     return votes
 

@@ -5,7 +5,8 @@ only the others show clutter, and the density follows from the distance within w
 the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
 And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), both by what
-came before: where targets stand or circle, each is near its own track.
+came before: where targets stand or circle, each is near its own track. In the first turns nobody can be sure, and what
+may be a place is in doubt unless tracks have predicted its plots better.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ class ClutterMap(NamedTuple):
     ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """Logarithms of densities relative to that of the sensor's false alarms, >= 0: those in use, and all.
 
-        All also hold places where tracks predict better, and of which nobody is sure yet. At the scan's measurements,
-        or ``elsewhere``: at others, (m_s, d_s) for each sensor.
+        In the first turns, in use are those in doubt: where tracks have not predicted better so far. All also hold
+        places where they have. At the scan's measurements, or ``elsewhere``: at others, (m_s, d_s) for each sensor.
         """
         found = []
         for s, sensor in enumerate(sensors):
@@ -170,5 +171,9 @@ def _densities(
     size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
     ratio = (last + 1) / (size * usual)
     result[dense] = np.where(ratio > least, np.log(np.maximum(ratio, 1.0)), 0.0)
-    used[dense] = (votes[near].sum(axis=1) > NEEDED) & (before >= YOUNG)
+    if before >= YOUNG:
+        used[dense] = (votes[near] * (clocks[near] >= YOUNG - 1.0)).sum(axis=1) > NEEDED
+    else:
+        # of what is about the place, nothing: targets that fly alone are predicted well, and near by
+        used[dense] = (votes[near] * within).sum(axis=1) >= 0.0
     return np.where(used, result, 0.0), result

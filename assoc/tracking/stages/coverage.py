@@ -126,8 +126,8 @@ def false_alarms_at(progress: Progress, tracks: TrackBatch) -> Array | float:
     before = progress.state.clutter
     if before is None or clutter is None or not len(new):
         return alarms
-    used, found = densities_at(progress, tracks[new], clutter)
-    doubtful = np.where(clutter.clock < YOUNG, found, used) @ (before.clock < YOUNG) * tracks.hits[new]
+    used = densities_at(progress, tracks[new], clutter)[0]
+    doubtful = used @ (before.clock < YOUNG) * tracks.hits[new]
     usual = life.false_tracks_per_hour / float(life.false_share(alarms)) if math.isinf(alarms) else alarms
     at = np.full(len(tracks), usual)
     at[new] *= np.exp(np.minimum(np.maximum(used.max(axis=1), doubtful), _SURELY_FALSE))
