@@ -8,7 +8,8 @@ each time at which most intervals overlap is where a fit starts.
 
 Of what few stations hear all parts are listed. Of many, an optimal association gives a target every arrival time that
 fits it and that no other target has. So an emission is listed without an arrival time, or with a worse one of that
-station, only where the better one fits an emission that could stand beside it, and fits that better. To take an arrival
+station, only where the better one fits an emission that could stand beside it, and may fit that better: what it adds to
+each is seen from where the emission lies, and from where it would lie without that station. To take an arrival
 time from a target wins no more than that it fits better, so that an emission made of what cheaper ones have contends
 for nothing and is listed as it is.
 """
@@ -205,11 +206,13 @@ def _is_part(rows: Array) -> Array:
 
 
 @njit
-def _contended(rows: Array, off: Array, owner: Array, gain: Array, bases: Array, viable: Array, most: Array) -> Array:
-    """Which arrival times (N,) fit another of the `viable` among M emissions better, for each of these, bool (M, N).
+def _contended(
+    rows: Array, least: Array, off: Array, owner: Array, gain: Array, bases: Array, viable: Array, most: Array
+) -> Array:
+    """Which arrival times (N,) may fit another of the `viable` among M emissions better, for each of these, (M, N).
 
-    `off` (M, N) is the square of how far each is from what the emission expects, in standard deviations, `bases` (M,)
-    what all gains of a target must exceed. Two emissions may stand side by side if one of them is a target without
+    `least` and `off` (M, N) are bounds of what each adds to the chi-square of an emission, `bases` (M,) what all gains
+    of a target must exceed. Two emissions may stand side by side if one of them is a target without
     what both have.
     """
     result = np.zeros(off.shape, np.bool_)
@@ -220,10 +223,10 @@ def _contended(rows: Array, off: Array, owner: Array, gain: Array, bases: Array,
     for n in range(off.shape[1]):
         limit = most[owner[n]]
         for u in range(len(rows)):
-            if not viable[u] or off[u, n] > limit:
+            if not viable[u] or least[u, n] > limit:
                 continue
             for m in range(len(rows)):
-                if not viable[m] or off[u, n] >= off[m, n] or off[m, n] > limit or result[m, n]:
+                if m == u or not viable[m] or least[u, n] >= off[m, n] or least[m, n] > limit or result[m, n]:
                     continue
                 shared = 0.0
                 for s in range(rows.shape[1]):
@@ -296,16 +299,19 @@ def grow_arrivals(
     order = np.argsort(cost, kind="stable")[: np.count_nonzero(cost < 0.0)]
     rows, places, cost = rows[order], places[order], cost[order]
     away = np.linalg.norm(places[:, None, :3] - r.site, axis=2)
-    off = (picks - places[:, 3:] - (away / r.speed)[:, owner]) ** 2 * r.weight[owner]
+    late = picks - places[:, 3:] - (away / r.speed)[:, owner]
+    off = late**2 * r.weight[owner]
     bases = cost + (rows >= 0) @ arrays.gain - 0.5 * fitted[0][order]
     if count <= _FEW:
-        given_up = np.ones(off.shape, dtype=np.bool_)
+        least, given_up = off, np.ones(off.shape, dtype=np.bool_)
     else:
         viable = _viable(rows, off, arrays.gain, bases)
-        given_up = _contended(rows, off, owner, arrays.gain, bases, viable, most)
+        added = _added(r, places, away, rows, late, owner)
+        least, off = np.minimum(off, added), np.maximum(off, added)
+        given_up = _contended(rows, least, off, owner, arrays.gain, bases, viable, most)
     chosen, starts, fresh = none[0], np.zeros((0, 3)), 0
     for m in range(len(rows)):
-        choices = _choices(*_options(off[m], given_up[m], most, first), arrays.gain, bases[m], max_tuples)
+        choices = _choices(*_options(least[m], off[m], given_up[m], most, first), arrays.gain, bases[m], max_tuples)
         chosen = np.concatenate([chosen, choices])
         starts = np.concatenate([starts, np.broadcast_to(places[m, :3], (len(choices), 3))])
         fresh += len(choices)
@@ -347,6 +353,26 @@ def _found(r: Receivers, heard: Heard, base: float, number: int, max_tuples: int
     return rows[whole], places[whole]
 
 
+def _added(r: Receivers, places: Array, away: Array, rows: Array, late: Array, owner: Array) -> Array:
+    """What each arrival time (N,) adds to the chi-square of M emissions that hear no other of its station, (M, N).
+
+    An emission lies where it fits what it hears, so what it hears seems to fit better than it does: all is seen from
+    where the emission would lie without that station, to first order. ``away`` (M, S) are distances, ``late`` (M, N)
+    how much later each arrival time is than the emission expects.
+    """
+    axes = needed(r) - 1
+    slope = np.ones((*away.shape, axes + 1))
+    slope[..., :axes] = (places[:, None, :axes] - r.site[:, :axes]) / np.maximum(away * r.speed, 1e-9)[..., None]
+    heard = rows >= 0
+    curvature = np.einsum("ms,s,msi,msj->mij", heard, r.weight, slope, slope)
+    leverage = np.einsum("s,msi,mij,msj->ms", r.weight, slope, np.linalg.pinv(curvature, hermitian=True), slope)
+    # without a station that alone tells where the emission lies, it could lie anywhere
+    left = np.maximum(1.0 - leverage, 1e-6)
+    pulled = np.where(heard, np.take_along_axis(late, np.maximum(rows, 0), axis=1) * leverage / left, 0.0)
+    scale = np.where(heard, left, 1.0 / (1.0 + leverage))
+    return (late + pulled[:, owner]) ** 2 * (r.weight * scale)[:, owner]
+
+
 def _viable(rows: Array, off: Array, gain: Array, bases: Array) -> Array:
     """Which emissions, the cheapest first, can be targets beside all cheaper ones, bool (M,).
 
@@ -364,15 +390,20 @@ def _viable(rows: Array, off: Array, gain: Array, bases: Array) -> Array:
     return viable
 
 
-def _options(off: Array, given_up: Array, most: Array, first: Array) -> tuple[Array, Array]:
-    """What an emission may have of each station, (S, W), best first, and how many: up to one that no other wants."""
+def _options(least: Array, off: Array, given_up: Array, most: Array, first: Array) -> tuple[Array, Array]:
+    """What an emission may have of each station, (S, W), best first, and how many: up to one that no other wants.
+
+    Of bounds `least` and `off` of what each adds: one that surely adds more than one that no other wants is left out.
+    """
     found = []
     for s in range(len(most)):
         own = np.arange(first[s], first[s + 1])
-        own = own[off[own] <= most[s]]
+        own = own[least[own] <= most[s]]
         own = own[np.argsort(off[own], kind="stable")]
-        wanted = given_up[own]
-        found.append(np.append(own, -1) if wanted.all() else own[: int(np.argmin(wanted)) + 1])
+        free = np.flatnonzero(~given_up[own])
+        limit = off[own[free[0]]] if len(free) else math.inf
+        kept = own[(least[own] < limit) | (off[own] <= limit)]
+        found.append(kept if limit <= most[s] else np.append(kept, -1))
     counts = np.array([len(own) for own in found])
     options = np.full((len(found), counts.max()), -1, dtype=np.int64)
     for s, own in enumerate(found):
