@@ -46,24 +46,6 @@ def test_gospa_is_the_minimum_over_matchings(x, y, c, p):
     assert other.distance == near(found.distance)
 
 
-@settings(max_examples=60)
-@given(points, points, points, cutoffs, orders)
-def test_both_are_metrics(x, y, z, c, p):
-    for metric in (ospa, gospa):
-        assert metric(x, x, c, p).distance == 0.0
-        assert metric(x, z, c, p).distance <= metric(x, y, c, p).distance + metric(y, z, c, p).distance + 1e-9
-
-
-def test_empty_sets():
-    nothing = np.zeros((0, 3))
-    one = np.ones((1, 3))
-    assert ospa(nothing, nothing, 10.0).distance == 0.0
-    assert ospa(one, nothing, 10.0) == (10.0, 0.0, 10.0)
-    assert gospa(nothing, nothing, 10.0).distance == 0.0
-    assert gospa(one, nothing, 10.0)[:4] == pytest.approx((50**0.5, 0, 50, 0))
-    assert gospa([], one, 10.0)[:4] == pytest.approx((50**0.5, 0, 0, 50))
-
-
 def trajectories(rng, ids, instants, spread):
     """Random walks that come and go."""
     rows = []
