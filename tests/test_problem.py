@@ -150,37 +150,3 @@ def test_files_round_trip(tmp_path):
         for name in ("tuples", "costs", "sizes"):
             assert np.array_equal(getattr(again, name), getattr(problem, name))
             assert getattr(again, name).dtype == getattr(problem, name).dtype
-
-
-def _archive(path, **changes):
-    content = {
-        "format": np.array("assoc.problem"),
-        "version": np.array(1),
-        "tuples": np.array([[1, 1]], dtype=np.int32),
-        "costs": np.array([1.0]),
-        "sizes": np.array([1, 1], dtype=np.int32),
-        "dummy": np.array(True),
-    }
-    content.update(changes)
-    np.savez(path, **{key: value for key, value in content.items() if value is not None})
-    return path
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"format": np.array("assoc.scene")}, "format"),
-        ({"version": np.array(2)}, "version"),
-        ({"tuples": None}, "tuples"),
-        ({"costs": np.array([NAN])}, "costs: row 0 is nan"),
-        ({"tuples": np.array([[1, 5]])}, "index 5 is outside"),
-        ({"dummy": np.array([True, False])}, "dummy"),
-        ({"costs": np.array([{"a": 1}], dtype=object)}, "costs"),
-    ],
-)
-def test_bad_files_are_one_line_that_names_the_file(tmp_path, changes, message):
-    path = _archive(tmp_path / "problem.npz", **changes)
-    with pytest.raises(InvalidInputError, match=message) as caught:
-        AssignmentProblem.load(path)
-    assert str(caught.value).startswith(str(path))
-    assert "\n" not in str(caught.value)

@@ -8,22 +8,6 @@ from assoc.simulation import simulate
 from assoc.simulation.scenarios.bearing_only import BearingOnlyParameters, sensor_positions
 
 
-def same(a, b) -> bool:
-    return all(
-        np.array_equal(x, y)
-        for k, m in zip(a.measurements, b.measurements, strict=True)
-        for x, y in zip(k, m, strict=True)
-    )
-
-
-@pytest.mark.parametrize("name", ["three-radar", "crowd", "bearing-only"])
-def test_one_seed_one_scene(name):
-    first, again, other = simulate(name, 3, scans=4), simulate(name, 3, scans=4), simulate(name, 4, scans=4)
-    assert same(first, again)
-    assert not same(first, other)
-    assert first.name == f"{name} (seed 3, scans 4)" if name != "crowd" else "scans 4" in first.name
-
-
 def test_three_radar_is_the_papers_scene():
     scene = simulate("three-radar")
     assert scene.num_scans == 100
