@@ -54,24 +54,3 @@ def test_a_known_track_does_not_blink(kind):
         (track,) = [track for track in tracker.tracks if track.track_id == 1]
         seen.append(track.status)
     assert seen == ["confirmed"] * 6 + ["coasting", "lost", "confirmed"]
-
-
-@pytest.mark.parametrize("kind", TRACKERS.values())
-def test_a_detection_brings_a_track_back(kind):
-    tracker = tracker_of(kind, np.array([500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
-    for k in range(1, 4):
-        tracker.step(2.0 * k, NOTHING)
-    assert not any(track.reported for track in tracker.tracks)
-    tracker.step(8.0, [np.array([[500.0, 500.0, 250.0]])] * 2)
-    (track,) = [track for track in tracker.tracks if track.confirmed]
-    assert track.track_id == 1
-    assert track.reported
-
-
-@pytest.mark.parametrize("kind", TRACKERS.values())
-def test_what_no_sensor_can_see_is_not_missed(kind):
-    # the sensors see up to x = 2000 m
-    tracker = tracker_of(kind, np.array([2500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
-    tracker.step(2.0, NOTHING)
-    (track,) = tracker.tracks
-    assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)

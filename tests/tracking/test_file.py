@@ -6,7 +6,6 @@ import pytest
 from assoc import simulation
 from assoc._files.npz import save_npz
 from assoc.errors import InvalidInputError
-from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
 from assoc.tracking import TRACKERS
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from tests.sizes import sample
@@ -113,23 +112,6 @@ def test_ids_that_do_not_ascend_are_named(field, tmp_path):
     save_npz(tmp_path / "bad.npz", FORMAT, VERSION, {**arrays, field: ids[::-1].copy()})
     with pytest.raises(InvalidInputError, match=f"'{field}'.*expected ids that ascend"):
         TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: EnsembleKalmanFilter(ConstantVelocity(20.0, kind="continuous"), 20, 1),
-        lambda: FuzzyAdaptiveEKF.from_data(CoordinatedTurn(20.0, 0.05), tuned_data()),
-    ],
-    ids=["enkf", "fuzzy"],
-)
-def test_filters_with_states_of_their_own(make, tmp_path):
-    kind, path = TRACKERS["multi-sensor"], tmp_path / "state.npz"
-    tracker = saved(kind, path, make())
-    again = kind.for_scene(SCENE, make())
-    again.restore(path)
-    step(tracker), step(again)
-    assert [t.score for t in tracker.tracks] == [t.score for t in again.tracks]
 
 
 @pytest.mark.parametrize("settings", ["{", "[]", "[" * 5000, '{"seed": "1"}'])
