@@ -58,9 +58,11 @@ def solve(run, folder, *words):
         (["s.npz", "none.npz"], "none.npz: no such file"),
         (["s.npz", "--config", "broken.toml"], "broken.toml: is not a TOML file"),
         (["s.npz", "--config", "unknown.toml"], "unknown.toml: colour: unknown key"),
-        (["s.npz", "--config", "type.toml"], "seed: expected a whole number >= 0, got 'four'"),
+        (["s.npz", "--config", "type.toml"], "type.toml: seed: expected a whole number >= 0, got 'four'"),
         (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
         (["s.npz", "--config", "solver.toml"], "[bees] is no solver"),
+        (["s.npz", "--config", "kbest.toml"], "kbest.toml: kbest: expected a whole number >= 1, got '0'"),
+        (["s.npz", "--config", "scans.toml"], "scans.toml: scans: 3:99 is not within the scans"),
     ],
 )
 def test_bad_options(run, tmp_path, scene_fields, words, message):
@@ -69,6 +71,8 @@ def test_bad_options(run, tmp_path, scene_fields, words, message):
     (tmp_path / "broken.toml").write_text("colour =\n")
     (tmp_path / "type.toml").write_text('seed = "four"\n')
     (tmp_path / "ants.toml").write_text('solver = "aco"\n[aco]\nants = "many"\n')
+    (tmp_path / "kbest.toml").write_text("kbest = 0\n")
+    (tmp_path / "scans.toml").write_text("scans = '3:99'\n")
     (tmp_path / "solver.toml").write_text("[bees]\nants = 3\n")
     before = {entry.name for entry in tmp_path.iterdir()}
     if "--solver" not in words and not any("ants.toml" in word for word in words):

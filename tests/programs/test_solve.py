@@ -83,27 +83,6 @@ def test_parameters_from_options_and_from_a_file(run, scene_file, tmp_path):
     assert (chosen["ants"], chosen["alpha"], chosen["rho"], chosen["beta"]) == (9, 2.0, 0.3, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("kbest = 0", "kbest: expected a whole number >= 1, got '0'"),
-        ("kbest = 2\nsolver = 'aco'", "kbest: has its own algorithm"),
-        ("seed = -1", "seed: expected a whole number >= 0, got '-1'"),
-        ("jobs = 0", "jobs: expected a whole number >= 1 or 'all', got '0'"),
-        ("max_tuples = 0", "max_tuples: expected a whole number >= 1, got '0'"),
-        ("solver = 3", "solver: expected text, got 3"),
-        ("scans = '3:99'", "scans: 3:99 is not within the scans"),
-    ],
-)
-def test_numbers_of_a_file_are_refused_by_its_name(scene_file, tmp_path, capsys, text, message):
-    from assoc import solve
-
-    (tmp_path / "c.toml").write_text(text)
-    assert solve.main([str(scene_file), "--config", str(tmp_path / "c.toml")]) == 2
-    error = capsys.readouterr().err
-    assert f"{tmp_path / 'c.toml'}: {message}" in error and error.count("\n") == 1
-
-
 @pytest.mark.slow
 def test_time_limit_is_for_each_scan(run, tmp_path):
     path = tmp_path / "ghosts.npz"
