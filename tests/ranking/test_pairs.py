@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from assoc import AssignmentProblem, marginals
 from assoc.ranking.pairs.events import FAINT, pair_probabilities, reduced
 from assoc.ranking.pairs.graph import pair_graph
 from assoc.ranking.pairs.messages import bound_pairs, log_beliefs
@@ -154,15 +153,3 @@ def test_belief_propagation_is_exact_where_the_graph_is_a_tree():
     share = weight / (1.0 + np.bincount(vertex, weight))[vertex]
     expected = enumerated(first, second, log_weight)
     np.testing.assert_allclose(share, expected[graph.edge], rtol=1e-8)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_sums_over_tuples_say_the_same(seed):
-    rng = np.random.default_rng(seed)
-    first, second = np.nonzero(rng.random((9, 9)) < 0.3)
-    log_weight = rng.normal(0.0, 2.0, len(first))
-    rows = np.stack([first, second], axis=1) + 1
-    known = marginals(AssignmentProblem(rows, -log_weight, [9, 9]))
-    of_pair = dict(zip(map(tuple, known.tuples.tolist()), known.probability.tolist(), strict=True))
-    found = pair_probabilities(first, second, log_weight, (9, 9), WIDE)
-    np.testing.assert_allclose(found.probability, [of_pair[tuple(row)] for row in rows.tolist()], atol=1e-9)
