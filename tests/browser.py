@@ -90,9 +90,3 @@ def screenshot(browser: Any, path: Path) -> bytes:
     content = base64.b64decode(shot["data"])
     path.write_bytes(content)
     return content
-
-
-def press(browser: Any, element: Any) -> None:
-    """Click an element in the middle of the window, clear of headings that stay at the edge."""
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-    element.click()
