@@ -10,7 +10,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from typing import IO, TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.plot_lines import Lines
+    from assoc._types import Array
     from assoc.plotting.live import LivePage
     from assoc.scene.scene import Scene
     from assoc.tracking import LiveTracker, Picture
@@ -44,7 +45,7 @@ def _live(words: list[str]) -> None:
     given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
     from assoc._cli.track.plot_lines import Lines, header_of
 
-    scene, form = _scene(given, settings)
+    scene, form, identities = _scene(given, settings)
     going_on = given["state"] is not None and os.path.exists(given["state"])
     whole = _check_output(given["output"], header_of(scene.origin), going_on)
     with announcement.silenced() if given["quiet"] else nullcontext():
@@ -82,12 +83,12 @@ def _live(words: list[str]) -> None:
         _say(given, tracker.summary())
 
     with _INTERRUPTION.reported(end):
-        _take_plots(lines, scene, tracker, given, show, form)
+        _take_plots(lines, scene, tracker, given, show, form, identities)
     end()
 
 
-def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
-    """The scene of the sensors, and how lines are read; radars.toml says more of radars than a scene does."""
+def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm, Sequence[tuple[Array, ...]]]:
+    """The scene of the sensors, how lines are read, and the identities of its own plots."""
     from assoc._cli.biases import print_biases
     from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.radars_file import read_radars
@@ -99,7 +100,7 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
         if given["registration"] is not None:
             raise InvalidInputError("--registration: first takes the plots of radars.toml; register a scene before")
         scene = Scene.load(given["file"])
-        return scene, LineForm(scene)
+        return scene, LineForm(scene), ()
     if given["turns"] is not None:
         raise InvalidInputError(f"--turns: {given['file']} says how the antennas turn")
     radars = read_radars(given["file"])
@@ -120,7 +121,8 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm]:
     numbers = radars.numbers
     others = len(scene.sensors) - len(numbers)
     places = [radars.places[number] for number in numbers] + [(0.0, 0.0, 0.0)] * others
-    return scene, LineForm(scene, places, [biases[number] for number in numbers] + [Bias()] * others)
+    identities = () if given["identity"] == "ignore" else radars.identities
+    return scene, LineForm(scene, places, [biases[number] for number in numbers] + [Bias()] * others), identities
 
 
 class _StateFile:
@@ -205,12 +207,13 @@ def _take_plots(
     given: Given,
     show: Callable[[list[Picture]], None],
     form: LineForm,
+    identities: Sequence[tuple[Array, ...]],
 ) -> None:
     """Pass the plots of the lines (of the scene if there are none) to the tracker, and show its pictures."""
     from assoc._cli.track.plot_lines import IdentityError, OwnPosition, parse_line, replayed
 
     if lines is None:
-        for plot in replayed(scene, given["replay"]):
+        for plot in replayed(scene, given["replay"], identities):
             show(tracker.take(*plot))
         return
     for line in lines:

@@ -8,7 +8,7 @@ import pytest
 
 from assoc import live
 from assoc._cli.track.line_form import LineForm
-from assoc._cli.track.plot_lines import parse_line
+from assoc._cli.track.plot_lines import parse_line, replayed
 from assoc._cli.track.radars_file import read_radars
 from assoc.errors import InvalidInputError
 from assoc.recordings.on_earth import Bias
@@ -64,6 +64,16 @@ def test_lines_in_compass_degrees_and_nautical_miles(tmp_path):
     naive = np.pi / 2 - np.radians(float(row.split(",")[0]))
     assert 5e-3 < abs(np.angle(np.exp(1j * (naive - far.values[1])))) < 3e-2
     assert {f"{plot.identity[0]:04d}" for plot in plots} == {"0000", "4521", "2000", "7001"}
+
+
+def test_replayed_plots_of_radars_have_their_codes(tmp_path):
+    found = read_radars(described(tmp_path))
+    plots = list(replayed(found.scene, 0.0, found.identities))
+    header, *rows = lines_of(tmp_path)
+    form = form_of(found)
+    parse_line(header, found.scene, form)
+    told = sorted(parse_line(row, found.scene, form).identity for row in rows)
+    assert sorted(plot.identity for plot in plots) == told and len({*told}) == 4
 
 
 def test_json_by_the_names_of_recordings():

@@ -22,6 +22,7 @@ from assoc.recordings.several import NO_HEIGHT, heights_above
 from assoc.tracking.records.identity_evidence import ship
 
 if TYPE_CHECKING:
+    from assoc._types import Array
     from assoc.scene.geodesy import Origin
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
@@ -298,14 +299,18 @@ class Lines:
                 yield line
 
 
-def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
-    """The plots of a scene by their times, ``speed`` times as quickly as they were made; 0: without waiting."""
+def replayed(scene: Scene, speed: float, identities: Sequence[tuple[Array, ...]] = ()) -> Iterator[Plot]:
+    """The plots of a scene by their times, ``speed`` times as quickly as they were made; 0: without waiting.
+
+    ``identities`` are codes, 12 bits as a number, and addresses (n, 2) for each scan and sensor, where they are known.
+    """
     plots = []
     for k in range(scene.num_scans):
         scan = scene.scan(k)
         for s, (z, times) in enumerate(zip(scan.measurements, scan.own_times(), strict=True)):
-            rows = zip(times.tolist(), z.tolist(), strict=True)
-            plots += [Plot(str(s + 1), when, values) for when, values in rows]
+            known = identities[k][s].astype(int).tolist() if identities else [(0, 0)] * len(z)
+            rows = zip(times.tolist(), z.tolist(), known, strict=True)
+            plots += [Plot(str(s + 1), when, values, (int(f"{c:o}"), a)) for when, values, (c, a) in rows]
     plots.sort(key=lambda plot: plot.time)
     begin, first = time.monotonic(), plots[0].time if plots else 0.0
     for plot in plots:
