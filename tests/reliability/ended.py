@@ -1,12 +1,15 @@
-"""Programs that are ended by signals at any moment.
+"""Programs that are ended at any moment: signals, and `kill -9` of live tracking, which then goes on.
 
-    python -m tests.reliability.ended --signals 300 --seed 1 [--publish NAME]
+    python -m tests.reliability.ended --signals 300 --restarts 100 --seed 1 [--publish NAME]
 
 Programs run in children forked from a process that has imported and loaded all, so that a try takes some tenths of a
 second. A signal must end a program with its exit code and one line, or find it done, and leave no half-written file.
+Live tracking gets its lines anew from some seconds before its last row, as a source that repeats; in the end it must
+have written each row of a run that nothing ended.
 """
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -18,6 +21,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from assoc.simulation import simulate
 from tests.listening import listens
@@ -110,10 +114,56 @@ def clear() -> None:
         Path(path).unlink(missing_ok=True)
 
 
+def restarts(rng: np.random.Generator, count: int, faults: Counter[str], counts: Counter[str], end: float) -> None:
+    """Kill live tracking, ten times in a session, and let it go on."""
+    from assoc import live
+    from assoc._cli.track.plot_lines import replayed
+
+    # states are saved after each plot: a try need not wait
+    live._EVERY = 0.0
+    session = 0
+    while counts["restarts"] < count and time.monotonic() < end:
+        scene = simulate("rotating-radars", 100 + session, aircraft=3, duration=60.0, false_alarms=1.0)
+        scene.save("live-scene.npz")
+        clear()
+        words = ["live-scene.npz", "--turns", "4,5,5.5", "-q", "-o"]
+        lines = [",".join([p.sensor, repr(p.time), *map(repr, p.values)]) for p in replayed(scene, 0.0)]
+        times = np.array([float(line.split(",")[1]) for line in lines])
+        whole = forked("live", [*words, "whole.csv"], "\n".join(lines).encode())[1]()
+        assert whole[0] == 0, whole
+        begin = 0
+        for _ in range(10):
+            child, wait = forked("live", [*words, "live.csv", "--state", "live.npz"], "\n".join(lines[begin:]).encode())
+            time.sleep(float(rng.uniform(0.0, 1.0)))
+            os.kill(child, signal.SIGKILL)
+            code, said = wait()
+            counts["restarts"] += 1
+            if code not in (0, -9):
+                faults[f"live: exit code {code}"] += 1
+                print(f"session {session}: exit code {code}: {said[-300:]}", flush=True)
+            text = Path("live.csv").read_text() if Path("live.csv").exists() else ""
+            rows = text[: text.rfind("\n") + 1].splitlines()[1:]
+            last = max((float(row.split(",")[1]) for row in rows if row.count(",") > 3), default=0.0)
+            begin = int(np.searchsorted(times, last - 8.0))
+        code, said = forked("live", [*words, "live.csv", "--state", "live.npz"], "\n".join(lines[begin:]).encode())[1]()
+        found, expected = (
+            pd.read_csv(io.StringIO(Path(name).read_text())).drop_duplicates(["track_id", "time"])
+            for name in ("live.csv", "whole.csv")
+        )
+        if code or found.isna().any(axis=None) or abs(len(found) - len(expected)) > 0.02 * len(expected):
+            faults["live: other rows than without kills"] += 1
+            print(
+                f"session {session}: {code}, {len(found)} rows, {len(expected)} without kills: {said[-300:]}",
+                flush=True,
+            )
+        session += 1
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the program; exit code 1 if there were faults."""
-    parser = argparse.ArgumentParser(description="Programs that are ended by signals.")
+    parser = argparse.ArgumentParser(description="Programs that are ended by signals and by kill -9.")
     parser.add_argument("--signals", type=int, default=300)
+    parser.add_argument("--restarts", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     add_ends(parser)
     chosen = parser.parse_args(arguments)
@@ -124,6 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             last = time.monotonic() + 60.0 * chosen.minutes
             signals(rng, chosen.signals, faults, counts, last)
+            restarts(rng, chosen.restarts, faults, counts, last)
         finally:
             os.chdir(before)
     return report("ended", chosen.publish, counts, faults)
