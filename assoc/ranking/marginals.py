@@ -19,6 +19,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
+from assoc.ranking.log_sums import is_short, swept_in_logarithms
 from assoc.ranking.sampler import estimates
 from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
 from assoc.ranking.sweep import Graph
@@ -102,9 +103,10 @@ def marginals(problem: AssignmentProblem | ArrayLike, *, time_limit: float | Non
     -----
     With all solutions x and their costs c(x), P(t) = sum_{x contains t} exp(-c(x)) / sum_x exp(-c(x)). Clusters of
     tuples are independent. Those that an elimination over measurements sums with a table of at most 2^22 entries are
-    summed (`assoc.ranking.sweep`); all others are sampled by several Markov chains (`assoc.ranking.sampler`), whose
-    differences give the standard error. Where chains all stay in one part of a large set of solutions, such an error
-    is too small: no sample can show what it never met.
+    summed (`assoc.ranking.sweep`), in logarithms where costs are so large that all weights underflow and the tables
+    are small (`assoc.ranking.log_sums`); all others are sampled by several Markov chains (`assoc.ranking.sampler`),
+    whose differences give the standard error. Where chains all stay in one part of a large set of solutions, such an
+    error is too small: no sample can show what it never met.
     """
     return weighed(taken_problem(problem), checked_time_limit(time_limit))
 
@@ -159,7 +161,13 @@ def _of_columns(
     probability = np.ones(num + rows)
     summed = sum_clusters(plan, weights, free, run.deadline(_FOR_SUMS), probability[:num], probability[num:])
     label = np.append(_label(graph, plan), plan.label)
-    rounding = _rounding(problem, columns, label)
+    lost = np.unique(label[(label >= 0) & (label < summed) & ~np.isfinite(probability)])
+    for c in lost.tolist():
+        steps = plan.steps[plan.ends[c - 1] if c else 0 : plan.ends[c]]
+        if is_short(steps) and not run.should_stop():
+            duals = np.where(columns.slack, columns.duals, -np.inf)
+            swept_in_logarithms(steps, priced - columns.weights, duals, probability[:num], probability[num:])
+    rounding = _rounding(problem, columns, label, lost)
     done = (label >= 0) & (label < summed) & np.isfinite(probability)
     exact = done & (rounding <= _EXACT)
     probability[~done] = 0.5
@@ -203,13 +211,14 @@ def _label(graph: Graph, plan: Plan) -> Array:
     return plan.label[graph.ends[np.arange(len(first)), first]]
 
 
-def _rounding(problem: AssignmentProblem, columns: AllColumns, label: Array) -> Floats:
+def _rounding(problem: AssignmentProblem, columns: AllColumns, label: Array, lost: Array) -> Floats:
     """How far rounding may move the probabilities of each column and row at most; at most 1.
 
-    Logarithms of weights are differences of costs, which may cancel. Columns that weigh nothing do not count.
+    Logarithms of weights are differences of costs, which may cancel. Columns that weigh nothing do not count, but in
+    ``lost`` clusters all do: there what counts is far above the multipliers.
     """
     num, clusters = len(columns.weights), int(label.max(initial=-1)) + 2
-    near = columns.reduced <= _UNDERFLOW
+    near = (columns.reduced <= _UNDERFLOW) | np.isin(label[:num], lost)
     size = np.abs(problem.costs[columns.origin]) + np.abs(columns.weights)
     own = np.abs(columns.duals)
     if columns.single.size:

@@ -81,6 +81,32 @@ def test_chains_that_stay_where_they_began_do_not_agree_on_what_is_wrong():
     assert _far_off(8300, 1764) == []
 
 
+def test_sums_whose_weights_underflow_are_done_in_logarithms():
+    """Costs of millions, and a relaxation that is half as much again below every solution: an odd cycle of pairs."""
+    around = [[1, 1, 0], [0, 1, 1], [1, 0, 1]]
+    found = marginals(AssignmentProblem(around, [-8e6, -8e6 - np.log(2.0), -8e6], (1, 1, 1)))
+    known = dict(zip(map(tuple, found.tuples.tolist()), found.probability, strict=True))
+    assert [known[row] for row in [(1, 1, 0), (0, 1, 1), (1, 0, 1)]] == pytest.approx([0.25, 0.5, 0.25], abs=1e-7)
+    assert [known[row] for row in [(1, 0, 0), (0, 1, 0), (0, 0, 1)]] == pytest.approx([0.5, 0.25, 0.25], abs=1e-7)
+    # equal ones among which no chain could pass
+    problem = draw(9702, 4115).problem
+    found = marginals(problem)
+    assert np.abs(found.probability - true_of(found, problem)).max() < 1e-8
+    assert found.error.max() < 1e-5
+
+
+def test_sums_in_logarithms_are_those_of_the_usual_sweep(monkeypatch):
+    def lost(plan, weights, free, deadline, probability, alone):
+        probability[:], alone[:] = np.nan, np.nan
+        return len(plan.ends)
+
+    problems = list(enumerable(12, 77))
+    monkeypatch.setattr("assoc.ranking.marginals.sum_clusters", lost)
+    for problem in problems:
+        found = marginals(problem)
+        assert np.abs(found.probability - true_of(found, problem)).max() < 1e-8
+
+
 def test_of_what_no_chain_ever_left_nothing_is_known():
     """One cover of what must be covered: nothing shows that it is the only one."""
     only = AssignmentProblem([[1, 1, 1], [2, 2, 2], [1, 2, 1]], [0.0, 0.0, -50.0], (2, 2, 2), dummy=False)
