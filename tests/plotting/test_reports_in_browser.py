@@ -69,7 +69,7 @@ def test_it_draws_and_nothing_leaves(browser, pages, pictures, tmp_path, name, s
     browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
     requests(browser)  # what an earlier page asked for
     show(browser, pages / f"{name}.html", size)
-    assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"
+    assert in_time(lambda: browser.execute_script("return document.documentElement.dataset.ready")) == "yes"
     # nothing but the boxes of tables scrolls sideways
     assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
     drawn = browser.execute_script("return document.querySelectorAll('.js-plotly-plot .main-svg').length")

@@ -163,9 +163,9 @@ def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> 
             track, near = near_pairs(expected, z, periods_of(sensor), gate)
             off = sensor.residual(z[near], expected.mean[track])
             square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[track], off)
-            size = np.sqrt(np.linalg.det(2.0 * np.pi * expected.covariance))[track]
+            size = 0.5 * np.linalg.slogdet(2.0 * np.pi * expected.covariance)[1][track]
             density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
-            np.add.at(dense, near, density * np.exp(-0.5 * square) / size)
+            np.add.at(dense, near, density * np.exp(-0.5 * square - size))
         crowd = np.count_nonzero(found)
         more = (found[rows] > 0.0) * (sensor.detection_probability * there[:, s].sum() / max(crowd, 1) - 1.0)
         votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -ONE_SAYS, ONE_SAYS)
