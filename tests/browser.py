@@ -54,6 +54,9 @@ def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment:
     browser.get_log("browser")  # what an earlier page said
     browser.get("about:blank")
     browser.get(page.resolve().as_uri() + fragment)
+    # a busy browser may answer for the blank page, or for one whose script has not yet ended
+    drawn = "return location.href !== 'about:blank' && document.readyState === 'complete'"
+    assert in_time(lambda: browser.execute_script(drawn)), f"the browser did not open {page.name}"
 
 
 def in_time(condition: Callable[[], Any]) -> Any:

@@ -30,6 +30,7 @@ document.querySelectorAll('a, .updatemenu-button, .legendtoggle').forEach(
 buttons.forEach((one) => one.dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true})));
 return buttons.map((one) => one.dataset.title);
 """
+READY = "return document.documentElement.dataset.ready === 'yes'"
 LOCAL = ("file:", "data:", "blob:", "about:")
 
 
@@ -69,7 +70,7 @@ def test_it_draws_and_nothing_leaves(browser, pages, pictures, tmp_path, name, s
     browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
     requests(browser)  # what an earlier page asked for
     show(browser, pages / f"{name}.html", size)
-    assert in_time(lambda: browser.execute_script("return document.documentElement.dataset.ready")) == "yes"
+    assert in_time(lambda: browser.execute_script(READY))
     # nothing but the boxes of tables scrolls sideways
     assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
     drawn = browser.execute_script("return document.querySelectorAll('.js-plotly-plot .main-svg').length")
@@ -119,6 +120,7 @@ def test_a_script_that_slips_through_does_not_run(browser, pages, tmp_path):
 def test_on_paper_nothing_is_cut(browser, pictures, pages, name):
     """A4 without its margins is 703 units wide."""
     show(browser, pages / f"{name}.html")
+    assert in_time(lambda: browser.execute_script(READY))  # only then does the page hear of paper
     try:
         browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
