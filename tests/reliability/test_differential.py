@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from assoc.errors import InfeasibleError
+from assoc.errors import AssocWarning, InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
@@ -23,6 +23,7 @@ from tests.sizes import few_or_all, sample
 
 # the structures and tempers there were when the faults below were found: the same numbers then draw the same problems
 FIRST, SECOND = (list(STRUCTURES)[:14], list(TEMPERS)[:21]), (list(STRUCTURES)[:18], list(TEMPERS)[:21])
+THIRD = (list(STRUCTURES)[:24], list(TEMPERS)[:29])
 QUICK = [name for name in (*WAYS, *LISTED) if not name.startswith("milp")]
 
 
@@ -69,6 +70,15 @@ def test_exact_proves_its_answer_where_costs_cancel(temper):
         answer, optimum = assign(problem), exact_optimum(problem)
         assert answer.status == "optimal" and answer.cost == pytest.approx(float(optimum), rel=1e-6, abs=1e-6)
         assert answer.lower_bound <= optimum + 1e-9
+
+
+def test_exact_finds_the_optimum_where_rounding_is_too_coarse_to_prove_it():
+    """Costs of 2e9 cancel, and doubles of that size know steps of 5e-7: "feasible", but not 4.2 above the optimum."""
+    problem = draw(9707, 2196, *THIRD).problem
+    with pytest.warns(AssocWarning, match="too large for doubles"):
+        answer, optimum = assign(problem), exact_optimum(problem)
+    assert answer.status == "feasible" and answer.gap < 1e-4
+    assert answer.cost == pytest.approx(float(optimum), abs=1e-4)
 
 
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])

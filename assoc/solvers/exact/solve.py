@@ -44,8 +44,9 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
         return outcome
     chosen = packing.weights[outcome.columns]
     weight, size = float(chosen.sum()), float(np.abs(chosen).sum())
-    # gaps with another cause, or below the rounding error, cannot be closed so
-    if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
+    wanted = max(wanted, 1e-14 * size)  # no search sees below the rounding error
+    # gaps with another cause cannot be closed so, and those of rounding not at all
+    if not 4.0 * wanted < weight - outcome.lower_bound < 1e-8 * size:
         return outcome
     search = BranchAndBound(packing, dual_bound(packing, run=run), weight, wanted, run.deadline, run.memory_allows)
     most = max(50, _VISITS // packing.num_columns)
