@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -79,8 +80,6 @@ class EnsembleKalmanFilter(PointFilter[Ensemble]):
         """Draw ensembles from Gaussians."""
         check_dimension(state, self.motion.dim)
         B, n = state.mean.shape
-        # the members, their noise, and the next ones
-        memory.require(24.0 * B * n * self.size, f"size = {self.size}: {B} ensembles", "take fewer members")
         factors = np.linalg.cholesky(state.covariance)
         shocks = self._drawn((B, self.size, n), state.mean)
         return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))
@@ -126,6 +125,8 @@ class EnsembleKalmanFilter(PointFilter[Ensemble]):
 
     def _drawn(self, shape: tuple[int, ...], *rows: Array) -> Array:
         """Standard normal numbers for each of the rows, the same in whatever order these come."""
+        # the members, their noise, and the next ones
+        memory.require(24.0 * prod(shape), f"size = {shape[1]}: {shape[0]} ensembles", "take fewer members")
         order = np.lexsort(np.concatenate(rows, axis=1).T)
         shocks = np.empty(shape)
         shocks[order] = self.rng.standard_normal(shape)

@@ -12,6 +12,7 @@ import pytest
 from assoc._system import memory
 from assoc.costs.build import build_problem
 from assoc.errors import LimitExceededError
+from assoc.filters.state import Gaussian
 from assoc.metrics.ospa import ospa
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
@@ -22,6 +23,7 @@ from assoc.ranking.kbest import kbest
 from assoc.simulation import simulate, simulate_recording
 from assoc.simulation.dubins.paths import Pose, shortest
 from assoc.solvers.assign import assign
+from assoc.tracking.filter_choice import make_filter
 from tests.oracles import gated_problem
 from tests.reliability.big import axial, ghosts
 from tests.reliability.memory import peak_of
@@ -117,6 +119,20 @@ def test_processes_are_counted(little: Callable[[float], None]) -> None:
     little(1e9)
     with pytest.raises(LimitExceededError, match="jobs: 300 processes would take about 30 GB"):
         list(process_map(abs, range(300), 10**6))
+
+
+def test_ensembles_are_refused_before_they_are_drawn(little: Callable[[float], None]) -> None:
+    """A step of thousands of tuples by ensembles, not only their start: it ended in a MemoryError of numpy."""
+    sensor = simulate("three-radar", scans=1).sensors[0]
+    filter = make_filter("enkf", [sensor])
+    few = filter.start(Gaussian(np.tile([3e4, 3e4, 5e3, 1.0, 1.0, 1.0], (50, 1)), np.tile(1e4 * np.eye(6), (50, 1, 1))))
+    measured = sensor.measure(few.mean[:, :3])
+    little(2e5)
+    for work in (lambda: filter.update(few, measured, sensor), lambda: filter.predict(few, 1.0)):
+        with pytest.raises(
+            LimitExceededError, match=r"size = 100: 50 ensembles would take about .*; take fewer members"
+        ):
+            work()
 
 
 def test_thousands_of_sensors() -> None:
