@@ -10,7 +10,7 @@
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
 # make test-newest      a part of the tests with a newer Python (3.13 or 3.12) where there is one; TESTS=tests for all
 # make test-uncompiled  a part of the tests with numba switched off
-# make test-checked     the tests of one room, another each time: kernels check indices, what is freed is overwritten
+# make test-checked     a sixteenth of the tests, another each time: kernels check indices, what is freed is overwritten
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
 # make check-dist       the same, and checks what they hold, that they work in an empty environment, and compile nothing;
 #                       of another Python: make check-dist VENV=.venv-3.12 PYTHON=python3.12
@@ -32,9 +32,11 @@ TESTS ?= tests/sensors tests/test_problem.py tests/packing/test_matching.py test
 UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tests/simulation/test_observation.py \
 	tests/solvers/test_reduction.py tests/packing/test_matching.py tests/packing/test_dimensionwise.py \
 	"tests/solvers/test_against_brute_force.py::test_small_problems[1.0-exact]" tests/tracking/test_multi_sensor.py
-# rooms whose tests call kernels, of which one is run with checked indices: by the number of commits, or CHECKED=tests/ROOM
-CHECKED ?= $(shell set -- packing solvers ranking costs filters tracking registration sensors association; \
-	shift $$(( $$(git rev-list --count HEAD 2>/dev/null || date +%-j) % $$# )); echo tests/$$1)
+# files of tests that call kernels, of which every sixteenth is run with checked indices: others on another day and
+# after another commit, or CHECKED="tests/FILE ..."
+KERNELS := packing solvers ranking costs filters tracking registration sensors association
+CHECKED ?= $(shell ls $(KERNELS:%=tests/%/test_*.py) | awk -v turn=$$(( $$(git rev-list --count HEAD 2>/dev/null || echo 0) + \
+	$$(date +%-j) )) 'NR % 16 == turn % 16')
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
