@@ -42,6 +42,15 @@ def test_what_grows_is_seen():
     assert held("Python's objects", objects=lambda place: 100 * place) is False
 
 
+def test_a_leak_is_seen():
+    watch, kept = Watch(1), []
+    for number in range(1, 21):
+        kept.append(np.ones(2**18))
+        watch.add(number)
+    memory, *_ = watch.claims("x")
+    assert memory.holds is False and memory.ours > 20.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(endurance.LONG))
 def test_a_short_run_of_each_tracker(kind):
