@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import Parameters
+from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import process_map
 from assoc.errors import AssocWarning, InfeasibleError
 from assoc.packing.packing import Packing
@@ -46,8 +47,7 @@ Way = Callable[[AssignmentProblem], list[Solution]]
 _RANKS = 4
 _END = 200
 """Rankings of problems with fewer solutions are asked for to the end."""
-_SLOW = 5.0  # seconds; problems of this size take milliseconds, but first calls compile
-_FIRST_CALLS = 20
+_SLOW = 5.0  # seconds; problems of this size take milliseconds
 _PROGRESS = 60.0  # seconds between two lines that say how far one is
 
 
@@ -318,7 +318,7 @@ def _judged(case: Case, names: list[str], ranks: list[Fraction] | None) -> list[
 
 @dataclass
 class Judge:
-    """Judges cases by their numbers; one for each process, so that it can count them.
+    """Judges cases by their numbers.
 
     Answers the structure and temper of the case, the faults, and what was compared: answers by their ways.
     """
@@ -326,19 +326,17 @@ class Judge:
     seed: int
     names: list[str]
     each: int = 0
-    done: int = 0
 
     def __call__(self, number: int) -> tuple[str, str, list[str], Counter[str]]:
         """Draw a case and judge it."""
         case = draw(self.seed, number)
-        before = time.process_time()
+        before = time.process_time() - compile_seconds()
         each = self.each or len(self.names)
         names = [self.names[(number * each + turn) % len(self.names)] for turn in range(each)]
         ranks = true_ranks(case, names)
         lines = _judged(case, names, ranks)
-        seconds = time.process_time() - before
-        self.done += 1
-        if seconds > _SLOW and self.done > _FIRST_CALLS:
+        seconds = time.process_time() - compile_seconds() - before
+        if seconds > _SLOW:
             lines.append(f"all ways together take {seconds:.1f} s")
         compared = Counter(dict.fromkeys(names, 1), answers=each)
         if ranks is not None and "ranking" in names:
