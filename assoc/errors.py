@@ -38,6 +38,7 @@ def warn(message: str) -> None:
     """Issue an `AssocWarning` at the line of the user's code that called the package."""
     level = 2  # stack level of `frame`, seen from `warnings.warn`
     frame = sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "assoc":
+    # decorators put contextlib between the package and its caller
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in ("assoc", "contextlib"):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, AssocWarning, stacklevel=level)

@@ -7,6 +7,8 @@ from scipy.optimize import linear_sum_assignment
 import assoc
 from assoc.errors import AssocWarning, InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import kbest
+from assoc.ranking.marginals import marginals
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from tests.oracles import gated_problem
@@ -88,7 +90,10 @@ def test_assign_says_that_it_takes_a_matrix_as_scipy_does(shape):
         AssocWarning, match=rf"array of shape \({shape[0]}, {shape[1]}\) is taken as by scipy's"
     ) as caught:
         solution = assign(costs)
-    assert "\n" not in str(caught[0].message) and caught[0].filename == __file__
+        kbest(costs, 2)
+        marginals(costs)
+    assert all("\n" not in str(one.message) for one in caught) and len(caught) == 3
+    assert {one.filename for one in caught} == {__file__}
     assert np.array_equal(solution.tuples.T - 1, linear_sum_assignment(costs))
     assert np.array_equal(assign(AssignmentProblem.from_dense(costs, dummy=False)).tuples, solution.tuples)
     with pytest.warns(AssocWarning), pytest.raises(InfeasibleError):
