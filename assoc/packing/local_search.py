@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.sorting import ascending
 from assoc._types import Floats
 from assoc.packing.component import Component, Owner
 from assoc.packing.cover import Cover
-from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.neighbourhoods.insertion import insert_and_eject, search_arrays
 from assoc.packing.neighbourhoods.random_cover import Trail, walk

@@ -11,11 +11,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.sorting import ascending
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.component import Component
 from assoc.packing.cover import Cover
-from assoc.packing.kernels.sorting import ascending
 from assoc.packing.run import Outcome, Run, infeasible
 
 # share of a component's gap by which its bound must rise for a new point of the trace

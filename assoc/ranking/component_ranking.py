@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
+from assoc._system.sorting import order_of
 from assoc._types import Floats
 from assoc.packing.branching.counts import USUAL, Leaf, Splitting, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.node import (
@@ -41,8 +43,6 @@ from assoc.packing.branching.pairs import (
     part_certain,
 )
 from assoc.packing.branching.root import plain_root, root_with_cuts
-from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import memory_allows, never
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
+from assoc._system.sorting import order_of, sort_part
 from assoc._types import Floats, Ints
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
-from assoc.packing.kernels.sorting import order_of
 
 NOT_COMPLETE = -1
 _ALONE = -1
@@ -114,7 +114,8 @@ def _keep(store: Store, k: int, weight: float, columns: Ints, count: int, check:
     mark = np.uint64(0)
     for t in range(count):
         mark ^= _mark(columns[t])
-    ordered = np.sort(columns[:count])
+    ordered = columns[:count].copy()
+    sort_part(ordered, 0, count)
     if check:
         for i in range(store.num[0]):
             at = store.slot[i]

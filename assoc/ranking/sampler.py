@@ -205,7 +205,9 @@ def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> int:
     cols, owner, num_sensors = problem.cols, chain.owner, problem.cols.shape[1]
     block, freed, old = np.empty(_TAKEN, np.int64), np.empty(_TAKEN * num_sensors, np.int64), np.empty(_TAKEN, np.int64)
     # a measurement alone can always be covered anew
-    most = np.diff(problem.row_ptr).max()
+    most = 0
+    for r in range(owner.size):
+        most = max(most, problem.row_ptr[r + 1] - problem.row_ptr[r])
     room = max(_ROOM, most + 1)
     choice, value, fitting = np.empty((room, _TAKEN), np.int64), np.empty(room), np.empty((_TAKEN, most), np.int64)
     looks = 0

@@ -15,12 +15,12 @@ import numpy as np
 
 from assoc._system.compiled import wait_for_kernels
 from assoc._system.interpreted import compiled_only
+from assoc._system.sorting import ascending
 from assoc.errors import InfeasibleError
 from assoc.packing import prepare as packing_form
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.compiling import compile_all_branching_ahead
 from assoc.packing.component import split_components
-from assoc.packing.kernels.sorting import ascending
 from assoc.packing.local_search import LocalSearch
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem

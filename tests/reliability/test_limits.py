@@ -11,9 +11,9 @@ import pytest
 
 import assoc
 from assoc._system.interpreted import compiled_only
+from assoc._system.sorting import ascending, order_of, sort_part
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
@@ -126,6 +126,11 @@ def test_sorting_as_numpy_does():
             for size in (values.size, 100, 33, 32, 17, 16, 1):
                 some = values[:size]
                 assert np.array_equal(order_of(some), np.argsort(some, kind="stable"))
+        for begin, end in ((0, 3), (2, 45), (5, 1000), (7, 7)):
+            part = values[:1000].copy()
+            sort_part(part, begin, min(end, part.size))
+            assert np.array_equal(part[begin:end], np.sort(values[:1000][begin:end]))
+            assert np.array_equal(part[:begin], values[:begin]) and np.array_equal(part[end:], values[end:1000])
 
 
 def test_distinct_tuples():

@@ -9,15 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._system.compiled import inner_njit, lean_inner_njit, njit
+from assoc._system.sorting import order_of, sort_part
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
 
 MOST_PAIRS = 20_000_000
 """Most pairs of tracks and measurements; more occur only with useless predictions."""
-
-# so few are sorted by insertion, which needs no array of its own
-_MOST_INSERTED = 32
 
 
 def near_pairs(expected: Expected, measurements: Array, periods: tuple[float, ...], gate: float) -> tuple[Array, Array]:
@@ -91,7 +89,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
                     count += 1
                     if count > most:
                         return tracks[:count].copy(), found[:count].copy(), looked
-        _sort(found, before, count)
+        sort_part(found, before, count)
     return tracks[:count].copy(), found[:count].copy(), looked
 
 
@@ -107,12 +105,21 @@ def _first(along: Array, least: float, begin: int, end: int) -> int:
     return begin
 
 
+@lean_inner_njit
+def _ends(z: Array, i: int) -> tuple[float, float]:
+    """The least and the largest number of a column."""
+    least, most = z[0, i], z[0, i]
+    for m in range(1, len(z)):
+        least, most = min(least, z[m, i]), max(most, z[m, i])
+    return least, most
+
+
 @inner_njit
 def _strips(reach: Array, z: Array, across: int) -> tuple[float, float, int]:
     """Where strips begin, how wide they are (a usual gate), and how many there are."""
     if across < 0:
         return 0.0, 1.0, 1
-    begin, end = z[:, across].min(), z[:, across].max()
+    begin, end = _ends(z, across)
     total = 0.0
     for t in range(len(reach)):
         total += reach[t, across]
@@ -133,9 +140,7 @@ def _strip(x: float, begin: float, width: float, strips: int) -> int:
 @inner_njit
 def _in_strips(z: Array, axis: int, across: int, begin: float, width: float, strips: int) -> tuple[Array, Array]:
     """Measurements strip by strip, each sorted along the axis, and where strips begin in this order."""
-    order = np.arange(z.shape[0])
-    if axis >= 0:
-        order = np.argsort(z[:, axis], kind="mergesort")
+    order = order_of(z[:, axis]) if axis >= 0 else np.arange(z.shape[0])
     first = np.zeros(strips + 1, np.int64)
     if across < 0:
         first[1] = order.size
@@ -161,27 +166,11 @@ def _axis(reach: Array, z: Array, turning: Array, other: int) -> int:
             total = 0.0
             for t in range(len(reach)):
                 total += reach[t, i]
-            share = (z[:, i].max() - z[:, i].min()) / max(total / len(reach), 1e-300)
+            least, most = _ends(z, i)
+            share = (most - least) / max(total / len(reach), 1e-300)
             if share > widest:
                 axis, widest = i, share
     return axis
-
-
-@inner_njit
-def _sort(found: Array, begin: int, end: int) -> None:
-    """Sort a part of an array in place."""
-    if end - begin > _MOST_INSERTED:
-        # number by number: assigning the slice would compile an error message about lengths
-        ordered = np.sort(found[begin:end])
-        for k in range(ordered.size):
-            found[begin + k] = ordered[k]
-        return
-    for k in range(begin + 1, end):
-        value, at = found[k], k
-        while at > begin and found[at - 1] > value:
-            found[at] = found[at - 1]
-            at -= 1
-        found[at] = value
 
 
 @inner_njit

@@ -343,8 +343,11 @@ def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_
             if not math.isfinite(z[b, a]):
                 return BAD_MEASUREMENT + STATUSES * b
         if code == GIVEN:
-            v[b] = z[b]
-            linear[H, :, :c] = matrix
+            # slices again number by number: assigning one would compile an error message about its shape
+            for a in range(d):
+                v[b, a] = z[b, a]
+                for p in range(c):
+                    linear[H, a, p] = matrix[a, p]
         else:
             linearise_at(code, position, columns, matrix, mean[b], h, linear[H])
             for a in range(d):
@@ -414,5 +417,6 @@ def follow(
         status = update(predicted, predicted_P, z[k], models, means[k], Ps[k], rest)
         if status != GOOD:
             return status + STATUSES * B * k
-        scores[0, k], scores[1, k] = nis, ll
+        for b in range(B):
+            scores[0, k, b], scores[1, k, b] = nis[b], ll[b]
     return GOOD

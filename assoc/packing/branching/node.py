@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
+from assoc._system.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.branching.kept_bases import KeptBases, keep_basis, kept_memory, no_kept_bases, take_kept
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.packing import PackingArrays
 from assoc.packing.simplex.basis import Basis, new_basis, refactor
 from assoc.packing.simplex.dual import Effort, most_exchanges, solve_dual

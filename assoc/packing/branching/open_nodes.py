@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
+from assoc._system.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.branching.root import Root
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Allowed
 

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.sorting import ascending, order_of
 from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, ReducedCosts
 from assoc.packing.kernels.columns import choose, first_row
-from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
 from assoc.packing.packing import Packing, PackingArrays
 

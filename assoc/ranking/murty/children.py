@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import inner_njit
-from assoc.packing.kernels.copying import copy_to
+from assoc._system.copying import copy_to
+from assoc._system.sorting import order_of
 from assoc.packing.kernels.heap import pop, push
-from assoc.packing.kernels.sorting import order_of
 from assoc.ranking.murty.arrays import ALONE, Forbidden, Graph, Nodes, PathWork, Queues
 
 

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._system.copying import copy_to
 from assoc._types import Floats
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.kernels.matching import match_sparse
 from assoc.ranking.murty.arrays import (
@@ -159,8 +159,13 @@ def _root(graph: Graph, nodes: Nodes, queues: Queues) -> bool:
     costs, columns, row_ptr, row_edges = graph.costs, graph.columns, graph.row_ptr, graph.row_edges
     row_alone, column_alone, edge_of, row_of = graph.row_alone, graph.column_alone, nodes.edge_of, nodes.row_of
     num_rows, num_columns = row_alone.size, column_alone.size
-    row_slack = np.where(row_alone, 0.0, np.inf)
-    column_slack = np.where(column_alone, 0.0, np.inf)
+    row_slack, column_slack = np.full(num_rows, np.inf), np.full(num_columns, np.inf)
+    for r in range(num_rows):
+        if row_alone[r]:
+            row_slack[r] = 0.0
+    for c in range(num_columns):
+        if column_alone[c]:
+            column_slack[c] = 0.0
     edge_costs = np.empty(row_edges.size)
     edge_columns = np.empty(row_edges.size, np.int64)
     for x in range(row_edges.size):

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.sorting import sort_part
 from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.graph import PairGraph
 from assoc.ranking.sweep import cluster
@@ -102,7 +103,9 @@ def bound_pairs(graph: PairGraph, weights: Floats, free: Floats, vertices: Ints,
     """
     incoming, low, high = work[0], work[1], work[2]
     # numbers that have lost digits are replaced by what they are at most, and at least
-    most, least = np.maximum(weights, _FAINT), np.where(weights > _FAINT, weights, 0.0)
+    most, least = np.empty(weights.size), np.empty(weights.size)
+    for e in range(weights.size):
+        most[e], least[e] = max(weights[e], _FAINT), weights[e] if weights[e] > _FAINT else 0.0
     for v in vertices:
         for x in range(graph.ptr[v], graph.ptr[v + 1]):
             incoming[x] = 1.0 / free[v] if free[v] > _FAINT else np.inf
@@ -148,7 +151,8 @@ def log_beliefs(graph: PairGraph, log_weight: Floats, wanted: NDArray[np.bool_])
         size = cluster(graph.graph, every, start, start, label, members)
         if not _any_of(graph, members[:size], wanted):
             continue
-        queue, count, left = np.sort(members[:size]), size, _ROUNDS * size
+        queue, count, left = members[:size], size, _ROUNDS * size
+        sort_part(queue, 0, size)
         at = 0
         while count > 0 and left > 0:
             v = queue[at]

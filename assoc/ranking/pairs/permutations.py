@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.sorting import order_of
 from assoc._types import Array, Floats, Ints
-from assoc.packing.kernels.sorting import order_of
 from assoc.ranking.pairs.events import reduced
 from assoc.ranking.pairs.graph import PairGraph, pair_graph
 from assoc.ranking.sweep import cluster

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import (
     COOLING,
@@ -33,7 +34,6 @@ from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.component import Component, split_components
 from assoc.packing.cover import Cover, best_of_both
 from assoc.packing.kernels.columns import first_row
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
 from assoc.packing.packing import Packing, PackingArrays, assembled
 from assoc.packing.run import Run

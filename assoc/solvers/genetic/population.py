@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._system.sorting import ascending, order_of
 from assoc._types import Floats
 from assoc.packing.component import Component
 from assoc.packing.cover import Cover
 from assoc.packing.kernels.columns import choose, first_row, fits
-from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.local_search import LocalSearch
 from assoc.packing.packing import PackingArrays
 

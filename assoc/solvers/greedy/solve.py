@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
+from assoc._system.sorting import ascending
 from assoc.packing.cover import Cover
-from assoc.packing.kernels.sorting import ascending
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run, infeasible
 

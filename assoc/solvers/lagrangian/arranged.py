@@ -131,5 +131,9 @@ def alone_prices(rows: NDArray[np.int64], num: int, slack: NDArray[np.bool_]) ->
 @inner_njit
 def drop_needless_prices(left: Floats, right: Floats) -> None:
     """Set the prices on the right to 0 where all on the left must be matched and both sides have the same size."""
-    if left.size == right.size and (left.size == 0 or left.min() == np.inf):
-        right[:] = 0.0
+    if left.size != right.size:
+        return
+    for price in left:
+        if price != np.inf:
+            return
+    right[:] = 0.0

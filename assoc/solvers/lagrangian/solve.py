@@ -27,11 +27,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.sorting import ascending
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass, reduced_costs
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.cover import Cover
-from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.packing import Packing

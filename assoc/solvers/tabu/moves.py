@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
 from assoc._types import Floats, Ints
 from assoc.packing.component import Component
 from assoc.packing.cover import Cover
 from assoc.packing.kernels.columns import first_row, fits
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.local_search import LocalSearch
 from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
 from assoc.packing.packing import PackingArrays

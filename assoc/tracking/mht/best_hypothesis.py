@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
+from assoc._system.sorting import order_of, sort_by
 from assoc._types import Floats
-from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.sorting import order_of, sort_by
 from assoc.tracking.mht.losses import Priced
 
 VISITS = 20_000

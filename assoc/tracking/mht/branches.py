@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._system.copying import copy_to
 from assoc._types import Array, Floats
-from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.growth import Offers
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
@@ -97,7 +97,11 @@ def _cut(tables: Tables, offers: Offers, grown: _Grown, column: int, scan: int, 
     ids, rows, since, first = births
     tree, score, loss, chosen = grown
     old, pairs = born.size, branch.size
-    kept = keep_best(tree, score, np.where(chosen, -1.0, loss), most, drop)
+    order = loss.copy()
+    for i in range(order.size):
+        if chosen[i]:
+            order[i] = -1.0
+    kept = keep_best(tree, score, order, most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):

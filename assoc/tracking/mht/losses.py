@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.sorting import order_of
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
-from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import PackingArrays, assembled
 
 # temperatures of the smoothed ascent, in nats: the branches of a tree differ by about ten, however high their scores,

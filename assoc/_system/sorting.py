@@ -1,6 +1,7 @@
 """Sort a million weights in hundredths of a second, for greedy choices.
 
-Kernels call `order_of`: for each ``np.argsort`` numba would compile another sort into the kernel.
+Kernels call `order_of` and `sort_part`: for each ``np.argsort`` and ``np.sort`` numba would compile another sort into
+the kernel.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, lean_inner_njit, njit
+from assoc._system.copying import copy_to
 from assoc._types import Array, Floats
-from assoc.packing.kernels.copying import copy_to
 
 # bits of a digit; for fewer numbers radix sort does not pay
 _BITS = 11
@@ -78,6 +79,22 @@ def sort_by(rows: Array, values: Array, begin: int, end: int) -> None:
 
 
 @lean_inner_njit
+def sort_part(values: Array, begin: int, end: int) -> None:
+    """Sort a part of an array in place: by insertion, first of numbers far apart (Shell's way)."""
+    gap = 1
+    while 2.25 * gap + 1.0 < end - begin:
+        gap = int(2.25 * gap) + 1
+    while gap > 0:
+        for k in range(begin + gap, end):
+            value, at = values[k], k
+            while at >= begin + gap and values[at - gap] > value:
+                values[at] = values[at - gap]
+                at -= gap
+            values[at] = value
+        gap = int(gap / 2.25)
+
+
+@lean_inner_njit
 def _insert(rows: Array, values: Array, begin: int, end: int) -> None:
     for i in range(begin + 1, end):
         moved, k = rows[i], i
@@ -128,7 +145,10 @@ def _by_digits(bits: Array) -> Any:
     other_keys = np.empty(num, np.uint64)
     for d in range(digits):
         shift = np.uint64(_BITS * d)
-        if counts[d].max() == num:
+        equal = False
+        for b in range(base):
+            equal = equal or counts[d, b + 1] == num
+        if equal:
             continue
         for b in range(base):
             counts[d, b + 1] += counts[d, b]
