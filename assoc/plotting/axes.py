@@ -70,6 +70,14 @@ def set_plan_view(ax: Any, box: Array, unit: Unit) -> None:
     ax.grid(alpha=0.25, linewidth=0.6)
 
 
+def set_log_x(ax: Any) -> None:
+    """Make the x axis logarithmic, with plain numbers: powers of ten overlap where it spans less than a decade."""
+    ticker = load_extra("matplotlib.ticker", "plot")
+    ax.set_xscale("log")
+    ax.xaxis.set_major_formatter(ticker.LogFormatter(labelOnlyBase=True))
+    ax.xaxis.set_minor_formatter(ticker.LogFormatter(minor_thresholds=(2.0, 0.4)))
+
+
 def legend(ax: Any, **options: Any) -> None:
     """Add a legend below the axes, where it hides nothing, unless it would be empty."""
     handles, labels = ax.get_legend_handles_labels()

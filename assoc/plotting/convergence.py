@@ -9,7 +9,7 @@ import numpy as np
 
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.errors import InvalidInputError
-from assoc.plotting.axes import axes_or_new, legend
+from assoc.plotting.axes import axes_or_new, legend, set_log_x
 from assoc.plotting.colours import colour, marker
 from assoc.solution import Solution
 
@@ -62,7 +62,7 @@ def plot_convergence(
     if over == "iteration":
         ax.xaxis.get_major_locator().set_params(integer=True)
     else:
-        ax.set_xscale("log")
+        set_log_x(ax)
     ax.set_xlabel(_UNITS[over])
     ax.set_ylabel("cost (nats)")
     ax.grid(alpha=0.25, linewidth=0.6)

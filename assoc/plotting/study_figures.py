@@ -14,6 +14,7 @@ from assoc._files.output import write_atomically
 from assoc._system.imports import load_extra
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
+from assoc.plotting.axes import set_log_x
 from assoc.plotting.colours import DASHES, colour
 from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
 from assoc.sweeps.summary import FACTORS, by_problem, mean_interval, measured, numbers, summarize, varied, weighted_mean
@@ -162,7 +163,9 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
                 style["label"] = setting_title(row, names, several)
             draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
-            ax.set_xscale("log")
+            set_log_x(ax)
+        else:
+            ax.xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
         ax.set_xlabel(unit)
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("mean cost above the best known")

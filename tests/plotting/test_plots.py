@@ -1,5 +1,6 @@
 """What the figures show, read back from the axes and compared with the arrays it should be."""
 
+import itertools
 import re
 
 import matplotlib as mpl
@@ -10,6 +11,7 @@ from scipy import stats
 
 import assoc
 from assoc import plotting
+from assoc.plotting.axes import set_log_x
 from assoc.plotting.measured import distances_to_border, ellipses, positions_of
 from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
@@ -54,6 +56,23 @@ def sensors():
         PositionSensor(position=(0, 0, 0), noise=(5, 6), field_of_view=[[-9e4, 9e4]] * 2),
         PositionSensor(position=(0, 0, 0), noise=(5, 6, 7), field_of_view=[[-9e4, 9e4]] * 3),
     ]
+
+
+@pytest.mark.parametrize("span", [(2.45, 3.1), (95, 105), (2, 9), (2, 150), (0.02, 5e4)])
+def test_numbers_at_a_logarithmic_axis_are_plain_and_apart(ax, span):
+    ax.figure.set_size_inches(5, 3)
+    ax.plot(span, [0, 1])
+    set_log_x(ax)
+    ax.figure.draw_without_rendering()
+    shown = [
+        one
+        for one in ax.get_xticklabels(which="both")
+        if one.get_text() and span[0] <= one.get_position()[0] <= span[1]
+    ]
+    assert len(shown) >= 3
+    assert all(float(one.get_text().replace("\u2212", "-")) == pytest.approx(one.get_position()[0]) for one in shown)
+    places = sorted((one.get_window_extent() for one in shown), key=lambda box: box.x0)
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(places)), [one.get_text() for one in shown]
 
 
 def test_rays_end_on_the_border():
