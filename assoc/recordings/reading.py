@@ -122,12 +122,18 @@ class PlotReader:
         return joined(parts, self.notes, self.file.name)
 
     def __iter__(self) -> Iterator[Recording]:
-        parquet = kind_of(self.file) == "parquet"
-        found = _frames(self.file, self._at_once) if parquet else _lines(self.file)
+        kind = kind_of(self.file)
+        parquet = kind == "parquet"
+        binary = kind == "asterix" and self.file.is_file()
+        hint = "; if it is ASTERIX, assoc.integrations.asterix.read_asterix reads it" if binary else ""
+        try:
+            found = _frames(self.file, self._at_once) if parquet else _lines(self.file)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{error}{hint}") from None
         try:
             columns_of, said = choose(found.header, self._columns, self._units)
         except InvalidInputError as error:
-            raise InvalidInputError(f"{self.file}: {error}") from None
+            raise InvalidInputError(f"{self.file}: {error}{hint}") from None
         of_row = {
             meaning: unit_of(meaning, found.units[k]) for meaning, k in columns_of.items() if k < len(found.units)
         }

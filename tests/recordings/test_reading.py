@@ -132,9 +132,10 @@ def test_a_wrong_time_neither_moves_nor_delays_the_plots_after_it(tmp_path, cloc
         (HEAD + "1,2\n\n,2,3,4,5\n", "holds no plots: 2 rows without time, range or bearing left out"),
         (HEAD + "1,٢,3,4,5\n", "line 2, column 'range': expected a number"),
         (HEAD + "1,2,3,4," + "5" * 20_000, "line 2 is longer than 10000 bytes"),
-        (HEAD.encode() + b"1,2,3,4,5\n1,\x00,3,4,5\n", "line 3 holds a NUL byte"),
+        (HEAD.encode() + b"1,2,3,4,5\n1,\x00,3,4,5\n", "line 3 holds a NUL byte, expected text .UTF-8.$"),
+        (bytes([48, 0, 9, 0x80, 25, 201, 0, 0, 1]), "line 1 holds a NUL byte.*asterix.read_asterix"),
         (HEAD.encode() + b"1,2,\xff\xfe,4,5\n", "line 2, column 'bearing': expected a number"),
-        (b"\x89PNG\r\n\x1a\n\x00\x00", "no column time or .*; it has: '.PNG'"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "no column time or .*; it has: '.PNG'; if it is ASTERIX"),
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path, text, message):
