@@ -22,6 +22,7 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc._cli.track.radars_file import Radars
     from assoc._types import Array
+    from assoc.recordings import Recording
     from assoc.registration.agreement import Agreement
 
 _MANY = 30
@@ -148,7 +149,7 @@ def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
     """What agrees with what, what does not, and what was compared with nothing: nothing else may be called right."""
     import numpy as np
 
-    from assoc.registration.agreement import compare, noise_of, reported
+    from assoc.registration.agreement import compare, noise_of, reported, standing_still
 
     agreed, wrong, unknown = [], [], []
     assert found.scene.origin is not None
@@ -161,11 +162,23 @@ def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
         )
         for one, sensor in found.reports
     ]
-    for s, one in enumerate(compare(found.recordings, found.radars, found.turns, found.scene.origin, reports)):
+    recordings = []
+    for recording, radar, turn in zip(found.recordings, found.radars, found.turns, strict=True):
+        still = standing_still(recording, turn)
+        recordings.append(recording.take(np.flatnonzero(~still)))
+        if still.any():
+            agreed.append(f"{radar.name}: {still.sum()} plots are of what stands still (turbines, masts): not compared")
+    compared, high = (
+        compare(recordings, found.radars, found.turns, found.scene.origin, reports),
+        _without_heights(found, recordings),
+    )
+    for s, one in enumerate(compared):
         radar = found.radars[s]
         declared = radar.covariance.diagonal() ** 0.5
         if one.change is None:
-            if one.places >= _MANY:
+            # what the others see may be too little to be found again
+            others = math.inf if reports else sum(other.places for other in compared) - one.places
+            if min(one.places, others) >= _MANY:
                 wrong.append(
                     f"{radar.name}: {one.places} places where another sensor looks, and no turn of north, unit of "
                     "ranges or clock with which they see the same targets: is the place right?"
@@ -174,8 +187,8 @@ def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
                 unknown.append(f"{radar.name}: bearings, ranges and times: too few targets that another sensor sees")
         else:
             agreed.append(f"{radar.name}: another sensor sees the same target at {one.common} of {one.places} places")
-            wrong += [f"{radar.name}: {text}" for text in _differences(one, declared)]
-        noise = noise_of(found.recordings[s], found.turns[s])
+            wrong += [f"{radar.name}: {text}" for text in _differences(one, declared, flat=not high)]
+        noise = noise_of(recordings[s], found.turns[s])
         if noise.plots < _MANY:
             unknown.append(f"{radar.name}: noise: {noise.plots} plots are between two others of the same target")
             continue
@@ -185,13 +198,31 @@ def compared_lines(found: Radars) -> tuple[list[str], list[str], list[str]]:
         if not all(1 / 3 < ratio < 3 for ratio in ratios):
             said = f"{declared[0]:.3g} m and {math.degrees(declared[1]):.2g} deg"
             wrong.append(f"{radar.name}: noise: {said} are declared, {seen} are seen")
+    if high and agreed:
+        unknown.append(
+            f"{', '.join(high)}: small errors of ranges and bearings: most plots have no height ('heights = [lowest, "
+            "highest]', metres, says how high targets are)"
+        )
     if found.reports and not found.radars:
         unknown.append("positions that are reported: no radar sees the targets")
     return agreed, wrong, unknown
 
 
-def _differences(one: Agreement, declared: Array) -> list[str]:
-    """What is different between a radar and the others."""
+def _without_heights(found: Radars, recordings: list[Recording]) -> list[str]:
+    """Radars whose slant ranges are longer than ground ranges by an unknown part that is more than half their noise."""
+    import numpy as np
+
+    region, names = found.scene.region, []
+    top = abs(region[2, 1]) if len(region) > 2 else 20_000.0
+    for recording, radar in zip(recordings, found.radars, strict=True):
+        few = len(recording) > 0 and np.isfinite(recording.trusted_altitudes).mean() < 0.5
+        if few and top**2 > float(np.median(recording.ranges)) * radar.covariance[0, 0] ** 0.5:
+            names.append(radar.name)
+    return names
+
+
+def _differences(one: Agreement, declared: Array, *, flat: bool) -> list[str]:
+    """What is different between a radar and the others; small differences only where heights are known."""
     from assoc.registration.agreement import UNITS
 
     change = one.change
@@ -221,7 +252,7 @@ def _differences(one: Agreement, declared: Array) -> list[str]:
         abs(one.turn[0]) > max(4.0 * one.turn[1], 0.5 * declared[1]) and not change.turn,
         abs(length) > max(4.0 * one.length[1], 0.5 * declared[0]),
     ]
-    if any(apart):
+    if flat and any(apart):
         said = " and ".join(text for text, is_so in zip(small, apart, strict=True) if is_so)
         lines.append(f"beside the others {said}: assoc register radars.toml --write finds whose error it is")
     return lines

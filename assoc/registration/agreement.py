@@ -39,6 +39,8 @@ _INSTANTS, _MOST_PLOTS, _MOST_POINTS = 60, 40_000, 1_000
 _STEP = math.radians(0.5)
 _AROUND = 10
 _APART, _FAR = 1e8, 1e5
+# share of the turns in which something is seen where a thing stands
+_STAYS = 0.25
 # seconds between two reports of one target that make a leg
 _LONGEST = 60.0
 
@@ -117,6 +119,30 @@ def noise_of(recording: Recording, turn: float) -> Noise:
     along = off * np.conj(z[middle] / np.abs(z[middle]))
     angle = along.imag / np.abs(z[middle])
     return Noise(_deviation(along.real), _deviation(angle), len(left))
+
+
+def standing_still(recording: Recording, turn: float) -> Array:
+    """Which plots (n,) are of what stays in its place, as wind turbines, masts and buildings.
+
+    In a cell of six standard deviations of the noise something is seen in a quarter of all turns, in the first and in
+    the last half of the recording: no flight stays so long.
+    """
+    found = np.zeros(len(recording), dtype=np.bool_)
+    noise = noise_of(recording, turn)
+    if not noise.plots >= 3:
+        return found
+    z = np.stack([recording.ranges / max(noise.range, 1.0), recording.bearings / max(noise.azimuth, 1e-5)]) / 6.0
+    turns = np.floor((recording.times - recording.times[0]) / turn)
+    half = (turns[-1] + 1.0) / 2.0
+    # what lies at the border of one cell is inside another
+    for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
+        cells, of = np.unique(np.floor(z.T + shift), axis=0, return_inverse=True)
+        seen = np.unique(np.stack([of, turns]), axis=1)
+        early, late = (np.bincount(seen[0, part].astype(int), minlength=len(cells))
+                       for part in (seen[1] < half, seen[1] >= half))  # fmt: skip
+        stays = (np.minimum(early, late) > 0) & (early + late >= np.maximum(_STAYS * 2.0 * half, 4.0))
+        found |= stays[of]
+    return found
 
 
 def _deviation(values: Array) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from assoc.recordings import Recording, radar_of
 from assoc.recordings.on_earth import placed
-from assoc.registration.agreement import Change, compare, noise_of
+from assoc.registration.agreement import Change, compare, noise_of, standing_still
 from assoc.scene.geodesy import east_north_up, geodetic
 from tests.sizes import sample
 
@@ -105,3 +105,26 @@ def test_what_is_compared_with_nothing(plots):
     noise = replace(plots[1], azimuths=rng.uniform(-np.pi, np.pi, len(plots[1])), altitudes=None)
     assert [one.change for one in agreements([plots[0], noise])] == [None, None]
     assert noise_of(plots[0].take(np.arange(10)), 5.0).plots < 3
+
+
+def test_turbines_are_no_flights(plots):
+    """A farm that one radar sees in two thirds of its turns: without it the radar is what it is without the farm."""
+    rng = np.random.default_rng(1)
+    east, north = np.meshgrid(12e3 + 600.0 * np.arange(6), -20e3 + 600.0 * np.arange(6))
+    far, azimuth = np.hypot(east, north).ravel(), np.arctan2(north, east).ravel()
+    turn, farm = np.nonzero(rng.random((48, 36)) < 0.67)
+    times = 5.0 * (turn + np.mod(np.pi / 2 - azimuth[farm], 2 * np.pi) / (2 * np.pi))
+    noise = rng.normal(0, [60.0, 1e-3], (len(farm), 2))
+    plot = np.column_stack([times, far[farm] + noise[:, 0], azimuth[farm] + noise[:, 1], np.full(len(farm), np.nan)])
+    alone = np.column_stack([plots[0].times, plots[0].ranges, plots[0].azimuths, plots[0].altitudes])
+    rows = np.concatenate([alone, plot])
+    order = np.argsort(rows[:, 0], kind="stable")
+    times, ranges, azimuths, heights = rows[order].T
+    both = Recording(times, ranges, azimuths, altitudes=heights)
+    still = standing_still(both, 5.0)
+    of_farm = order >= len(alone)
+    assert still[of_farm].mean() > 0.97 and still[~of_farm].mean() < 0.02
+    assert not standing_still(plots[0], 5.0).any()
+    moving = both.take(np.flatnonzero(~still))
+    assert noise_of(moving, 5.0).range == pytest.approx(60.0, rel=0.3)
+    assert [one.change for one in agreements([moving, plots[1]])] == [Change(), Change()]
