@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.compiled import compile_ahead, wait_for_kernels
 from assoc._system.interpreted import compiled_only
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.costs import build_problem
@@ -16,6 +17,7 @@ from assoc.errors import AssocWarning
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
+from assoc.ranking.pairs.messages import bound_pairs
 from assoc.scene.scene import Scene
 from assoc.simulation import simulate
 from assoc.solvers import warm_up as of_solvers
@@ -53,35 +55,51 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     started = time.perf_counter()
     of_solvers.warm_up(solvers)
     if solvers is None:
-        with compiled_only(), warnings.catch_warnings():
-            warnings.simplefilter("ignore", AssocWarning)
-            scenes = _scenes()
-            for scene in scenes:
-                for kind in TRACKERS.values():
-                    for own_times in (False, True):
-                        follow(kind.for_scene(scene), scene, own_times)
-            _rank()
-            for name in FILTERS:
-                scene = scenes[0 if name == "kalman" else 2]
-                chosen = make_filter(name, scene.sensors)
-                for own_times in (False, True):
-                    follow(TRACKERS["multi-sensor"].for_scene(scene, filter=chosen), scene, own_times)
-            for targets, names in _CROWDS.items():
-                scene = simulate("crowd", 5, targets=targets, scans=3, width=50.0 * targets)
-                for name in names:
-                    follow(TRACKERS[name].for_scene(scene), scene, False)
+        # another process ranks meanwhile
+        compile_ahead(bound_pairs, rank, anyway=True)
+        follow_all()
+        wait_for_kernels()
+        rank()
     return time.perf_counter() - started
 
 
-def _rank() -> None:
+def follow_all() -> None:
+    """Compile the kernels of trackers, with each of their filters."""
+    with compiled_only(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssocWarning)
+        scenes = _scenes()
+        for scene in scenes:
+            for kind in TRACKERS.values():
+                for own_times in (False, True):
+                    follow(kind.for_scene(scene), scene, own_times)
+        for name in FILTERS:
+            scene = scenes[0 if name == "kalman" else 2]
+            chosen = make_filter(name, scene.sensors)
+            for own_times in (False, True):
+                follow(TRACKERS["multi-sensor"].for_scene(scene, filter=chosen), scene, own_times)
+        for targets, names in _CROWDS.items():
+            scene = simulate("crowd", 5, targets=targets, scans=3, width=50.0 * targets)
+            for name in names:
+                follow(TRACKERS[name].for_scene(scene), scene, False)
+
+
+def rank() -> None:
     """Rank and weigh matrices, with and without all of their rows matched, and a scan."""
     rng = np.random.default_rng(3)
     # the last is too wide for exact sums
     costs, small, wide = rng.normal(size=(12, 12)), np.zeros((2, 3)), rng.normal(size=(50, 50))
     scene = simulate("crowd", 5, targets=20, scans=1, width=1_000.0)
-    for problem in (costs, small, wide, AssignmentProblem.from_matrix(costs, unassigned=0.5), build_problem(scene, 0)):
-        kbest(problem, 4)
-        marginals(problem, time_limit=1.0)
+    with compiled_only(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssocWarning)
+        for problem in (
+            costs,
+            small,
+            wide,
+            AssignmentProblem.from_matrix(costs, unassigned=0.5),
+            build_problem(scene, 0),
+        ):
+            kbest(problem, 4)
+            marginals(problem, time_limit=1.0)
 
 
 def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:
