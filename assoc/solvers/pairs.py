@@ -30,8 +30,9 @@ def proved_pairs(problem: AssignmentProblem, run: Run, parameters: Any) -> Solut
     if matrix is None:
         tuples, costs = problem.tuples[indices], problem.costs[indices]
     else:
-        pairs = np.unravel_index(indices, matrix.shape)
-        tuples, costs = np.stack(pairs, axis=1).astype(np.int32) + np.int32(1), matrix[pairs]
+        tuples, costs = np.empty((indices.size, 2), np.int32), matrix.reshape(-1)[indices]
+        np.divmod(indices, matrix.shape[1], out=(tuples[:, 0], tuples[:, 1]), casting="same_kind")
+        tuples += 1
     cost = math.fsum(costs.tolist())
     if cost - bound > TOLERANCE * max(1.0, abs(bound)):
         return None
@@ -63,8 +64,9 @@ def _of_matrix(matrix: Floats) -> _Answer | None:
     upright = matrix.shape[0] > matrix.shape[1]
     costs = np.ascontiguousarray(matrix.T) if upright else matrix
     n, m = costs.shape
-    indptr, indices = np.arange(0, n * m + 1, m, dtype=np.int64), np.tile(np.arange(m, dtype=np.int64), n)
-    found = match(indptr, indices, costs.reshape(-1), *_slacks(n, m))
+    indptr, columns = np.arange(0, n * m + 1, m, dtype=np.int64), np.empty((n, m), np.int64)
+    columns[:] = np.arange(m)
+    found = match(indptr, columns.reshape(-1), costs.reshape(-1), *_slacks(n, m))
     if found is None:
         return None
     edges = found.row_edge
