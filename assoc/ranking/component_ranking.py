@@ -43,6 +43,7 @@ from assoc.packing.branching.pairs import (
     part_certain,
 )
 from assoc.packing.branching.root import plain_root, root_with_cuts
+from assoc.packing.kernels.heap import doubled
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import memory_allows, never
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
@@ -320,7 +321,9 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
     pointer = np.zeros(65, np.int64)
     columns = np.empty(256, np.int32)
     proven = np.full(num_components, -np.inf)
-    names = np.arange(reduced.size).astype(np.int32)
+    names = np.empty(reduced.size, np.int32)
+    for j in range(names.size):
+        names[j] = j
     priced = PricedColumns(
         packing.cols, names, packing.weights, reduced, packing.slack, duals, packing.row_ptr, packing.row_cols,
         np.empty(reduced.size, np.int32),
@@ -342,12 +345,11 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
                 room -= lightest[0] - base
             for i in range(lightest.size):
                 if count == weights.size:
-                    weights = np.concatenate((weights, np.empty(count)))
-                    pointer = np.concatenate((pointer, np.empty(count, np.int64)))
+                    weights, pointer = doubled(weights), doubled(pointer)
                 weights[count] = lightest[i]
                 at = pointer[count]
-                if at + chosen.shape[1] > columns.size:
-                    columns = np.concatenate((columns, np.empty(columns.size + chosen.shape[1], np.int32)))
+                while at + chosen.shape[1] > columns.size:
+                    columns = doubled(columns)
                 for t in range(chosen.shape[1]):
                     if chosen[i, t] < 0:
                         break

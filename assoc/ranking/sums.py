@@ -67,13 +67,13 @@ def _planned(graph: Graph, log_upper: Floats, most: int, drop: bool) -> tuple[ND
                 continue
             for u in inside:
                 label[u] = -1
+                wide[u] = not drop
             if not drop:
-                wide[inside] = True
                 continue
-            level = limit[inside].max()
             # no step at which nothing would be left out
-            least = np.inf
+            level, least = -np.inf, np.inf
             for u in inside:
+                level = max(level, limit[u])
                 for x in range(graph.ptr[u], graph.ptr[u + 1]):
                     if kept[graph.edge[x]]:
                         least = min(least, log_upper[graph.edge[x]])

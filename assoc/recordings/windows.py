@@ -246,7 +246,7 @@ def _follow(times: Array, angles: Array, turn: float, state: Array) -> Array:
         fraction = math.atan2(held.imag, held.real) / (2 * math.pi)
         now += (fraction - now + 0.5) % 1.0 - 0.5
         phase[row] = now
-    state[:] = held.real, held.imag, now, before
+    state[0], state[1], state[2], state[3] = held.real, held.imag, now, before
     return phase
 
 

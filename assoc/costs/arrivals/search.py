@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._system.copying import copy_to
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays
 from assoc.costs.arrivals.fit import (
@@ -256,7 +257,8 @@ def _choices(options: Array, counts: Array, gain: Array, base: float, limit: int
                     break
                 if found == len(result):
                     longer = np.empty((2 * found, stations), np.int32)
-                    longer[:found] = result
+                    for k in range(found):
+                        copy_to(longer[k], result[k])
                     result = longer
                 for i in range(stations):
                     result[found, i] = options[i, chosen[i]]

@@ -39,7 +39,10 @@ def observe_points(
     That of the first point is kept in `first`. Of the user's own model (GIVEN) they are the matrix.
     """
     if code == GIVEN:
-        h[:] = matrix
+        # number by number: assigning the whole would compile an error message about its shape
+        for s in range(len(points)):
+            for a in range(len(first)):
+                h[s, a] = matrix[s, a]
         return
     d = len(first)
     for s in range(len(points)):
@@ -228,7 +231,8 @@ def unscented(
                 extra[e, a] = total
         if not residual_of_mean(code, folding, z[b], first, mu, v[b]):
             return BAD_MEAN + STATUSES * b
-        linear[V, 0, :d] = v[b]
+        for a in range(d):
+            linear[V, 0, a] = v[b, a]
         good, nis[b], log_det = correct(d, n, P[b], every, linear, work, S[b], new_P[b])
         if not good:
             return BAD_COVARIANCE + STATUSES * b

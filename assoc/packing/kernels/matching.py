@@ -104,7 +104,7 @@ def match_sparse(
     """Fill ``row_edge``, ``u`` and ``v``; return the total cost, ``inf`` where there is no matching."""
     n, m = row_slack.size, column_slack.size
     # matching all rows matches all columns: no price, which would take digits from the duals
-    all_matched = n == m and np.all(row_slack == np.inf)
+    all_matched = n == m and _all_are(row_slack, np.inf)
     must = False
     for j in range(m):
         must = must or column_slack[j] == np.inf
@@ -113,7 +113,7 @@ def match_sparse(
     for j in range(m):
         base[j] = column_slack[j] if column_slack[j] < np.inf else price
         v[j] = 0.0
-    if np.any(base != 0.0):
+    if not _all_are(base, 0.0):
         above = np.empty(indptr[n])
         for k in range(indptr[n]):
             above[k] = costs[k] - base[indices[k]]
@@ -169,6 +169,14 @@ def match_sparse(
         if owner[j] < 0:
             total += column_slack[j]
     return total
+
+
+@inner_njit
+def _all_are(values: Floats, value: float) -> bool:
+    for one in values:
+        if one != value:
+            return False
+    return True
 
 
 @inner_njit

@@ -64,7 +64,9 @@ def _permuted(graph: PairGraph, weights: Floats, free: Floats, rows: int, most: 
                     bit[inside[i]] = 1 << i
                 _permute(graph, (weights, free), kept, inside, rows, most, share, (bit, found))
                 break
-            level = _STEP * limit[inside].max()
+            level = 0.0
+            for u in inside:
+                level = max(level, _STEP * limit[u])
             for u in inside:
                 label[u] = -1
                 limit[u] = level

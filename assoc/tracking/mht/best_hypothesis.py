@@ -94,7 +94,8 @@ def choose(score: Floats, history: NDArray[np.int32], known: Priced, visits: int
                 gap = max(gap, lost / total)
         if not settled:
             for t in trees:
-                doubtful[good[start[t] : start[t + 1]]] = True
+                for g in range(start[t], start[t + 1]):
+                    doubtful[good[g]] = True
         begin = end
     return chosen, doubtful, gap
 

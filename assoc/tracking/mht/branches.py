@@ -49,7 +49,8 @@ def extend(
     Returns rows of the candidates that are kept, their tables, which of them form the best global hypothesis found, and
     how far its score may be below the best one's where no solver was asked, relative; mostly 0.
     """
-    history, doubtful, gap, grown, *cut = _extend(tables, offers, column, scan, most, drop, visits)
+    history, uncertain, gap, grown, *cut = _extend(tables, offers, column, scan, most, drop, visits)
+    doubtful = np.flatnonzero(uncertain)
     if doubtful.size:
         tree, score, _, chosen = grown
         other = solve(tree[doubtful], score[doubtful], history[doubtful])
@@ -86,7 +87,7 @@ def _extend(tables: Tables, offers: Offers, column: int, scan: int, most: int, d
     chosen, doubtful, gap = choose(score, wide, known, visits)
     grown = tree, score, known.loss, chosen
     kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, offers, grown, column, scan, most, drop)
-    return wide, np.flatnonzero(doubtful), gap, grown, kept, ours, new_numbers, new_counts, new_history, new_born
+    return wide, doubtful, gap, grown, kept, ours, new_numbers, new_counts, new_history, new_born
 
 
 @njit

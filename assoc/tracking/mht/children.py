@@ -102,9 +102,11 @@ def next_hypotheses(
                 held[c, tracks + choice[c, j]] = True
     used, size = np.empty(held.shape[1], np.int64), 0
     for column in range(held.shape[1]):
-        if held[:, column].any():
-            used[size] = column
-            size += 1
+        for c in range(parent.size):
+            if held[c, column]:
+                used[size] = column
+                size += 1
+                break
     found = np.empty((parent.size, size), np.bool_)
     for c in range(parent.size):
         for i in range(size):

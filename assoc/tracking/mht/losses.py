@@ -72,14 +72,14 @@ def priced(tree: NDArray[np.int64], score: Floats, history: NDArray[np.int32]) -
                     contested[m] = contested[m] or (holder[m] >= 0 and holder[m] != number[b])
                     holder[m] = number[b]
     price = np.zeros(trees + first[columns])
-    involved = np.zeros(trees, np.bool_)
+    involved, any_involved = np.zeros(trees, np.bool_), False
     for b in range(tree.size):
         if score[b] > 0.0:
             price[number[b]] = max(price[number[b]], score[b])
             for c in range(columns):
                 if history[b, c] > 0 and contested[first[c] + history[b, c] - 1]:
-                    involved[number[b]] = True
-    if involved.any():
+                    involved[number[b]] = any_involved = True
+    if any_involved:
         _price(number, score, history, first, contested, involved, price)
     loss = np.empty(tree.size)
     for b in range(tree.size):
@@ -134,18 +134,25 @@ def _price(
                         rows[k, 1 + c] = trees + m
             k += 1
     slack = np.ones(price.size, np.bool_)
+    # names of columns are not asked for
     cols, costs, free, col_start, row_start, row_ptr, row_cols, _, row_origin = assembled(
-        rows, weights, slack, np.arange(count).astype(np.int32)
+        rows, weights, slack, np.empty(count, np.int32)
     )
     packing = PackingArrays(cols, costs, free, col_start, row_start, row_ptr, row_cols)
     duals, reduced = np.zeros(free.size), np.empty(count)
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
     # rows of trees come first in every component: after this sweep their prices are the scores of their best branches
     hard_sweeps(packing, duals, reduced, 1)
-    temperature = np.minimum(np.maximum(START * spread(packing), 2.0 * _COLDEST), _HOTTEST)
-    while temperature.max() > _COLDEST:
+    temperature, hottest = spread(packing), 0.0
+    for c in range(temperature.size):
+        temperature[c] = min(max(START * temperature[c], 2.0 * _COLDEST), _HOTTEST)
+        hottest = max(hottest, temperature[c])
+    while hottest > _COLDEST:
         smooth_passes(packing, point, temperature, _PASSES, np.inf)
-        temperature = np.maximum(0.5 * temperature, 0.5 * _COLDEST)
+        hottest = 0.0
+        for c in range(temperature.size):
+            temperature[c] = max(0.5 * temperature[c], 0.5 * _COLDEST)
+            hottest = max(hottest, temperature[c])
     hard_sweeps(packing, duals, reduced, 2)
     for r in range(free.size):
         price[row_origin[r]] = max(-duals[r], 0.0)
