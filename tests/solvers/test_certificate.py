@@ -9,6 +9,7 @@ from assoc.errors import InfeasibleError
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
+from assoc.solvers.assign import assign
 from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.parameters import GreedyParameters
 from tests.oracles import small_problems
@@ -88,3 +89,20 @@ def test_of_a_tuple_that_is_listed_twice_the_cheaper_copy_counts(dummy):
 def test_a_bound_that_is_none_is_found_anew():
     for bound in (-np.inf, np.nan):
         assert -6.0 < answer(PROBLEM, [column(PROBLEM, 1, 2)], bound).lower_bound <= -5.0
+
+
+def test_greedy_proves_of_the_whole_what_it_proves_of_its_parts():
+    """Bounds of parts add up; the short ascent that many columns get does not close them."""
+    rng, parts = np.random.default_rng(77), []
+    while len(parts) < 6:
+        tuples = np.unique(rng.integers(0, 5, (30, 3)), axis=0)[1:]
+        part = AssignmentProblem(tuples, -rng.gamma(2.0, 2.0, len(tuples)), [4, 4, 4])
+        if assign(part, "greedy").status == "optimal":
+            parts.append((part.tuples, part.costs))
+    # measurements of their own, which nobody contends for
+    parts += [(np.full((1, 3), 1, np.int32), np.full(1, -10.0))] * 150
+    sizes = np.array([tuples.max(axis=0) for tuples, _ in parts])
+    before = np.cumsum(sizes, axis=0) - sizes
+    tuples = np.concatenate([np.where(t > 0, t + b, 0) for (t, _), b in zip(parts, before, strict=True)])
+    costs = np.concatenate([costs for _, costs in parts])
+    assert assign(AssignmentProblem(tuples, costs, sizes.sum(axis=0)), "greedy").status == "optimal"
