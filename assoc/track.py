@@ -5,6 +5,8 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
+import copy
+import itertools
 import math
 import os
 import shlex
@@ -136,10 +138,10 @@ def _of_radars(file: str, given: Given, settings: dict[str, Any], _: ExitStack) 
     found = read_radars(file)
     settings["initiation"] = closing(settings["initiation"], found.closed)
     scene = _registered(found.scene, given, settings, found.references)
-    tracker = make_tracker(
-        given["tracker"] or "multi-sensor", scene.sensors, given, settings, scene.region, found.shortest
-    )
-    return _of_scans(scene, tracker, given, None if given["identity"] == "ignore" else found.identities)
+    identities = None if given["identity"] == "ignore" else found.identities
+    tracked = _of_scans(scene, given, settings, found.shortest, identities)
+    low, high = scene.region[2].tolist()
+    return tracked._replace(tall=high - low > 10_000.0)
 
 
 def _of_scene(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -> Tracked:
@@ -157,15 +159,19 @@ def _of_scene(file: str, given: Given, settings: dict[str, Any], _: ExitStack) -
         scene = replace(scene, origin=given["origin"])
     elif given["map"] and scene.origin is None:
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
-    name, pace = given["tracker"] or "multi-sensor", pace_of(scene.times)
-    tracker = make_tracker(name, scene.sensors, given, settings, scene.region, pace, scene)
-    return _of_scans(scene, tracker, given)
+    return _of_scans(scene, given, settings, pace_of(scene.times))
 
 
-def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = None) -> Tracked:
+def _of_scans(scene: Scene, given: Given, settings: dict[str, Any], pace: float, identities: Any = None) -> Tracked:
     """Track the scans of a scene."""
     from assoc.tracking import smoothed, track_scene
+    from assoc.tracking.target_kinds import evidence_of
 
+    def made(given: Given) -> Tracker:
+        name = given["tracker"] or "multi-sensor"
+        return make_tracker(name, scene.sensors, given, settings, scene.region, pace, scene)
+
+    tracker = made(given)
     (tracks, decisions), count = _watched(
         given,
         range(scene.num_scans),
@@ -177,7 +183,19 @@ def _of_scans(scene: Scene, tracker: Tracker, given: Given, identities: Any = No
         if identities is not None:
             tracks.take_names(named)
     tracked = scene if count == scene.num_scans else scene.part(0, count)
-    return Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
+    again = _again(given, lambda other: evidence_of(made(other), scene))
+    return Tracked(tracker, tracks, tracked, None, count, scene.num_scans, again=again)
+
+
+def _again(given: Given, evidence: Callable[[Given], float]) -> Callable[[str], float] | None:
+    """What the tracks of another kind of targets score, by its name; None where the kind or the speed was given."""
+
+    def of(kind: str) -> float:
+        other = copy.copy(given)
+        other["targets"] = kind
+        return evidence(other)
+
+    return of if given["targets"] is None and given["speed"] is None else None
 
 
 def _registered(scene: Scene, given: Given, settings: dict[str, Any], references: Sequence[str] = ()) -> Scene:
@@ -200,7 +218,8 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     from assoc.recordings import radar_of, with_heights
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
-    from assoc.tracking.offline.plots import PlotTracks, track_plots
+    from assoc.tracking.offline.plots import PlotTracks, follow, track_plots
+    from assoc.tracking.target_kinds import SCANS, score_of
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if kind_of(file) == "asterix" else "tables", given["identity"] or "score-only"
@@ -217,7 +236,17 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
         windows = Windows(stored, given, settings.get("seed", 0))
         print_lines(survey.summary(notes))
         radar = radar_of(survey, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
-    tracker = make_tracker(name, with_heights(radar, survey), given, settings, None)
+
+    def made(given: Given) -> Tracker:
+        return make_tracker(name, with_heights(radar, survey), given, settings, None)
+
+    def evidence(other: Given) -> float:
+        tracker = made(other)
+        for _ in follow(tracker, itertools.islice(windows, SCANS), forget=True):
+            pass
+        return score_of(tracker)
+
+    tracker = made(given)
     # these show all tracks at once
     whole = any(given[name] for name in ("report", "map", "asterix"))
     plots = None
@@ -251,7 +280,8 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
             table.finish()
 
     ends_here = None if whole else finish
-    return Tracked(tracker, table, None, judged, count, total, plots, left, ends_here)
+    again = _again(given, evidence)
+    return Tracked(tracker, table, None, judged, count, total, plots, left, ends_here, again)
 
 
 def _take(given: Given, tracker: Tracker, scans: Iterator[Window], table: EndedTracks, stored: StoredPlots) -> Judged:

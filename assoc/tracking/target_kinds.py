@@ -10,7 +10,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
 # the first scans, by which "auto" decides
-_SCANS = 50
+SCANS = 50
 
 
 class TargetKind(NamedTuple):
@@ -52,13 +52,28 @@ def target_kind(name: str, scene: Scene | None, make: Callable[..., Any]) -> Tar
         return TARGETS[name]
     if scene is None:
         raise InvalidInputError(f"targets: auto needs a scene; name one of {', '.join(TARGETS)}")
-    evidence = {kind: _evidence(make(scene, targets=kind), scene) for kind in TARGETS}
+    evidence = {kind: evidence_of(make(scene, targets=kind), scene) for kind in TARGETS}
     return TARGETS[max(evidence, key=lambda kind: evidence[kind])]
 
 
-def _evidence(tracker: Any, scene: Scene) -> float:
+def slower_kind(speed: float, evidence: Callable[[str], float]) -> str:
+    """The kind slower than a prior of this speed, m/s, with the most evidence for its tracks; "" if none has any.
+
+    A prior that is wide beside the region leaves slow targets without a track, so that no speed of theirs is known.
+    """
+    found = {kind: evidence(kind) for kind, priors in TARGETS.items() if 2.0 * priors.speed < speed}
+    best = max(found, key=lambda kind: found[kind], default="")
+    return best if best and found[best] > 0 else ""
+
+
+def score_of(tracker: Any) -> float:
     """Sum of the scores of the confirmed tracks: how much likelier the measurements are with these targets."""
-    for k in range(min(scene.num_scans, _SCANS)):
+    return float(sum(track.score for track in tracker.tracks if track.confirmed))
+
+
+def evidence_of(tracker: Any, scene: Scene) -> float:
+    """What the confirmed tracks of a scene's first scans score."""
+    for k in range(min(scene.num_scans, SCANS)):
         scan = scene.scan(k)
         tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
-    return sum(track.score for track in tracker.tracks if track.confirmed)
+    return score_of(tracker)

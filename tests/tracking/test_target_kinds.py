@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assoc import Scene, simulation
+from assoc import Scene, simulation, track
 from assoc._cli.track import options
 from assoc.filters import FreeFlight
 from assoc.sensors import Radar2D, Radar3D
@@ -42,6 +42,18 @@ def test_boats_in_a_small_region_get_tracks(targets):
     assert confirmed(scene) == []  # 300 m/s: the second detection may be anywhere
     speeds = sorted(float(np.linalg.norm(track.velocity)) for track in confirmed(scene, targets=targets))
     np.testing.assert_allclose(speeds, [2.0, 3.0], atol=0.7)
+
+
+def test_where_nothing_is_tracked_the_end_says_which_slower_targets_would_be(tmp_path, capsys):
+    harbour(scans=40).save(tmp_path / "harbour.npz")
+    words = [str(tmp_path / "harbour.npz"), "-o", str(tmp_path / "tracks.csv")]
+    for more in ([], ["--check"]):
+        assert track.main([*words, *more]) == 0
+        told = capsys.readouterr().out
+        assert "0 confirmed tracks" in told and "targets look slower than assumed: --targets ship\n" in told
+    assert track.main([*words, "--targets", "ship"]) == 0
+    told = capsys.readouterr().out
+    assert "2 confirmed tracks" in told and "slower" not in told
 
 
 def test_auto_tells_aircraft_from_boats():

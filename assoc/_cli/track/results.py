@@ -37,6 +37,10 @@ class Tracked(NamedTuple):
     """Files that they lack."""
     finish: Callable[[], object] | None = None
     """Writes the rest of tracks that were written as they ended."""
+    again: Callable[[str], float] | None = None
+    """Score of the tracks that the first scans give with targets of another kind; None where the kind was given."""
+    tall: bool = False
+    """Whether a description of radars leaves open how high targets are."""
 
 
 class Judged(NamedTuple):
@@ -150,7 +154,10 @@ def _print_rates(plots: Judged, identity: str | None) -> None:
 
 
 def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float, check: bool) -> None:
+    import numpy as np
+
     from assoc.tracking.filter_choice import height_note
+    from assoc.tracking.target_kinds import slower_kind
 
     tracker, rows = found.tracker, found.table
     name = "stdout" if output == STDOUT else printable(output)
@@ -169,6 +176,12 @@ def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float,
         print_lines(note)
     if health is not None and health.speed and not check:
         print_lines(health.speed)
+    elif found.again is not None and not rows.confirmed_ids():
+        slower = slower_kind(float(np.max(tracker.settings.initiation.speed)), found.again)
+        if slower:
+            print_lines(f"no track: targets look slower than assumed: --targets {slower}")
+        elif note is not None and found.tall:
+            print_lines("no track: where targets are low, 'heights = [lowest, highest]' in the description says so")
 
 
 def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:
