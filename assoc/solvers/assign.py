@@ -256,9 +256,10 @@ def start_columns(
         found = tuples.min() if tuples.dtype.kind in "iu" else tuples.dtype
         raise InvalidInputError(f"start: expected tuples of whole numbers, 0 for a miss, got {found}")
     for s, column in enumerate(tuples.T):
-        used, counts = np.unique(column[column > 0], return_counts=True)
-        if (counts > 1).any():
-            which, count = used[counts.argmax()], counts.max()
+        used = np.sort(column[column > 0])
+        if (used[1:] == used[:-1]).any():
+            numbers, counts = np.unique(used, return_counts=True)
+            which, count = numbers[counts.argmax()], counts.max()
             raise InvalidInputError(
                 f"start: expected every measurement once; measurement {which} of sensor {s + 1} is in {count} tuples"
             )
@@ -267,10 +268,12 @@ def start_columns(
     packing = prepared.packing
     rows = np.where(packing.cols >= 0, packing.row_origin[packing.cols], -1) if packing.num_columns else packing.cols
     which = _indices_among(rows, np.where(tuples > 0, tuples + before - 1, -1))
-    # the cheaper one of tuples that are listed twice
     columns = np.flatnonzero(which >= 0)
-    columns = columns[np.argsort(packing.weights[columns], kind="stable")]
-    columns = np.sort(columns[np.unique(which[columns], return_index=True)[1]])
+    # the cheaper one of tuples that are listed twice is written last
+    columns = columns[np.argsort(packing.weights[columns], kind="stable")[::-1]]
+    found = np.full(len(tuples), -1)
+    found[which[columns]] = columns
+    columns = np.sort(found[found >= 0])
     cover = Cover.of(packing, columns)
     if cover.is_complete:
         return columns

@@ -106,8 +106,10 @@ def solver(name: str) -> SolveFunction:
 
 def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
     """Check and complete a solver's parameters; of an unknown name the message lists similar ones."""
+    if not values and name not in _REGISTERED:
+        return _defaults(name)
     kind = parameters(name)
-    known = [f.name for f in fields(kind)] if values else []  # type: ignore[arg-type]
+    known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
     for key in values:
         if key not in known:
             # associate and assign hand on what they do not know
@@ -119,6 +121,11 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         return kind(**values)
     except TypeError as error:
         raise InvalidInputError(f"parameters of solver {name!r}: {error}") from None
+
+
+@cache
+def _defaults(name: str) -> Parameters:
+    return _kind(name)()
 
 
 @cache
