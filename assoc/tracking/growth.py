@@ -16,8 +16,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.limits import refuse_of_tracks
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.costs.tracks.tuples import corrected, gate_of, require_states, track_pairs
-from assoc.filters.base import Filter
+from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
 from assoc.filters.batches import concatenate, placed
 from assoc.filters.merging import merged
 from assoc.tracking.progress import Progress
@@ -137,71 +136,47 @@ class Growth(ABC):
 
 
 class AtOnce(Growth):
-    """All sensors covered everything at one instant: predicted branches are updated sensor by sensor.
+    """All sensors covered everything at one instant: predicted branches are updated sensor by sensor."""
 
-    Where no sensor measures velocities only positions are, unless states are to be `whole`: those of the branches that
-    are left in the end follow.
-    """
-
-    def __init__(self, progress: Progress, whole: bool) -> None:
+    def __init__(self, progress: Progress) -> None:
         super().__init__(progress)
-        settings, states = progress.settings, self._before.states
-        self._whole = whole
         self.order = range(self.rows.shape[1])
-        self._filter, self._states = self._seen(states)
-        self._partly = self._filter is not settings.filter
+        self._states = self._before.states
         self._corrected: Callable[[Array], Any] = self._states.__getitem__
-        # states at the beginning, one batch after the other: where each branch comes from, and what it was corrected by
-        self._begun, self._sources = [states], self.origin
-        self._since = self.rows
-
-    def _seen(self, states: Any) -> tuple[Filter[Any], Any]:
-        """What says how well measurements fit, and what it reads of states."""
-        settings = self._progress.settings
-        if self._whole or any(getattr(sensor, "measures_velocity", True) for sensor in settings.sensors):
-            return settings.filter, states
-        return settings.filter.positions_alone(states)
+        self._begun: Any = None
 
     def pairs(self, s: int) -> Offers:
         """Pairs of the predicted branches and the measurements of sensor s."""
         settings, scan = self._progress.settings, self._progress.scan
         sensor, terms = settings.sensors[s], settings.terms
         gate = gate_of(sensor, settings.gate_probability)
-        pairs = track_pairs(self._filter, self._states, scan.measurements[s], sensor, gate)
+        pairs = track_pairs(settings.filter, self._states, scan.measurements[s], sensor, gate)
         count, most = len(pairs.track) + len(self._states), settings.max_tuples
         if count > most:
             raise refuse_of_tracks(count, most)
         self._corrected = pairs.correct
-        missed = misses_of(self._progress, self._states, s, self._partly)
+        missed = misses_of(self._progress, self._states, s)
         gain = pairs.log_likelihood + terms.detection[s] - scan.crowd(s, pairs.measurement)
         when = np.full(len(gain), scan.time)
         return Offers(missed, pairs.track, pairs.measurement, gain, when, self._no_births())
 
     def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
         """New targets, each with the state of its measurement."""
-        begun, fit, positions, score = self._progress.settings.births.singles(s, self._progress.scan, numbers)
-        self._begun.append(begun)
-        when = np.full(len(begun), self._progress.scan.time)
+        self._begun, fit, positions, score = self._progress.settings.births.singles(s, self._progress.scan, numbers)
+        when = np.full(len(score), self._progress.scan.time)
         return offers._replace(births=self._births(numbers[fit], s, np.lexsort(positions.T), when, score))
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
-        hit, begun = self._since[offers.branch], self._begun[-1]
-        hit[:, s] = offers.measurement + 1
-        self._since = np.concatenate([self._since, hit, np.zeros_like(offers.births.rows)])[kept]
-        first = sum(map(len, self._begun[:-1]))
-        new = np.arange(first, first + len(begun))
-        self._sources = np.concatenate([self._sources, self._sources[offers.branch], new])[kept]
-        _, positions = self._seen(begun)
-        sources = self._states.__getitem__, self._corrected, positions.__getitem__
-        lengths = len(self._states), len(offers.branch), len(begun)
-        self._states = _in_blocks(kept, lengths, lambda part, _, rows: sources[part](rows))
+        sources = self._states.__getitem__, self._corrected, self._begun.__getitem__
+        lengths = len(self._states), len(offers.branch), len(self._begun)
+        self._states = _in_blocks(kept, lengths, sources)
 
     def merge(self, offers: Offers, used: Array, weight: Array, stays: Array, order: Array) -> None:
-        """Merge branches (whole states) with their pairs in rows `used` (K,) by weights (K,); then add births in order.
+        """Merge branches with their pairs in rows `used` (K,) by weights (K,); then add births in order.
 
-        `stays` (B,) are the weights of the branches as they are. Nothing that precedes the sensor can follow.
+        `stays` (B,) are the weights of the branches as they are.
         """
-        count, begun = len(self._states), self._begun[-1][order]
+        count, begun = len(self._states), self._begun[order]
         changed = np.bincount(offers.branch[used], minlength=count) > 0
         old, same = np.flatnonzero(changed), np.flatnonzero(~changed)
         row = np.concatenate([np.searchsorted(old, offers.branch[used]), np.arange(len(old))])
@@ -211,19 +186,6 @@ class AtOnce(Growth):
         self._states = placed(count + len(new), [(old, mixed), (same, self._states[same]), (new, begun)])
         self.rows = np.concatenate([self.rows, offers.births.rows[order]])
         self.origin = np.append(self.origin, np.full(len(new), -1))
-
-    def _whole_states(self) -> Any:
-        """The states of all branches, corrected by all that belongs to them."""
-        settings, scan = self._progress.settings, self._progress.scan
-        if not self._partly:
-            return self._states
-        require_states(self._before.states, len(self._sources))
-
-        def grown(part: int, places: Array, rows: Array) -> Any:
-            begun = self._begun[part][rows]
-            return corrected(settings.filter, begun, scan.measurements, settings.sensors, self._since[places])[0]
-
-        return _in_blocks(self._sources, [len(states) for states in self._begun], grown)
 
     def crossings(self, taken: Array, by_place: bool) -> Offers | None:
         """New targets at which measurements cross."""
@@ -241,9 +203,8 @@ class AtOnce(Growth):
         ids = np.empty(len(best), dtype=np.int64)
         ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
-        begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
+        self._begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
         self._corrected = self._states.__getitem__
-        self._begun.append(begun)
         nothing = np.zeros(0, dtype=np.int64)
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
@@ -251,9 +212,8 @@ class AtOnce(Growth):
         """The branches at the end of the scan, which is the instant."""
         hit = np.asarray(self.rows.any(axis=1)) if seen is None else seen
         seen = np.where(hit, self._progress.scan.time, np.nan)
-        states = self._whole_states()
-        at_all = detected_or_in_view(self._progress, states, hit)
-        return Grown(states, seen, seen, at_all)
+        at_all = detected_or_in_view(self._progress, self._states, hit)
+        return Grown(self._states, seen, seen, at_all)
 
 
 class InOrder(Growth):
@@ -302,10 +262,10 @@ class InOrder(Growth):
         return Grown(self._timed.at_end(followed, self.origin), followed.first, last, at_all)
 
 
-def _in_blocks(kept: Array, lengths: Sequence[int], states: Callable[[int, Array, Array], Any]) -> Any:
+def _in_blocks(kept: Array, lengths: Sequence[int], sources: Sequence[Callable[[Array], Any]]) -> Any:
     """The states of rows `kept` (K,) of several batches one after the other, of these lengths, in blocks.
 
-    A block is `states` of the number of a batch, places in the result and rows of the batch; it stays in the cache.
+    A source makes the states of rows of its batch; a block stays in the cache.
     """
     ends = np.cumsum(lengths)
     which = np.searchsorted(ends, kept, side="right")
@@ -314,15 +274,15 @@ def _in_blocks(kept: Array, lengths: Sequence[int], states: Callable[[int, Array
         places = np.flatnonzero(which == part)
         blocks += [(part, places[k : k + _BLOCK]) for k in range(0, len(places), _BLOCK)]
     made = (
-        (places, states(part, places, kept[places] - (ends[part] - lengths[part])))
+        (places, sources[part](kept[places] - (ends[part] - lengths[part])))
         for part, places in blocks or [(0, np.zeros(0, dtype=np.int64))]
     )
     return placed(len(kept), made)
 
 
-def growth_of(progress: Progress, whole: bool = False) -> AtOnce | InOrder:
-    """The branches before the scan's first sensor; with states that are `whole` after each sensor, or in the end."""
-    return AtOnce(progress, whole) if progress.timed is None else InOrder(progress, progress.timed)
+def growth_of(progress: Progress) -> AtOnce | InOrder:
+    """The branches before the scan's first sensor."""
+    return AtOnce(progress) if progress.timed is None else InOrder(progress, progress.timed)
 
 
 class Scores:

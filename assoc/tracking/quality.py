@@ -159,22 +159,30 @@ class Qualities:
         order = np.argsort(named, kind="stable")
         in_order = np.append(named[order], -1)
         found: list[tuple[Array, Array, Array]] = []
-        stamps = scan.own_times()
-        for s, (z, ids, sensor) in enumerate(zip(scan.measurements, step.assigned, settings.sensors, strict=True)):
+        if before.time is None:
+            return
+        taken = []
+        for s, ids in enumerate(step.assigned):
             # of two under one id the last; -1 stands before the first
             index = np.searchsorted(in_order[:-1], ids, side="right") - 1
             number = np.flatnonzero(in_order[index] == ids)
             # from a platform that moved since the scan began: the prediction would be seen from elsewhere
-            if not len(number) or before.time is None or (scan.paths and scan.paths[s] is not None):
+            number = number[: 0 if scan.paths and scan.paths[s] is not None else None]
+            taken.append((number, order[index[number]]))
+        ends = np.cumsum([0, *(len(number) for number, _ in taken)])
+        lags = np.concatenate([own[number] for own, (number, _) in zip(scan.own_times(), taken, strict=True)])
+        rows = np.concatenate([row for _, row in taken])
+        # of all sensors together: most of the time of a small scene goes into calls
+        states = predict_each(settings.filter, known.states[rows], lags - before.time) if len(rows) else known.states
+        for s, (sensor, (number, _)) in enumerate(zip(settings.sensors, taken, strict=True)):
+            if not len(number):
                 continue
-            rows = order[index[number]]
-            states = predict_each(settings.filter, known.states[rows], stamps[s][number] - before.time)
-            expected = settings.filter.expected(states, sensor)
-            off = sensor.residual(z[number], expected.mean)
+            expected = settings.filter.expected(states[ends[s] : ends[s + 1]], sensor)
+            off = sensor.residual(scan.measurements[s][number], expected.mean)
             square = (off * np.linalg.solve(expected.covariance, off[:, :, None])[:, :, 0]).sum(axis=1)
             # beyond the gate it was another branch that took the measurement, with another past
             inside = square <= gate_of(sensor, settings.gate_probability)
-            taken = ids[number[inside]]
-            found.append((taken, square[inside], np.full(len(taken), float(sensor.dim))))
+            ids = step.assigned[s][number[inside]]
+            found.append((ids, square[inside], np.full(len(ids), float(sensor.dim))))
         if found:
             self._take(*(np.concatenate(column) for column in zip(*found, strict=True)))

@@ -128,11 +128,6 @@ class TrackerSettings:
         return Views(self.sensors, self.filter.motion.position, self.by_range)
 
     @cached_property
-    def views_of_positions(self) -> Views:
-        """What the sensors can see of tracks of which only positions are known (`Filter.positions_alone`)."""
-        return Views(self.sensors, range(len(self.filter.motion.position)), self.by_range)
-
-    @cached_property
     def births(self) -> NewTracks:
         """How tracks begin."""
         limits = {"gate_probability": self.gate_probability, "max_tuples": self.max_tuples}

@@ -142,7 +142,7 @@ class JointProbabilistic(Method):
     def associate(self, progress: Progress) -> Association:
         """Process sensor after sensor; measurements that probably belong to no track start new ones."""
         tracks, sizes = progress.state.tracks, progress.scan.sizes
-        growth, scores, parts = growth_of(progress, whole=True), Scores(progress), _Parts.of(len(tracks))
+        growth, scores, parts = growth_of(progress), Scores(progress), _Parts.of(len(tracks))
         # log odds of existence, and what they are ahead of the scores
         odds, ahead = tracks.existence, tracks.existence - tracks.score
         seen = np.zeros(len(tracks), dtype=np.bool_)

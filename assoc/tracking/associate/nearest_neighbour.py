@@ -36,7 +36,7 @@ class NearestNeighbour(Method):
     def associate(self, progress: Progress) -> Association:
         """Process sensor after sensor; unused measurements of one start tracks that the next may confirm."""
         sizes = progress.scan.sizes
-        growth, scores = growth_of(progress, whole=True), Scores(progress)
+        growth, scores = growth_of(progress), Scores(progress)
         for s in growth.order:
             offers, count = growth.pairs(s), len(scores.now)
             chosen = self._choose(progress, offers, scores.now, int(sizes[s]))

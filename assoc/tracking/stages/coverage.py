@@ -93,10 +93,9 @@ def misses(progress: Progress, states: Any) -> Array:
     return log_missed(progress.settings.terms.miss, progress.settings.views.shares(states))
 
 
-def misses_of(progress: Progress, states: Any, s: int, positions: bool = False) -> Array:
-    """`misses` of sensor s alone, (T,); of states that are ``positions`` alone if so said."""
-    views = progress.settings.views_of_positions if positions else progress.settings.views
-    share = views.shares(states, slice(s, s + 1))[:, 0]
+def misses_of(progress: Progress, states: Any, s: int) -> Array:
+    """`misses` of sensor s alone, (T,)."""
+    share = progress.settings.views.shares(states, slice(s, s + 1))[:, 0]
     return log_missed(progress.settings.terms.miss[s], share)
 
 
