@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from assoc.costs.views import BANDS, bands_of
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
 from assoc.scene.scan import Scan
-from assoc.sensors import PositionSensor
+from assoc.sensors import PositionSensor, Radar2D
 from assoc.sensors.base import wrap_angle
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
@@ -201,7 +202,7 @@ def test_density_of_clutter_by_place():
     patch, alone = empty, empty
     for k in range(30):
         plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, 1e3, (1, 2))])
-        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full(6, 0.5)])
+        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full((6, 2), 0.5)])
         alone = alone.after([sensor], Scan(k, float(k), (rng.normal(25.0, 1.0, (1, 2)),)), turns)
     there = Scan(30, 30.0, (np.array([[25.0, 25.0], [700.0, 700.0]]),))
     inside, outside = patch.used_and_found([sensor], there)[0][0]
@@ -245,6 +246,38 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     for k, z in enumerate(plots):
         tracker.step(float(k), [z])
     assert sum(track.reported for track in tracker.tracks) >= 11
+
+
+def test_what_stands_is_no_place_though_its_tracks_predict_badly():
+    """Ships at a pier, by a filter that lets them manoeuvre: what comes back to where it was is no clutter."""
+    for seed in range(3):
+        sensor, plots = group(seed, 0.0, 60.0, 15.0)
+        shown = []
+        for adapt in (True, False):
+            options = {"adapt": adapt, "initiation": Initiation(speed=10.0)}
+            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), **options)
+            for k, z in enumerate(plots):
+                tracker.step(10.0 * k, [z])
+            shown.append(sum(track.reported for track in tracker.tracks))
+        assert shown[0] >= shown[1] - 1 and shown[1] >= 10
+
+
+@pytest.mark.parametrize("middle", [0.0, np.pi])
+def test_density_of_plots_of_what_stands(middle):
+    """That of a normal distribution about the mean of the plots so far, also where azimuths begin again."""
+    sensor = Radar2D(
+        position=np.zeros(3), noise=[10.0, 1e-3], detection_probability=0.8, false_alarm_rate=2.0,
+        field_of_view=[[0.0, 20e3], [-np.pi, np.pi]],
+    )  # fmt: skip
+    rng, known, at = np.random.default_rng(2), ClutterMap.empty([sensor]), np.array([5e3, middle])
+    for k in range(10):
+        z = at + 0.05 * rng.normal(0.0, [10.0, 1e-3], (1, 2))
+        z[:, 1] = wrap_angle(z[:, 1])
+        known = known.after([sensor], Scan(k, float(k), (z,)), np.ones(1))
+    off = np.array([[0.0, 0.0], [15.0, 1e-3], [0.0, 0.1]])
+    z = np.stack([off[:, 0] + at[0], wrap_angle(off[:, 1] + at[1])], axis=1)
+    expected = 0.8 * multivariate_normal([0.0, 0.0], np.diag([100.0, 1e-6]) * 1.1).pdf(off) / (2.0 / sensor.volume)
+    assert known.standing(sensor, 0, z) == pytest.approx(expected, rel=0.05)
 
 
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():

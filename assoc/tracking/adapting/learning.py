@@ -143,14 +143,14 @@ def learn(progress: Progress) -> Progress:
 
 
 def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> list[Array]:
-    """How much better places predicted each measurement than predicted tracks did, (n_s,) for each sensor.
+    """How much better places predicted each measurement than predicted tracks, or targets that stand, (n_s, 2) each.
 
-    Differences of log likelihoods, limited; 0 outside of places, but for the first turns. Both are intensities of
+    Differences of log likelihoods, limited; 0 outside of places, but for the first turns. All are intensities of
     Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
     """
     settings, clutter = progress.settings, progress.state.clutter
     assert clutter is not None
-    votes = [np.zeros(len(z)) for z in progress.crowds]
+    votes = [np.zeros((len(z), 2)) for z in progress.crowds]
     for s, (sensor, found) in enumerate(zip(settings.sensors, progress.crowds, strict=True)):
         # in the first turns tracks may well predict what no place does yet
         rows = np.flatnonzero(found) if clutter.clock[s] >= YOUNG - 1.0 else np.arange(len(found))
@@ -168,7 +168,9 @@ def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> 
             np.add.at(dense, near, density * np.exp(-0.5 * square - size))
         crowd = np.count_nonzero(found)
         more = (found[rows] > 0.0) * (sensor.detection_probability * there[:, s].sum() / max(crowd, 1) - 1.0)
-        votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -ONE_SAYS, ONE_SAYS)
+        stand = clutter.standing(progress.work.settings.sensors[s], s, z)
+        others = np.stack([np.log1p(dense) - more, np.log1p(stand)], axis=1)
+        votes[s][rows] = np.clip(found[rows, None] - others, -ONE_SAYS, ONE_SAYS)
     return votes
 
 

@@ -4,9 +4,10 @@ The last plots of each sensor are kept. Of those near a measurement, the nearest
 only the others show clutter, and the density follows from the distance within which there are six of them, in units of
 the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
-And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), both by what
-came before: where targets stand or circle, each is near its own track. In the first turns nobody can be sure, and what
-may be a place is in doubt unless tracks have predicted its plots better.
+And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), and than
+targets that stand would, each by what came before: where targets circle, each is near its own track, and what stands
+comes back to where it was, tracked or not, while clutter lies anywhere in its place. In the first turns nobody can be
+sure, and what may be a place is in doubt unless either has predicted its plots better.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ ONE_SAYS = 0.5 * NEEDED
 """Largest vote: no measurement alone shows that a place predicts better than tracks, it may be of a new target."""
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
+# no two plots of one target are so far apart, in units of the noise
+_FAR = 8.0
 
 
 class ClutterMap(NamedTuple):
@@ -54,14 +57,14 @@ class ClutterMap(NamedTuple):
     clock: Array
     """Turns of each sensor so far, (S,)."""
     votes: tuple[Array, ...]
-    """Evidence of each plot that its place predicted it better than the tracks did; (n_s,) each."""
+    """Evidence of each plot that its place predicted it better than tracks, and what stands, did; (n_s, 2) each."""
 
     @staticmethod
     def empty(sensors: Sequence[Sensor]) -> ClutterMap:
         """No plots."""
         none = [np.zeros((0, sensor.position_part.dim)) for sensor in sensors]
         nothing = tuple(np.zeros(0) for _ in sensors)
-        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), nothing)
+        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), tuple(np.zeros((0, 2)) for _ in sensors))
 
     def arrays(self) -> dict[str, Array]:
         """Everything as plain arrays."""
@@ -97,15 +100,39 @@ class ClutterMap(NamedTuple):
         used, every = zip(*found, strict=True)
         return used, every
 
+    def standing(self, sensor: Sensor, s: int, at: Array) -> Array:
+        """Density of plots of targets that stand, at measurements of sensor s, relative to its false alarms, (n,).
+
+        Each plot so far may have been of one, that stands where the plots near by are on average.
+        """
+        turns, part, places = min(round(float(self.clock[s])), _TURNS), sensor.position_part, self.places[s]
+        if not len(at) or not len(places) or turns < 1:
+            return np.zeros(len(at))
+        around, z, most = _around(sensor), _places(sensor, at), min(_LOOKED_AT, len(places))
+        tree = cKDTree(places, boxsize=around)
+        nearest = [*range(1, most + 1)]
+        apart, near = (np.asarray(found) for found in tree.query(z, nearest, distance_upper_bound=_FAR))
+        who, which = np.nonzero(np.isfinite(apart))
+        some, row = np.unique(near[who, which], return_inverse=True)
+        apart, mates = (np.asarray(found) for found in tree.query(places[some], nearest))
+        weights = np.exp(-0.25 * apart**2)
+        count = weights.sum(axis=1)
+        mean = (weights[:, :, None] * _off(places[mates], places[some][:, None], around)).sum(axis=1) / count[:, None]
+        off = _off(z[who], (places[some] + mean)[row], around)
+        spread = 1.0 + 1.0 / count[row]
+        usual = part.false_alarm_rate / part.volume * float(np.prod(_units(sensor))) * turns
+        density = (2.0 * math.pi * spread) ** (-0.5 * part.dim) * np.exp(-0.5 * (off**2).sum(axis=1) / spread)
+        return np.bincount(who, density, len(at)) * sensor.detection_probability / usual
+
     def after(
         self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None
     ) -> ClutterMap:
         """The map after a scan in which each sensor made so many turns, (S,).
 
-        `votes` (n_s,) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
+        `votes` (n_s, 2) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
         """
         kept: list[tuple[Array, ...]] = []
-        votes = [np.zeros(len(z)) for z in scan.measurements] if votes is None else votes
+        votes = [np.zeros((len(z), 2)) for z in scan.measurements] if votes is None else votes
         for s, sensor in enumerate(sensors):
             fresh = np.arange(len(votes[s]) if turns[s] > 0.0 else 0)
             when = np.concatenate([self.clocks[s], np.full(len(fresh), self.clock[s])])
@@ -118,6 +145,19 @@ class ClutterMap(NamedTuple):
 
 def _units(sensor: Sensor) -> Array:
     return np.sqrt(np.diagonal(sensor.position_part.covariance))
+
+
+def _around(sensor: Sensor) -> Any:
+    """After how many units each component comes back, 0: never."""
+    angular = sensor.position_part.angular
+    pairs = zip(_units(sensor), angular, strict=False)
+    return [(2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in pairs][: sensor.position_part.dim]
+
+
+def _off(one: Array, other: Array, around: Any) -> Array:
+    """Differences of places, the short way round."""
+    off, period = one - other, np.array(around)
+    return np.asarray(off - period * np.rint(off / np.where(period > 0.0, period, np.inf)))
 
 
 def _places(sensor: Sensor, measured: Array) -> Array:
@@ -139,10 +179,7 @@ def _densities(
     age, turns = np.rint(now - clocks), max(before, 1)
     if len(places) <= _OTHERS or not n:
         return result, result
-    units, d = _units(sensor), part.dim
-    around: Any = [
-        (2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in zip(units, part.angular, strict=False)
-    ]
+    units, d, around = _units(sensor), part.dim, _around(sensor)
     # volume of a ball of radius 1, and false alarms there in these turns
     ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
     usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
@@ -164,16 +201,16 @@ def _densities(
     dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
     radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
     # the volume of an ellipsoid as they lie: many places are flat
-    off = places[near] - at[dense, None]
-    period = np.array(around)[:d]
-    off -= period * np.rint(off / np.where(period > 0.0, period, np.inf))
+    off = _off(places[near], at[dense, None], around)
     spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
     size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
     ratio = (last + 1) / (size * usual)
     result[dense] = np.where(ratio > least, np.log(np.maximum(ratio, 1.0)), 0.0)
     if before >= YOUNG:
-        used[dense] = (votes[near] * (clocks[near] >= YOUNG - 1.0)).sum(axis=1) > NEEDED
+        # of the first turns tracks know too little, but what stands shows from the second on
+        counts = np.stack([clocks[near] >= YOUNG - 1.0, np.ones(near.shape, dtype=np.bool_)], axis=2)
+        used[dense] = ((votes[near] * counts).sum(axis=1) > NEEDED).all(axis=1)
     else:
         # of what is about the place, nothing: targets that fly alone are predicted well, and near by
-        used[dense] = (votes[near] * within).sum(axis=1) >= 0.0
+        used[dense] = ((votes[near] * within[:, :, None]).sum(axis=1) >= 0.0).all(axis=1)
     return np.where(used, result, 0.0), result
