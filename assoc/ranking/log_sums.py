@@ -42,13 +42,13 @@ def swept_in_logarithms(steps: Ints, log_weights: Floats, log_free: Floats, prob
                 rest = rest[: len(table)]
             elif kind == CLOSE:
                 off, on = _halves(len(table), bits)
-                alone[what] = np.exp(_sum(log_free[what] + table[off] + rest) - total)
+                alone[what] = np.exp(min(_sum(log_free[what] + table[off] + rest) - total, 0.0))
                 completed = np.empty(len(table))
                 completed[off], completed[on] = log_free[what] + rest, rest
                 rest = completed
             elif kind != KEEP:
                 off, on = _halves(len(table), bits)
-                probability[what] = np.exp(_sum(log_weights[what] + table[off] + rest[on]) - total)
+                probability[what] = np.exp(min(_sum(log_weights[what] + table[off] + rest[on]) - total, 0.0))
                 rest = rest.copy()
                 rest[off] = np.logaddexp(rest[off], log_weights[what] + rest[on])
 

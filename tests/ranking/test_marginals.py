@@ -93,6 +93,11 @@ def test_sums_whose_weights_underflow_are_done_in_logarithms():
     found = marginals(problem)
     assert np.abs(found.probability - true_of(found, problem)).max() < 1e-8
     assert found.error.max() < 1e-5
+    # of logarithms of 1e290 rounding leaves nothing below 1: no probability is above it
+    for number in (3258, 12801, 13874):
+        problem = draw(9902, number).problem
+        found = marginals(problem)
+        assert np.all(np.abs(found.probability - true_of(found, problem)) <= found.error + 1e-8)
 
 
 def test_sums_in_logarithms_are_those_of_the_usual_sweep(monkeypatch):
