@@ -1,12 +1,15 @@
 """Plots as people have them: one file of plots, spoiled in each way, gives the plots of the clean one, and says so."""
 
 import gzip
+from datetime import datetime
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from assoc import track
 from assoc.recordings import read_plots
+from assoc.recordings.flights.table import seconds_of
 from tests.recordings.common import circling
 
 
@@ -64,6 +67,14 @@ def test_times_in_milliseconds_of_the_day_or_of_an_epoch(rows, tmp_path, step, s
     found = read(tmp_path, table(told, f"{head},range,bearing,squawk,fl"))
     np.testing.assert_allclose(found.times - start, [row[0] for row in rows], atol=2e-3)
     assert any("steps of" in what for what in found.notes) == (step < 1 and "ms" not in head)
+
+
+def test_dates_far_away_are_seconds_as_others_are():
+    """Nanoseconds of 64 bits end in the year 2262: pandas raised an error of its own."""
+    dates = pd.Series(["2024-01-01 00:00:00.5", "3024-01-01T02:00:00+02:00", "soon"])
+    there = "2024-01-01 00:00:00.5+00:00", dates[1]
+    seconds = [datetime.fromisoformat(date).timestamp() for date in there]
+    assert seconds_of(dates)[:2].tolist() == seconds and np.isnan(seconds_of(dates)[2])
 
 
 def test_seconds_of_some_days_are_no_milliseconds(rows, tmp_path):

@@ -163,4 +163,6 @@ def seconds_of(column: pd.Series) -> Array:
         moments = pd.to_datetime(column, format=None if dates else "ISO8601", utc=True, errors="coerce")
     except (ValueError, TypeError, OverflowError):  # what errors="coerce" does not catch
         return np.full(len(column), np.nan)
-    return np.asarray(((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)).to_numpy(dtype=np.float64))
+    # in microseconds: nanoseconds end in the year 2262
+    exact = moments.dt.tz_convert(None).to_numpy(dtype="datetime64[us]")
+    return np.asarray((exact - np.datetime64(0, "us")) / np.timedelta64(1, "s"), dtype=np.float64)
