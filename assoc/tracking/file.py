@@ -198,6 +198,11 @@ def _estimates(model: Estimates, saved: Saved) -> Estimates:
         saved.require((saved[name] > 1.0 / _HUGE).all(), name, f"numbers above {1.0 / _HUGE:g}")
     saved.require((saved["used"][:, DETECTION] < 1).all(), "used", "probabilities below 1 in its second column")
     saved.require((saved["bands"] < 1).all(), "bands", "probabilities below 1")
+    for hits, dwells in (("hits", "dwells"), ("open_hits", "open_dwells")):
+        good = (saved[hits] >= 0).all() and (saved[hits] <= saved[dwells] + 1e-6).all()
+        saved.require(good, hits, f"numbers from 0 to those of {dwells}")
+    for name in ("alarms", "turns"):
+        saved.require((saved[name] >= 0).all(), name, "no number below 0")
     saved.require((np.linalg.eigvalsh(saved["weights"]) > 0).all(), "weights", "a positive definite matrix")
     arrays: dict[str, Any] = {**saved, "manoeuvres": float(saved["manoeuvres"])}
     return Estimates(**arrays)

@@ -100,6 +100,19 @@ def test_numbers_too_large_for_any_estimate_are_named(field, tmp_path):
         TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
 
 
+@pytest.mark.parametrize(("field", "lie"), [("hits", 1e3), ("open_hits", 1e3), ("alarms", -1e3), ("turns", -1e3)])
+def test_counts_that_cannot_be_are_named(field, lie, tmp_path):
+    """A rate of a negative number, or of more hits than dwells, has no standard deviation."""
+    tracker = TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True)
+    stepped(tracker, SCENE, 0, SCANS)
+    arrays = {key: np.array(value) for key, value in arrays_of(tracker).items()}
+    assert arrays[f"estimates.{field}"].size
+    arrays[f"estimates.{field}"] += lie
+    save_npz(tmp_path / "bad.npz", FORMAT, VERSION, arrays)
+    with pytest.raises(InvalidInputError, match=f"'estimates.{field}'.*expected (no )?number"):
+        TRACKERS["multi-sensor"].for_scene(SCENE, adapt=True).restore(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize("field", ["estimates.ids", "unresolved.confirmed", "echoes.hidden"])
 def test_ids_that_do_not_ascend_are_named(field, tmp_path):
     """They are searched for by halving."""
