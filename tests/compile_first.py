@@ -23,13 +23,13 @@ def _solvers() -> None:
 def _all_but_solvers() -> None:
     from assoc.costs import build_problem
     from assoc.simulation import simulate
-    from assoc.tracking.warm_up import follow_all, rank
+    from assoc.tracking.warm_up import follow_all, rank_all
 
     # costs first: what trackers and rankings need of the solvers is on disk by then
     for name in ("three-radar", "bearing-only"):
         build_problem(simulate(name, 3, scans=2), 0)
     follow_all()
-    rank()
+    rank_all()
 
 
 if __name__ == "__main__":

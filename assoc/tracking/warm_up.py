@@ -14,8 +14,9 @@ from assoc._system.interpreted import compiled_only
 from assoc._system.wrong_types import explains_wrong_types
 from assoc.costs import build_problem
 from assoc.errors import AssocWarning
+from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking.kbest import kbest
+from assoc.ranking.kbest import kbest, rank
 from assoc.ranking.marginals import marginals
 from assoc.ranking.pairs.messages import bound_pairs
 from assoc.scene.scene import Scene
@@ -56,10 +57,10 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     of_solvers.warm_up(solvers)
     if solvers is None:
         # another process ranks meanwhile
-        compile_ahead(bound_pairs, rank, anyway=True)
+        compile_ahead(bound_pairs, rank_all, anyway=True)
         follow_all()
         wait_for_kernels()
-        rank()
+        rank_all()
     return time.perf_counter() - started
 
 
@@ -83,8 +84,8 @@ def follow_all() -> None:
                 follow(TRACKERS[name].for_scene(scene), scene, False)
 
 
-def rank() -> None:
-    """Rank and weigh matrices, with and without all of their rows matched, and a scan."""
+def rank_all() -> None:
+    """Rank and weigh matrices, with and without all of their rows matched, and a scan; branch for three lists."""
     rng = np.random.default_rng(3)
     # the last is too wide for exact sums
     costs, small, wide = rng.normal(size=(12, 12)), np.zeros((2, 3)), rng.normal(size=(50, 50))
@@ -100,6 +101,8 @@ def rank() -> None:
         ):
             kbest(problem, 4)
             marginals(problem, time_limit=1.0)
+        # at once, which harder ones do after some thousands of steps
+        rank(AssignmentProblem.from_dense(rng.normal(size=(5, 5, 5))), 20, Run(0), budget=0)
 
 
 def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:

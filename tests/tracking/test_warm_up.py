@@ -54,6 +54,7 @@ points = [rng.uniform(0, 60, (50, 2)) for _ in range(8)]
 for problem in (rng.random((30, 40)), rng.normal(size=(70, 70)), assoc.build_problem(scenes[4], 1)):
     assoc.kbest(problem, 5)
     assoc.marginals(problem, time_limit=1.0)
+assoc.kbest(assoc.AssignmentProblem.from_dense(rng.normal(size=(6, 6, 6))), 200)
 for words in ({}, {"memory": 2, "predict": True}, {"divisions": 2.0, "merges": 2.0}):
     assoc.link(points, 3.0, **words)
 if loaded()[0] != before:
