@@ -72,6 +72,20 @@ def test_echoes_are_found_and_not_shown(name, kind, monkeypatch):
     assert reported(scene, name)[1][25:].mean() > 8.5
 
 
+@pytest.mark.parametrize("name", ["multi-sensor", "mht"])
+def test_short_echoes_are_more_than_chance_brings(name):
+    """Also where a tracker knows of a track by its second plot alone; without echoes there are as many as by chance."""
+    counted = []
+    for echo in ([0.0, 0.07, 0.0], None):
+        known = []
+        for seed in range(3):
+            rng = np.random.default_rng(seed)
+            known.append(reported(scene_of(flights(rng), rng, echo, share=0.25), name)[0].state.echoes)
+        short, chance = (sum(getattr(each, what)[0, RANGE] for each in known) for what in ("short", "expected"))
+        counted.append((short - chance, np.sqrt(chance)))
+    assert counted[0][0] > 20.0 and abs(counted[1][0]) < 3.0 * counted[1][1] + 1.0
+
+
 @pytest.mark.parametrize("gap", [[0.0, 0.07, 0.0], [600.0, 0.0, 0.0], [2000.0, 0.0, 0.0]])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_targets_abreast_and_in_trail_are_shown(gap, seed):

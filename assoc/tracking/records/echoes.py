@@ -41,7 +41,7 @@ class Echoes(NamedTuple):
     counts: Array
     """Of the sensor's dwells with a plot of the target: hits, misses; detections without one; squared distance in the
     shared component in variances, summed over the hits; how often a target would be there by chance, relative to an
-    echo; whether the pair was formed when the first was new; (K, 6)."""
+    echo; detections of the first if the pair was formed when it was new, else 0; (K, 6)."""
     hidden: Array
     """Ids of tracks that are echoes rather than targets, ascending, int64 (H,)."""
     short: Array

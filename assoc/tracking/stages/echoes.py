@@ -57,7 +57,7 @@ def hide_echoes(progress: Progress) -> Progress:
 def _living(echoes: Echoes, ids: Array, shown: Array) -> Echoes:
     """The pairs of tracks that are left; those that ended without being shown are counted."""
     left, short = np.isin(echoes.ids, ids), echoes.short.copy()
-    tied = (echoes.counts[:, FRESH] > 0.0) & (echoes.counts[:, HITS] > 1.0)
+    tied = (echoes.counts[:, FRESH] > 0.0) & (echoes.counts[:, HITS] + echoes.counts[:, FRESH] > 2.0)
     ended = ~left[:, 0] & tied & ~np.isin(echoes.ids[:, 0], shown)
     once = np.unique(np.column_stack([echoes.ids[ended, 0], echoes.kinds[ended]]), axis=0)
     np.add.at(short, tuple(once[:, 1:].T), 1.0)
@@ -115,8 +115,8 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         around = _near(values, ours, theirs[tracks.confirmed[here]], _ROUND * spread[axis], sensor.angular[axis])[0]
         crowd = np.maximum((np.bincount(around, minlength=len(young)) - 1.0) / (2.0 * _ROUND), density)
         crowded = math.sqrt(2.0 * math.pi) * crowd >= 1.0
-        # twice in a row, and other plots than false alarms are shown
-        often = np.count_nonzero(fresh[young] & ~crowded) * (2.0 * _APART * density) ** 2
+        # twice in a row, or once where tracks begin with their second plot; and others than false alarms are shown
+        once, new_hits = 2.0 * _APART * density, tracks.hits[young[fresh[young] & ~crowded]]
         chance, crowded = np.full(len(first), math.sqrt(2.0 * math.pi) * density), crowded[first]
         first, second = young[first], here[second]
         off = _apart(progress, s, plots[first, s] - 1, plots[second, s] - 1)[0]
@@ -124,15 +124,19 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         if axis == AZIMUTH:
             # an echo is a little farther, at any scale: its detour is as likely between 1 and 2 km as between 2 and 4
             chance *= np.maximum(off[:, RANGE], 0.0) / width[RANGE] * math.log(width[RANGE] / spread[RANGE])
-            often *= (1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()) ** 2
+            once *= 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
         else:
             away = np.abs(away)
-        expected[s, axis] += often
+        expected[s, axis] += (once ** np.where(new_hits > 1, 1.0, 2.0)).sum()
         ids = np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1)
         new = (away > _APART) & (square < _APART**2) & ~crowded & (first != second) & ~_known(echoes, ids, s, axis)
         counts = np.zeros((np.count_nonzero(new), 6))
         counts[:, HITS], counts[:, STRAYS] = 1.0, alone[first[new]]
-        counts[:, SQUARE], counts[:, CHANCE], counts[:, FRESH] = square[new], chance[new], fresh[first[new]]
+        counts[:, SQUARE], counts[:, CHANCE], counts[:, FRESH] = (
+            square[new],
+            chance[new],
+            (fresh * tracks.hits)[first[new]],
+        )
         echoes = echoes._replace(
             ids=np.concatenate([echoes.ids, ids[new]]),
             kinds=np.concatenate([echoes.kinds, np.tile([s, axis], (len(counts), 1))]),
