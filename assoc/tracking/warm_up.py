@@ -12,7 +12,7 @@ import numpy as np
 from assoc._system.compiled import compile_ahead, wait_for_kernels
 from assoc._system.interpreted import compiled_only
 from assoc._system.wrong_types import explains_wrong_types
-from assoc.costs import build_problem
+from assoc.costs import build_problem, positions_and_covariances
 from assoc.errors import AssocWarning
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
@@ -85,7 +85,7 @@ def follow_all() -> None:
 
 
 def rank_all() -> None:
-    """Rank and weigh matrices, with and without all of their rows matched, and a scan; branch for three lists."""
+    """Rank and weigh matrices, with and without all rows matched, and a scan; branch for three lists; arrival times."""
     rng = np.random.default_rng(3)
     # the last is too wide for exact sums
     costs, small, wide = rng.normal(size=(12, 12)), np.zeros((2, 3)), rng.normal(size=(50, 50))
@@ -103,6 +103,9 @@ def rank_all() -> None:
             marginals(problem, time_limit=1.0)
         # at once, which harder ones do after some thousands of steps
         rank(AssignmentProblem.from_dense(rng.normal(size=(5, 5, 5))), 20, Run(0), budget=0)
+        for depth, density in ((5e3, None), (5e3, "auto"), (0.0, None)):
+            heard = simulate("arrival-times", 1, scans=1, stations=10, depth=depth)
+            positions_and_covariances(heard, 0, build_problem(heard, 0, target_density=density).tuples[:9])
 
 
 def follow(tracker: Tracker, scene: Scene, own_times: bool) -> None:

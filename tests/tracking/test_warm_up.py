@@ -10,6 +10,7 @@ _PROGRAM = """
 import assoc, warnings
 import numpy as np
 from assoc._system.compiled import loaded
+from assoc.costs import emission_times, positions_and_covariances
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LatePlots
 from assoc.tracking.filter_choice import FILTERS, make_filter
@@ -57,8 +58,14 @@ for problem in (rng.random((30, 40)), rng.normal(size=(70, 70)), assoc.build_pro
 assoc.kbest(assoc.AssignmentProblem.from_dense(rng.normal(size=(6, 6, 6))), 200)
 for words in ({}, {"memory": 2, "predict": True}, {"divisions": 2.0, "merges": 2.0}):
     assoc.link(points, 3.0, **words)
+for depth in (20e3, 0.0):
+    heard = simulate("arrival-times", 3, scans=1, stations=12, depth=depth)
+    for density in (None, "auto"):
+        tuples = assoc.build_problem(heard, 0, target_density=density).tuples
+        emission_times(heard, 0, tuples)
+        positions_and_covariances(heard, 0, tuples)
 if loaded()[0] != before:
-    print("rankings, links and filters", loaded()[0] - before)
+    print("rankings, links, filters and arrival times", loaded()[0] - before)
 """
 
 
