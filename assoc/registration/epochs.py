@@ -27,8 +27,8 @@ def scene_epochs(scene: Scene, *, moving: bool) -> list[Epoch]:
     """Epochs of a scene; with `moving` the velocities of targets too, which clocks' biases need.
 
     Where measurements have their own times an epoch holds as many scans as the slowest antenna needs for a turn, and of
-    them the measurements whose target's velocity is known: these can be moved to the epoch's middle. Late measurements,
-    from before the previous scan, are left out.
+    them the measurements whose target's velocity is known: these can be moved to the epoch's middle. Of a faster
+    antenna those of one turn are taken, about the middle. Late measurements, from before the previous scan, are not.
     """
     groups = scan_groups(scene)
     if scene.measurement_times is None and len(groups) == scene.num_scans:
@@ -40,6 +40,8 @@ def scene_epochs(scene: Scene, *, moving: bool) -> list[Epoch]:
         ]
     velocities = scene_velocities(scene)
     epochs = []
+    interval = float(np.median(np.diff(scene.times))) if scene.num_scans > 1 else math.inf
+    turns = [interval * scans if scans > 1 else math.inf for scans in _scans_of_turns(scene)]
     for group in groups:
         parts = [(scene.measurements[k], scene.scan(k).own_times(), velocities[k]) for k in group]
         begin = float(scene.times[group[0] - 1]) if group[0] else -math.inf
@@ -55,6 +57,8 @@ def scene_epochs(scene: Scene, *, moving: bool) -> list[Epoch]:
         for s, sensor in enumerate(scene.sensors):
             # a bearing has no velocity: that of its tuple is used
             known = ~np.isnan(speeds[s][:, 0]) | isinstance(sensor, BearingSensor)
+            # of two plots of a target the tuple would take the one that fits better, and residuals be too small
+            known &= np.abs(times[s] - middle) <= 0.5 * turns[s]
             measured[s], times[s], speeds[s] = measured[s][known], times[s][known], speeds[s][known]
         epochs.append(Epoch(middle, measured, times, speeds))
     return epochs
@@ -62,12 +66,16 @@ def scene_epochs(scene: Scene, *, moving: bool) -> list[Epoch]:
 
 def scan_groups(scene: Scene) -> list[list[int]]:
     """Groups of scans in which every sensor covers all directions: single, or as many as the slowest turn takes."""
-    together = 1
-    if scene.sectors is not None:
-        widths = scene.sectors[..., 1] - scene.sectors[..., 0]
-        turning = [float(width[width > 0].mean()) for width in widths.T if (width > 0).any()]
-        together = max((math.ceil(2.0 * math.pi / width - 0.05) for width in turning), default=1)
+    together = max((math.ceil(scans - 0.05) for scans in _scans_of_turns(scene)), default=1)
     return [list(range(k, min(k + together, scene.num_scans))) for k in range(0, scene.num_scans, together)]
+
+
+def _scans_of_turns(scene: Scene) -> list[float]:
+    """Scans that each sensor needs for all directions; 1 where no sectors are known."""
+    if scene.sectors is None:
+        return [1.0] * len(scene.sensors)
+    widths = scene.sectors[..., 1] - scene.sectors[..., 0]
+    return [2.0 * math.pi / float(width[width > 0].mean()) if (width > 0).any() else 1.0 for width in widths.T]
 
 
 def scene_velocities(scene: Scene) -> list[list[Array]]:

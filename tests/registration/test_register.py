@@ -16,6 +16,7 @@ from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
 from assoc.registration.result import describe
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
+from assoc.simulation import simulate
 from assoc.simulation.radars import on_circle
 from assoc.simulation.turning import Path, observe_in_turns
 from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
@@ -324,3 +325,9 @@ def test_gain_of_ranges(gain):
         register(scene).correct(scene).measurements[0][0][:, 0] - scene_of(radars(3), seed=4).measurements[0][0][:, 0]
     )
     assert np.abs(left).max() < 0.5 * np.abs(short).max()
+
+
+def test_residuals_are_those_of_the_noise_where_an_antenna_turns_twice_as_fast():
+    """Its better fitting one of two plots would leave residuals, and deviations told, that are too small."""
+    scenes = [simulate("rotating-radars", seed, turns="4,8", aircraft=20, duration=160.0) for seed in (3, 4, 5)]
+    assert np.mean([register(scene).noise for scene in scenes]) == pytest.approx(1.0, abs=0.06)
