@@ -29,6 +29,8 @@ from assoc.packing.run import Outcome
 
 # share of the gap that rows outside of regions may cost
 _OUTSIDE = 0.02
+# share of what is left that regions keep, above which they are too hard: they would only become harder
+_HARD = 0.5
 # share of the rows above which regions are not worth a search
 _MOST = 0.5
 # rounds of growth: a region grows by a column or two in each
@@ -131,6 +133,6 @@ def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _S
     owner[regions.row_origin[np.repeat(settled, np.diff(regions.row_start))]] = -1
     choose_all(packing.arrays.cols, chosen[settled[region]], owner)
     component.offer(owner, component.weight_of(owner))
-    # regions that are too hard would only become harder
     left = float(regions.weights[found.columns].sum()) - found.lower_bound
-    return _Searched(bound, extra, chosen[reaches], hard=left > _OUTSIDE * (component.weight - component.bound))
+    most = max(_OUTSIDE * (component.weight - component.bound), _HARD * (component.weight - bound))
+    return _Searched(bound, extra, chosen[reaches], hard=left > most)
