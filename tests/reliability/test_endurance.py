@@ -1,5 +1,6 @@
 """Mixed problems and steps in one process: a little of endurance.py; and does its watch see what it watches for?"""
 
+import mmap
 from collections import Counter
 
 import numpy as np
@@ -45,7 +46,9 @@ def test_what_grows_is_seen():
 def test_a_leak_is_seen():
     watch, kept = Watch(1), []
     for number in range(1, 21):
-        kept.append(np.ones(2**18))
+        # not of numpy, which may get memory that is there already
+        kept.append(mmap.mmap(-1, 2**21))
+        kept[-1].write(bytes(2**21))
         watch.add(number)
     memory, *_ = watch.claims("x")
     assert memory.holds is False and memory.ours > 20.0
