@@ -19,7 +19,7 @@ from assoc.filters.base import Expected
 from assoc.sensors import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.tracking import TRACKERS, MultiSensorTracker
-from assoc.tracking.records.unresolved import SURE, Unresolved
+from assoc.tracking.records.unresolved import SURE, Shared, Unresolved
 
 SENSOR = PositionSensor(
     position=[0.0, 0.0, 0.0], noise=[10.0, 10.0], detection_probability=0.95, false_alarm_rate=2.0,
@@ -177,3 +177,10 @@ def test_only_pairs_that_were_seen_apart_are_two():
     for k in range(12, 20):
         tracker.step(float(k), [at + rng.normal(0.0, 10.0, (2, 2))])
     assert tracker.state.unresolved.apart.tolist() == [SURE]
+
+
+def test_tracks_of_unresolved_pairs_have_no_plots_of_their_own():
+    """Each track of a pair that a sensor did not resolve, pair by pair; tracks that are gone are in no row."""
+    pairs, probability = np.array([[3, 7], [7, 9], [4, 8]]), np.array([[0.9, 0.1], [0.2, 0.7], [0.6, 0.6]])
+    hidden = Shared(pairs, probability).hidden(np.array([3, 5, 7, 8, 9]))
+    assert hidden.tolist() == [[True, False], [False, False], [True, True], [True, True], [False, True]]

@@ -13,6 +13,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.unresolved import GRID
 from assoc.scene.scan import Scan
+from assoc.tracking.records.track import rows_of_ids
 
 SURE = 3
 """Scans in which one sensor detected both of a pair, each by a plot of its own, after which they are taken for two."""
@@ -72,11 +73,11 @@ class Shared(NamedTuple):
     """The scan in which they count once."""
 
     def hidden(self, ids: Array) -> Array:
-        """Whether tracks with these ids (T,) have probably no plot of their own of each sensor, bool (T, S)."""
-        found = np.zeros((len(ids), self.probability.shape[1]), dtype=np.bool_)
-        for pair, probability in zip(self.ids, self.probability, strict=True):
-            found[np.isin(ids, pair)] |= probability > 0.5
-        return found
+        """Whether tracks with ascending `ids` (T,) have probably no plot of their own of each sensor, bool (T, S)."""
+        found = np.zeros((len(ids) + 1, self.probability.shape[1]), dtype=np.bool_)
+        for side in self.ids.T:
+            np.logical_or.at(found, rows_of_ids(ids, side), self.probability > 0.5)
+        return found[:-1]
 
     def of(self, first: Array, second: Array) -> Array:
         """The probability of pairs of ids (L,), (L,), in any order; (L, S)."""
