@@ -8,7 +8,7 @@ import pytest
 
 from assoc import live
 from assoc._cli.track.line_form import LineForm
-from assoc._cli.track.plot_lines import parse_line, replayed
+from assoc._cli.track.plot_lines import IdentityError, parse_line, replayed
 from assoc._cli.track.radars_file import read_radars
 from assoc.errors import InvalidInputError
 from assoc.recordings.on_earth import Bias
@@ -90,6 +90,8 @@ def test_json_by_the_names_of_recordings():
     plot = parse_line("2021-07-12T14:00:00Z,10,180,513", scene, form)
     assert (plot.time, plot.identity) == (1626098400.0, (1001, 0))
     assert plot.values == pytest.approx([18520.0, -np.pi / 2])
+    with pytest.raises(IdentityError, match="mode3: expected four octal digits .a header calls them squawk"):
+        parse_line("2021-07-12T14:00:00Z,10,180,4521", scene, form)
 
 
 def test_flight_levels_in_letters_and_words_for_nothing(tmp_path):

@@ -195,7 +195,9 @@ def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
         elif given is not None and given != "":
             number = -1
         if not 0 <= number <= most:
-            kind = "a whole number up to 7777" if base == 10 else "six hexadecimal digits, or the nine digits of a ship"
+            kind = "six hexadecimal digits, or the nine digits of a ship"
+            if base == 10:
+                kind = "four octal digits (a header calls them squawk; its mode3 is the 12 bits as a number)"
             raise ValueError(f"{what}: expected {kind}")
         found.append(number)
     return found[0], found[1]
