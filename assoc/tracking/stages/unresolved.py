@@ -232,14 +232,16 @@ def tell_apart(progress: Progress) -> Progress:
     known = dict(zip(map(tuple, before.ids.tolist()), before.apart.tolist(), strict=True))
     apart = np.zeros(len(ids), dtype=np.int64)
     assert step is not None
+    old = np.asarray(np.isin(ids, before.confirmed).all(axis=1))
+    detected = np.asarray(np.any([np.isin(ids, taken).all(axis=1) for taken in step.assigned], axis=0))
     for k, ((i, j), pair) in enumerate(zip(rows.tolist(), map(tuple, ids.tolist()), strict=True)):
         if pair in known:
             apart[k] = known[pair]
-        elif np.isin(pair, before.confirmed).all():
+        elif old[k]:
             both = int(tracks.detections[i] & tracks.detections[j] & ((1 << _RECENT) - 1))
             apart[k] = SURE if both.bit_count() >= _TOGETHER else 0
         if apart[k] < SURE:
-            apart[k] += any(np.isin(pair, taken).all() for taken in step.assigned)
+            apart[k] += detected[k]
     return progress.with_state(unresolved=before._replace(ids=ids, apart=apart, confirmed=np.sort(tracks.track_id)))
 
 
