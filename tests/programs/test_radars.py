@@ -287,3 +287,28 @@ def test_nothing_is_right_that_was_compared_with_nothing(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "not compared with anything:\n  north: bearings, ranges and times" in said
     assert re.search(r"looks wrong:\n  north: noise: 4 m and 0.05 deg are declared, \d\d\.?\d? m and", said)
+
+
+def test_without_heights_low_targets_have_no_track_and_the_end_says_so(tmp_path, capsys):
+    """A drone 1 km away, seen every 10 s: as high as 20 km it would be anywhere."""
+    rng, place, rows = np.random.default_rng(3), np.array([-800.0, 900.0]), []
+    for turn in range(50):
+        place = place + 120.0 * np.array([np.cos(1 + turn / 7), np.sin(1 + turn / 7)])
+        bearing = np.arctan2(*place) % (2 * np.pi)
+        noise = rng.normal(0, [10.0, 0.17])
+        rows.append([10 * (turn + bearing / (2 * np.pi)), np.hypot(*place) + noise[0], np.degrees(bearing) + noise[1]])
+        false = rng.uniform(0, 360)
+        rows.append([10 * (turn + false / 360), 5000 * rng.random() ** 0.5, false])
+    table = pd.DataFrame(sorted(rows), columns=["time_s", "range_m", "bearing_deg"])
+    table.assign(bearing_deg=table.bearing_deg % 360).to_csv(tmp_path / "r.csv", index=False)
+    text = '[[radar]]\nfile = "r.csv"\nplace = [47, 8, 0]\nnoise = [10, 0.17]\nfalse_alarms = 1\n'
+    file, words = tmp_path / "radars.toml", ["-o", str(tmp_path / "t.csv")]
+    file.write_text(text)
+    assert track.main([str(file), *words]) == 0
+    told = capsys.readouterr().out
+    assert "0 confirmed tracks" in told and "no track: where targets are low, 'heights = [lowest, highest]'" in told
+    assert inspect.main([str(file)]) == 0 and "most plots have no height" in capsys.readouterr().out
+    file.write_text("heights = [0, 100]\n" + text)
+    assert inspect.main([str(file)]) == 0 and "most plots have no height" not in capsys.readouterr().out
+    assert track.main([str(file), *words, "--targets", "drone"]) == 0
+    assert "1 confirmed tracks" in capsys.readouterr().out
