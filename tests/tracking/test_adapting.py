@@ -280,6 +280,38 @@ def test_density_of_plots_of_what_stands(middle):
     assert known.standing(sensor, 0, z) == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("turns", "least", "most"), [(range(10), 1.0, 1.0), ((0, 4, 9), 0.0, 0.01), ((0, 1, 9), 0.0, 0.01)]
+)
+def test_what_comes_back_seldom_is_no_target_that_stands(turns, least, most):
+    """A turbine that flickers: a target would have been detected in nine of ten turns, not in three."""
+    sensor, _ = group(0, 0.0, 60.0, 10.0)
+    known, always = ClutterMap.empty([sensor]), ClutterMap.empty([sensor])
+    for k in range(10):
+        z = np.full((1, 2), 100.0)
+        known = known.after([sensor], Scan(k, float(k), (z if k in turns else z[:0],)), np.ones(1))
+        always = always.after([sensor], Scan(k, float(k), (z,)), np.ones(1))
+    there = np.full((1, 2), 100.0)
+    share = known.standing(sensor, 0, there) / always.standing(sensor, 0, there)
+    assert least <= share[0] <= most
+
+
+def test_turbines_that_flicker_are_clutter():
+    """Twelve points that return a plot in a third of the turns, each its own: tracked without a map, not with one."""
+    shown = []
+    for adapt in (True, False):
+        found = 0
+        for seed in range(4):
+            sensor, plots = group(seed, 0.0, 60.0, 15.0, scans=40)
+            rng = np.random.default_rng(seed)
+            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=adapt, initiation=Initiation(speed=10.0))
+            for k, z in enumerate(plots):
+                tracker.step(10.0 * k, [z[rng.random(len(z)) < 0.4]])
+            found += sum(track.reported for track in tracker.tracks)
+        shown.append(found)
+    assert shown[0] < 0.6 * shown[1]
+
+
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
     """Eleven tracks of twelve targets are missed seldom, and leave plots over: neither is of the sensor."""
     sensor, plots = group(3, 120.0, 60.0, 50.0, scans=60)

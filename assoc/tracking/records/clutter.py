@@ -6,8 +6,9 @@ the sensor's noise. A wind farm, a shore or a road returns many plots from the s
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
 And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), and than
 targets that stand would, each by what came before: where targets circle, each is near its own track, and what stands
-comes back to where it was, tracked or not, while clutter lies anywhere in its place. In the first turns nobody can be
-sure, and what may be a place is in doubt unless either has predicted its plots better.
+comes back to where it was, tracked or not, as often as the sensor detects targets; clutter lies anywhere in its place,
+or flickers. In the first turns nobody can be sure, and what may be a place is in doubt unless either has predicted its
+plots better.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.special import gammaincinv, xlog1py, xlogy
 
 from assoc._types import Array
 from assoc.scene.scan import Scan
@@ -103,7 +105,8 @@ class ClutterMap(NamedTuple):
     def standing(self, sensor: Sensor, s: int, at: Array) -> Array:
         """Density of plots of targets that stand, at measurements of sensor s, relative to its false alarms, (n,).
 
-        Each plot so far may have been of one, that stands where the plots near by are on average.
+        Each plot so far may have been of one, that stands where the plots near by are on average; unless these came
+        more seldom than by the sensor's detection probability: turbines and masts flicker.
         """
         turns, part, places = min(round(float(self.clock[s])), _TURNS), sensor.position_part, self.places[s]
         if not len(at) or not len(places) or turns < 1:
@@ -119,10 +122,16 @@ class ClutterMap(NamedTuple):
         count = weights.sum(axis=1)
         mean = (weights[:, :, None] * _off(places[mates], places[some][:, None], around)).sum(axis=1) / count[:, None]
         off = _off(z[who], (places[some] + mean)[row], around)
+        age = np.rint(float(self.clock[s]) - self.clocks[s]).astype(np.int64)
+        # two plots of one target are nearer to each other than this, 95 % sure
+        own, mate = np.nonzero(apart**2 <= 4.0 * gammaincinv(0.5 * part.dim, _SURE))
+        seen = np.zeros((len(some), int(_TURNS) + 2), dtype=np.bool_)
+        seen[own, np.clip(age[mates[own, mate]], 0, int(_TURNS) + 1)] = True
+        share = _steadiness(seen, sensor.detection_probability)[row] * sensor.detection_probability
         spread = 1.0 + 1.0 / count[row]
         usual = part.false_alarm_rate / part.volume * float(np.prod(_units(sensor))) * turns
-        density = (2.0 * math.pi * spread) ** (-0.5 * part.dim) * np.exp(-0.5 * (off**2).sum(axis=1) / spread)
-        return np.bincount(who, density, len(at)) * sensor.detection_probability / usual
+        density = share * (2.0 * math.pi * spread) ** (-0.5 * part.dim) * np.exp(-0.5 * (off**2).sum(axis=1) / spread)
+        return np.bincount(who, density, len(at)) / usual
 
     def after(
         self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None
@@ -152,6 +161,19 @@ def _around(sensor: Sensor) -> Any:
     angular = sensor.position_part.angular
     pairs = zip(_units(sensor), angular, strict=False)
     return [(2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in pairs][: sensor.position_part.dim]
+
+
+def _steadiness(seen: Array, probability: float) -> Array:
+    """How likely plots in these turns, bool (n, T), are of a target that is detected with this probability, (n,).
+
+    Relative to one that returns plots half as often or less; at most 1. The first and the last plot do not count.
+    """
+    between = seen.shape[1] - np.argmax(seen[:, ::-1], axis=1) - np.argmax(seen, axis=1) - 2
+    hits = np.maximum(seen.sum(axis=1) - 2.0, 0.0)
+    missed = np.maximum(between - hits, 0.0)
+    rate = np.minimum(hits / np.maximum(between, 1), 0.5 * probability)
+    gain = xlogy(hits, probability) - xlogy(hits, rate) + xlog1py(missed, -probability) - xlog1py(missed, -rate)
+    return np.asarray(np.exp(np.minimum(gain, 0.0)))
 
 
 def _off(one: Array, other: Array, around: Any) -> Array:
