@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc._types import Floats
 from assoc.packing.component import Component, Owner
 from assoc.packing.cover import Cover

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.component import Component

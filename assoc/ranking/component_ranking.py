@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
-from assoc._system.sorting import order_of
+from assoc._system.kernels.copying import copy_to
+from assoc._system.kernels.sorting import order_of
 from assoc._types import Floats
 from assoc.packing.branching.counts import USUAL, Leaf, Splitting, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.node import (

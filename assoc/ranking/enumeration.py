@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
-from assoc._system.sorting import order_of, sort_part
+from assoc._system.kernels.copying import copy_to
+from assoc._system.kernels.sorting import order_of, sort_part
 from assoc._types import Floats, Ints
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from assoc._system.compiled import wait_for_kernels
 from assoc._system.interpreted import compiled_only
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc.errors import InfeasibleError
 from assoc.packing import prepare as packing_form
 from assoc.packing.bounds.dual_ascent import dual_bound

@@ -11,7 +11,7 @@ import pytest
 
 import assoc
 from assoc._system.interpreted import compiled_only
-from assoc._system.sorting import ascending, order_of, sort_part
+from assoc._system.kernels.sorting import ascending, order_of, sort_part
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.prepare import prepare

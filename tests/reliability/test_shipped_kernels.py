@@ -19,7 +19,7 @@ import numpy as np
 from numba.core import event
 from assoc._system import numba_private
 from assoc.packing.kernels.matching import match
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 
 numba_private.SHIPPED = Path(sys.argv[1])
 seen = event.RecordingListener()

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays
 from assoc.costs.arrivals.fit import (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._system.compiled import inner_njit, lean_inner_njit, njit
-from assoc._system.sorting import order_of, sort_part
+from assoc._system.kernels.sorting import order_of, sort_part
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected

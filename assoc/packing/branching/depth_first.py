@@ -12,8 +12,8 @@ import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
-from assoc._system.sorting import order_of
+from assoc._system.kernels.copying import copy_to
+from assoc._system.kernels.sorting import order_of
 from assoc.packing.branching.node import Work, allowed_at, branch, drop, keep_side, open_node, relax
 from assoc.packing.branching.open_nodes import Stack, has_room
 from assoc.packing.branching.pairs import NEITHER, TOGETHER, WHOLE, any_open_pair, decide, doubtful_pairs

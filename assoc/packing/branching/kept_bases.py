@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Program

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.branching.kept_bases import KeptBases, keep_basis, kept_memory, no_kept_bases, take_kept
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats, Ints
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, bound_of

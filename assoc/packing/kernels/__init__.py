@@ -1,1 +1,1 @@
-"""Compiled general-purpose tools: matching, sorting, a heap."""
+"""Compiled general-purpose tools: matching, auction, a heap."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.sorting import ascending, order_of
+from assoc._system.kernels.sorting import ascending, order_of
 from assoc._types import Ints
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, ReducedCosts

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Ints
 from assoc.packing.kernels.columns import choose_matched, sum_of_weights
 from assoc.packing.kernels.matching import match_sparse

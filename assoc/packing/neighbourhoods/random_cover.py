@@ -17,7 +17,7 @@ import numpy as np
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats, Ints
 from assoc.packing.bounds.priced import ReducedCosts
 from assoc.packing.kernels.columns import choose, fits, sum_of_weights

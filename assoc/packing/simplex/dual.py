@@ -19,7 +19,7 @@ import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc.packing.kernels.extremes import position_of_largest, position_of_smallest
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import inner_njit
-from assoc._system.copying import copy_to
-from assoc._system.sorting import order_of
+from assoc._system.kernels.copying import copy_to
+from assoc._system.kernels.sorting import order_of
 from assoc.packing.kernels.heap import pop, push
 from assoc.ranking.murty.arrays import ALONE, Forbidden, Graph, Nodes, PathWork, Queues
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.kernels.matching import match_sparse

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.sorting import sort_part
+from assoc._system.kernels.sorting import sort_part
 from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.graph import PairGraph
 from assoc.ranking.sweep import cluster

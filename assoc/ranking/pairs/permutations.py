@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.sorting import order_of
+from assoc._system.kernels.sorting import order_of
 from assoc._types import Array, Floats, Ints
 from assoc.ranking.pairs.events import reduced
 from assoc.ranking.pairs.graph import PairGraph, pair_graph

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._system.sorting import ascending, order_of
+from assoc._system.kernels.sorting import ascending, order_of
 from assoc._types import Floats
 from assoc.packing.component import Component
 from assoc.packing.cover import Cover

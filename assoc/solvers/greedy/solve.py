@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.cover import Cover

@@ -27,7 +27,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass, reduced_costs
 from assoc.packing.bounds.priced import Priced

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.interrupts import in_time
-from assoc._system.sorting import ascending
+from assoc._system.kernels.sorting import ascending
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.cover import Cover
 from assoc.packing.packing import Packing

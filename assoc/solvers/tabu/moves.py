@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats, Ints
 from assoc.packing.component import Component
 from assoc.packing.cover import Cover

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
-from assoc._system.sorting import order_of, sort_by
+from assoc._system.kernels.copying import copy_to
+from assoc._system.kernels.sorting import order_of, sort_by
 from assoc._types import Floats
 from assoc.tracking.mht.losses import Priced
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Array, Floats
 from assoc.tracking.growth import Offers
 from assoc.tracking.mht.best_hypothesis import VISITS, choose

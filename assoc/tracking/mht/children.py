@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Array, Floats
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.kernels.matching import match_sparse

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.sorting import order_of
+from assoc._system.kernels.sorting import order_of
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.packing import PackingArrays, assembled

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
-from assoc._system.sorting import order_of, sort_by
+from assoc._system.kernels.sorting import order_of, sort_by
 from assoc._types import Array, Floats
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, lean_inner_njit, njit
-from assoc._system.copying import copy_to
+from assoc._system.kernels.copying import copy_to
 from assoc._types import Array, Floats
 
 # bits of a digit; for fewer numbers radix sort does not pay
