@@ -140,6 +140,8 @@ def wait_for_kernels() -> None:
             # an endless wait would not end when another thread receives a signal
             while helper.poll() is None:
                 time.sleep(0.02)
+            if helper.stdin is not None:
+                helper.stdin.close()
 
 
 def compile_for(kernel: Any, *arguments: Any) -> None:
