@@ -37,6 +37,7 @@ from assoc.solvers import registry
 from assoc.solvers.assign import assign
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.solvers.greedy.solve import solve as greedy_solve
+from experiments.common.claims import Claim
 from tests.reliability.exact import exact_cost, exact_marginals, exact_ranks
 from tests.reliability.problems import Case, draw
 from tests.reliability.results import add_ends, report
@@ -176,8 +177,10 @@ WAYS: dict[str, Way] = {
     "liar": _by_a_liar,
     "after a liar": _after_a_liar,
 }
-LISTED = {"marginals": (WIDEST, 1.0), "marginals sampled": (0, 0.05)}
+_SAMPLED = "marginals sampled"
+LISTED = {"marginals": (WIDEST, 1.0), _SAMPLED: (0, 0.05)}
 """Ways to probabilities: measurements open in sums, and how long chains are."""
+_TOLD, _WITHIN, _BEYOND = "sampled probabilities with an error below 1", "within four errors", "beyond ten errors"
 RANKED = {"kbest": _RANKS, "ranking": _END}
 """Ways to rankings: how many solutions are asked for."""
 PROVING = ("exact", "kbest", "ranking", "file", "tensor", "exact from a start", "after a liar")
@@ -243,11 +246,15 @@ def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, 
 
 
 def probability_faults(
-    problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, widest: int, length: float
+    problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, name: str, compared: Counter[str]
 ) -> Iterator[str]:
-    """What is wrong with the probabilities; ``truth`` None: there is no solution."""
+    """What is wrong with the probabilities; ``truth`` None: there is no solution.
+
+    A standard error is no bound, and no sample shows what it never met: how often those that were sampled by force are
+    within their errors is counted in ``compared``, and judged over all problems (`sampled_claims`).
+    """
     results: list[Any] = []
-    yield from answered(lambda: weighed(problem, None, widest, length), truth is not None, results)
+    yield from answered(lambda: weighed(problem, None, *LISTED[name]), truth is not None, results)
     if not results or truth is None:
         return
     found = results[0]
@@ -256,7 +263,10 @@ def probability_faults(
     for row, p, error in zip(found.tuples.tolist(), found.probability.tolist(), found.error.tolist(), strict=True):
         # singletons that are not listed are in the result, not in the problem
         true = truth.get(tuple(row))
-        if true is not None and not abs(p - true) <= 10.0 * error + 2e-8:
+        away = 0.0 if true is None else max(abs(p - true) - 2e-8, 0.0)
+        if true is not None and name == _SAMPLED and 0.0 < error < 1.0:
+            compared.update({_TOLD: 1, _WITHIN: away <= 4.0 * error, _BEYOND: away > 10.0 * error})
+        elif not away <= 10.0 * error:
             yield f"says {p:.12g} +- {error:.3g} of {row}, true is {true:.12g}"
         if not 0.0 <= p <= 1.0 or not 0.0 <= error <= 1.0:
             yield f"says {p!r} +- {error!r} of {row}"
@@ -299,17 +309,25 @@ def true_ranks(case: Case, names: list[str]) -> list[Fraction] | None:
 
 def judge(case: Case, names: list[str]) -> list[str]:
     """All faults on one case, as lines."""
-    return _judged(case, names, true_ranks(case, names))
+    return _judged(case, names, true_ranks(case, names), Counter())
 
 
-def _judged(case: Case, names: list[str], ranks: list[Fraction] | None) -> list[str]:
+def sampled_claims(name: str, compared: Counter[str]) -> list[Claim]:
+    """How often the sampled probabilities of a run are within four of their standard errors: in 99 of 100, at least."""
+    if not compared[_TOLD]:
+        return []
+    share = compared[_WITHIN] / compared[_TOLD]
+    return [Claim(f"{name}: share of sampled probabilities within four errors", ours=share, band=(0.99, 1.0))]
+
+
+def _judged(case: Case, names: list[str], ranks: list[Fraction] | None, compared: Counter[str]) -> list[str]:
     truth = None
     if ranks is not None and not LISTED.keys().isdisjoint(names):
         truth = exact_marginals(case.problem)
     lines = []
     for name in names:
         if name in LISTED:
-            found = probability_faults(case.problem, truth, *LISTED[name])
+            found = probability_faults(case.problem, truth, name, compared)
         else:
             found = faults(case.problem, ranks and ranks[: RANKED.get(name, 1)], name, WAYS[name])
         lines += [f"{name} {text}" for text in found]
@@ -334,11 +352,11 @@ class Judge:
         each = self.each or len(self.names)
         names = [self.names[(number * each + turn) % len(self.names)] for turn in range(each)]
         ranks = true_ranks(case, names)
-        lines = _judged(case, names, ranks)
+        compared = Counter(dict.fromkeys(names, 1) if self.each else {}, answers=each)
+        lines = _judged(case, names, ranks, compared)
         seconds = time.process_time() - compile_seconds() - before
         if seconds > _SLOW:
             lines.append(f"all ways together take {seconds:.1f} s")
-        compared = Counter(dict.fromkeys(names, 1), answers=each)
         if ranks is not None and "ranking" in names:
             compared.update({"rankings to the end": len(ranks) < _END, "solutions ranked": len(ranks)})
         if ranks is not None and not LISTED.keys().isdisjoint(names):
@@ -377,7 +395,8 @@ def main(arguments: list[str] | None = None) -> int:
             said = time.perf_counter()
             done, faulty = number + 1 - chosen.start, sum(kinds.values())
             print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults, {compared}", flush=True)
-    return report("differential", chosen.publish, compared, kinds)
+    claims = sampled_claims(chosen.publish or "differential", compared)
+    return report("differential", chosen.publish, compared, kinds, claims)
 
 
 if __name__ == "__main__":

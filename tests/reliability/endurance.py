@@ -13,6 +13,7 @@ read or write beyond an array; with ``PYTHONMALLOC=debug MALLOC_PERTURB_=165`` w
 """
 
 import argparse
+import ctypes
 import faulthandler
 import gc
 import math
@@ -40,7 +41,7 @@ from assoc.tracking import TRACKERS, LatePlots, Tracker
 from assoc.tracking.filter_choice import FILTERS, make_filter
 from experiments.common.claims import Claim
 from experiments.common.measuring import processor_time
-from tests.reliability.differential import LISTED, WAYS, Judge
+from tests.reliability.differential import LISTED, WAYS, Judge, sampled_claims
 from tests.reliability.fuzzing import limit_memory
 from tests.reliability.results import add_ends, report
 
@@ -51,7 +52,6 @@ LOOKS = 100
 LONG = {"multi-sensor": 1.0, "mht": 0.2, "nearest-neighbour": 0.2}
 """Trackers of long sessions, and their shares of the scans."""
 _SCENES = ("three-radar", "rotating-radar", "bearing-only", "crowd")
-_RANKED = ("rankings to the end", "solutions ranked", "probabilities")
 _PROGRESS = 60.0
 Faults = Counter[str]
 
@@ -200,6 +200,9 @@ class Watch:
         if number % self.every:
             return False
         gc.collect()
+        # what is free, and kept by the C library for later, is no growth
+        if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
+            trim(0)
         with open("/proc/self/statm", encoding="ascii") as file:
             resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
         now = np.array([len(gc.get_objects()), resident])
@@ -291,7 +294,7 @@ def run(seed: int, problems: range, steps: int, minutes: float = math.inf) -> tu
             if len(problems):
                 counts["problems"] += 1
                 _, _, lines, compared = judge(number)
-                counts.update({what: compared[what] for what in _RANKED if what in compared})
+                counts.update({what: count for what, count in compared.items() if what not in judge.names})
                 for line in lines:
                     print(f"seed {seed} problem {number}: {line}", flush=True)
                     faults[" ".join(line.split()[:4])] += 1
@@ -325,7 +328,8 @@ def main(arguments: list[str] | None = None) -> int:
         chosen.seed, range(chosen.start, chosen.start + chosen.problems), chosen.steps, chosen.minutes
     )
     rng = np.random.default_rng(chosen.seed)
-    claims = watch.claims(chosen.publish or "endurance", growth=20.0)
+    name = chosen.publish or "endurance"
+    claims = [*watch.claims(name, growth=20.0), *sampled_claims(name, counts)]
     for kind, share in LONG.items() if chosen.scans else ():
         claims += follow(kind, int(share * chosen.scans), rng)
     return report("endurance", chosen.publish, counts, faults, claims)

@@ -1,5 +1,7 @@
 """Every way to an answer, on random problems against exact arithmetic; `make fuzz` runs thousands."""
 
+from collections import Counter
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -7,8 +9,10 @@ import pytest
 
 from assoc.errors import AssocWarning, InfeasibleError
 from assoc.problem import AssignmentProblem
+from assoc.ranking.marginals import weighed
 from assoc.solvers.assign import assign
-from tests.reliability.differential import LISTED, WAYS, faults, judge
+from tests.reliability import differential
+from tests.reliability.differential import LISTED, WAYS, Judge, faults, judge, sampled_claims
 from tests.reliability.exact import (
     exact_marginals,
     exact_optimum,
@@ -155,3 +159,19 @@ def test_multipliers_that_are_large_and_cancel():
 def test_rounding_is_no_better_matching():
     """Among prices that cancel the dimensionwise search found improvements of the order of rounding for ever."""
     assert judge(draw(600, 593, *SECOND), ["aco"]) == []
+
+
+@pytest.mark.parametrize(("factor", "holds"), [(1.0, True), (0.01, False)])
+def test_sampled_probabilities_are_judged_over_all_problems(monkeypatch, factor, holds):
+    def told(*arguments):
+        found = weighed(*arguments)
+        return replace(found, error=np.where(found.exact | (found.error == 1.0), found.error, factor * found.error))
+
+    monkeypatch.setattr(differential, "weighed", told)
+    compared = Counter()
+    for number in range(12):
+        _, _, lines, counts = Judge(9951, ["marginals sampled"])(number)
+        compared.update(counts)
+        assert lines == []
+    (claim,) = sampled_claims("some", compared)
+    assert claim.holds is holds
