@@ -108,6 +108,13 @@ class Packing:
         chosen = np.flatnonzero(keep).astype(np.int32)
         return assemble(self.cols[chosen], self.weights[chosen], self.arrays.slack, chosen, self.granularity)
 
+    def touching(self, rows: NDArray[np.integer]) -> NDArray[np.int32]:
+        """The columns that use one of these rows, ascending."""
+        used = np.zeros(self.num_columns, dtype=np.bool_)
+        for r in rows.tolist():
+            used[self.row_cols[self.row_ptr[r] : self.row_ptr[r + 1]]] = True
+        return np.flatnonzero(used).astype(np.int32)
+
     def read_only(self) -> Packing:
         """Return a copy with read-only fields.
 

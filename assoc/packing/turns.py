@@ -50,6 +50,8 @@ class Turns:
     columns: list[NDArray[np.integer]] = field(default_factory=list)
     weights: list[float] = field(default_factory=list)
     bounds: list[float] = field(default_factory=list)
+    proved: float = -math.inf
+    """The best bound on the whole so far: after a split the sum over the components may be below it."""
 
     def take(self, tasks: Iterable[Task]) -> None:
         """Give each task its turn, again and again, until all searches are over; errors as `search_components`."""
@@ -79,13 +81,14 @@ class Turns:
         components = [task.component for task in tasks]
         weight = math.fsum([*self.weights, *(component.weight for component in components)])
         bound = math.fsum([*self.bounds, *(component.lower_bound for component in components)])
-        self.run.record(self.iterations, weight, bound)
+        self.proved = max(self.proved, min(bound, weight))
+        self.run.record(self.iterations, weight, self.proved)
 
     def outcome(self, duals: Floats | None) -> Outcome:
         """The result of all searches together; ``duals`` as in `Outcome`."""
         self.record()
         chosen = np.concatenate(self.columns) if self.columns else np.zeros(0, dtype=np.int64)
-        return Outcome(chosen, self.iterations, math.fsum(self.bounds), duals)
+        return Outcome(chosen, self.iterations, self.proved, duals)
 
 
 def complete_greedily(component: Component, run: Run) -> None:

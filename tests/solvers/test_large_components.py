@@ -9,8 +9,11 @@ from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.component import split_components
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.packing.simplex.linear_program import LinearProgram
+from assoc.solvers.exact import regions, tightening
 from assoc.solvers.exact.regions import close_by_regions
 from assoc.solvers.exact.search import search_to_the_end
+from assoc.solvers.exact.tightening import Prices, tighten
 from experiments.common.instances.synthetic import wide_gates
 from tests.sizes import sample
 from tests.solvers.pieces import with_greedy_cover
@@ -31,9 +34,13 @@ def test_a_large_component_is_proved_without_its_linear_program(seed, monkeypatc
     assert answer.status == "optimal"
 
 
+@pytest.mark.parametrize("cuts", [False, True])
 @pytest.mark.parametrize("unit", [0.0, 1.0])
-def test_regions_bound_and_cover(unit):
+def test_regions_bound_and_cover(unit, cuts, monkeypatch):
     """From rough multipliers and greedy covers, by searches that are cut short: bounds hold, covers are complete."""
+    if cuts:
+        monkeypatch.setattr(regions, "MANY", 1)
+        monkeypatch.setattr(tightening, "_REGION", 25)
     closed = 0
     for seed in range(25):
         problem = wide_gates(60, seed, 0.5)
@@ -44,12 +51,42 @@ def test_regions_bound_and_cover(unit):
         parts = split_components(packing, multipliers, packing.origin.astype(np.int64))
         component = with_greedy_cover(max(parts, key=lambda one: one.packing.num_rows))
         optimum = search_to_the_end(component.packing, 10**6, 0, Run(0)).lower_bound
-        close_by_regions(component, lambda part, nodes=seed % 4: search_to_the_end(part, nodes, 0, Run(0)))
+        close_by_regions(component, lambda part, nodes=seed % 4: search_to_the_end(part, nodes, 0, Run(0)), Run(0))
         assert component.is_complete(component.best)
         assert component.weight == pytest.approx(component.weight_of(component.best), abs=1e-9)
         assert component.lower_bound <= optimum + 1e-6 <= component.weight + 2e-6
         closed += component.closed
     assert closed >= 10
+
+
+def test_cuts_of_regions_raise_the_bound_above_the_linear_program(monkeypatch):
+    """Bound and reduced costs hold for the optimum and its columns; most of the gap of the linear program is closed."""
+    monkeypatch.setattr(tightening, "_REGION", 60)
+    shares = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        # sources on a line: indices of a tuple are near each other
+        tuples = rng.integers(2, 80, size=(500, 1)) + rng.integers(-2, 3, size=(500, 3))
+        problem = assoc.AssignmentProblem(tuples, -rng.gamma(4.0, 1.0, size=500), [81] * 3)
+        packing = prepare(problem).packing
+        parts = split_components(packing, dual_bound(packing), packing.origin.astype(np.int64))
+        component = with_greedy_cover(max(parts, key=lambda one: one.packing.num_rows))
+        best = search_to_the_end(component.packing, 10**6, 0, Run(0))
+        relaxed = LinearProgram(component.packing).solve(duals=component.duals).bound
+        prices = Prices.of(component)
+        tighten(component, prices, Run(0))
+        assert prices.bound + np.append(0.0, prices.reduced[best.columns]).max() <= best.lower_bound + 1e-6
+        weights = component.packing.weights - prices.reduced
+        for cut in prices.cuts:
+            uses = np.isin(component.packing.cols, cut.rows).sum(axis=1) // 2
+            assert cut.rows.size % 2 == 1 and cut.dual < 0.0
+            weights -= cut.dual * uses
+        kept = np.isfinite(prices.reduced)
+        own = np.append(prices.duals, 0.0)[component.packing.cols].sum(axis=1)
+        assert weights[kept] == pytest.approx(own[kept], abs=1e-9)
+        if best.lower_bound - relaxed > 1e-3:
+            shares.append((prices.bound - relaxed) / (best.lower_bound - relaxed))
+    assert len(shares) >= 3 and np.mean(shares) > 0.5
 
 
 def test_an_allowed_gap_spares_large_components_their_linear_program():

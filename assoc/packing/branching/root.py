@@ -60,18 +60,22 @@ def _lowered(packing: Packing) -> Floats:
     return packing.weights - _LOWERED * packing.granularity / max(packing.num_rows, 1) * share
 
 
-def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: float) -> Root:
+def root_with_cuts(
+    packing: Packing, duals: Floats, cutoff: float, deadline: float, sets: NDArray[np.bool_] | None = None
+) -> Root:
     """The root of a component with cuts, added while they raise its bound; cuts that are not tight are removed.
 
-    Multipliers (R,) to start from; only solutions that weigh less than the cutoff are searched for.
+    Multipliers (R + K,) to start from, of rows and known odd sets (K, R); only solutions that weigh less than the
+    cutoff are searched for.
     """
     rows = packing.num_rows
-    root = plain_root(packing, duals)
-    program = root.program
+    root = plain_root(packing, duals[:rows])
+    if sets is None:
+        sets = root.sets
+    program = with_cuts(packing.arrays.cols, root.program.weights, rows, sets) if len(sets) else root.program
     effort = Effort(min(cutoff, float(weight_limit(program))), most_exchanges(program), deadline)
-    sets = np.zeros((0, rows), dtype=np.bool_)
     basis = new_basis(program)
-    allowed = all_allowed(program, root.slack)
+    allowed = all_allowed(program, np.concatenate([root.slack, np.ones(len(sets), dtype=np.bool_)]))
     begin = duals.copy()
     make_feasible(program, allowed, begin)
     begin_from_duals(program, allowed, begin, basis)

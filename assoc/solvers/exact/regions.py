@@ -7,7 +7,8 @@ of their columns. For any set A of rows with slack, every solution weighs at lea
 
 where the minimum is over packings of the rows of A. It falls into independent regions, which are solved exactly. An
 answer whose columns stay inside A replaces that part of the cover, and its region has no gap left; where columns reach
-out of A, A grows. Then the gap is what the rows outside of A cost: those that cost most of it join A, until nothing is
+out of A, A grows. (Of a very large component w is the weight less the multipliers of cuts that reach out of A:
+tightening.py.) Then the gap is what the rows outside of A cost: those that cost most of it join A, until nothing is
 left or regions become too hard or too large. Columns that cost more than what is left are dropped.
 """
 
@@ -25,12 +26,15 @@ from assoc.packing.component import Component
 from assoc.packing.kernels.columns import choose_all
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, assemble
-from assoc.packing.run import Outcome
+from assoc.packing.run import Outcome, Run
+from assoc.solvers.exact.tightening import MANY, Prices, tighten
 
 # share of the gap that rows outside of regions may cost
 _OUTSIDE = 0.02
 # share of what is left that regions keep, above which they are too hard: they would only become harder
 _HARD = 0.5
+# share of the rows up to which a gap comes from so few that regions alone close it
+_FEW = 0.01
 # share of the rows above which regions are not worth a search
 _MOST = 0.5
 # rounds of growth: a region grows by a column or two in each
@@ -52,13 +56,17 @@ class _Searched(NamedTuple):
     """Whether regions could not be closed."""
 
 
-def close_by_regions(component: Component, solve: Solve) -> NDArray[np.bool_] | None:
+def close_by_regions(component: Component, solve: Solve, run: Run) -> NDArray[np.bool_]:
     """Improve the cover and the bound of a component, whose rows all have slack, by searches of regions.
 
-    Returns the columns that a better cover may have, and those of the best one; None if regions are no way to go.
+    Returns the columns that a better cover may have, and those of the best one.
     """
     packing, searched = component.packing, None
-    inside = _costly(component, component.weight - component.bound)
+    prices = Prices.of(component)
+    inside = _costly(component, prices, component.weight - prices.bound)
+    if packing.num_rows >= MANY and np.count_nonzero(inside) > _FEW * packing.num_rows:
+        tighten(component, prices, run)
+        inside = _costly(component, prices, component.weight - prices.bound)
     before = -1
     for _ in range(_ROUNDS):
         _complete(component, inside)
@@ -66,26 +74,28 @@ def close_by_regions(component: Component, solve: Solve) -> NDArray[np.bool_] | 
         if rows > _MOST * packing.num_rows or rows == before:
             break
         before, weight = rows, component.weight
-        searched = _search(component, inside, solve)
+        searched = _search(component, prices, inside, solve)
         component.proven = max(component.proven, min(searched.bound, weight))
-        if component.closed or searched.hard:
+        # searches that end early may show less than cuts did
+        in_vain = bool(prices.cuts) and searched.bound < prices.bound
+        if component.closed or searched.hard or in_vain:
             break
         if not searched.reaching.size:
-            inside |= _costly(component, component.weight - searched.bound)
+            inside |= _costly(component, prices, component.weight - searched.bound)
         inside[packing.cols[searched.reaching]] = True
-    if searched is None:
-        return None
     cutoff = component.weight - (component.tolerance if packing.granularity else 0.0)
-    keep = searched.bound + searched.extra <= cutoff
+    keep = prices.bound + prices.reduced <= cutoff
+    if searched is not None:
+        keep &= searched.bound + searched.extra <= cutoff
     keep[component.best_columns()] = True
     return np.asarray(keep)
 
 
-def _costly(component: Component, gap: float) -> NDArray[np.bool_]:
+def _costly(component: Component, prices: Prices, gap: float) -> NDArray[np.bool_]:
     """The rows that cost most of a gap, shape (R + 1,); the last is no row, a sensor that missed."""
     best = component.best
     assert best is not None
-    cost = np.where(best >= 0, component.reduced[best], -component.duals)
+    cost = prices.costly(best)
     order = np.argsort(cost)
     # all rows of a column name its reduced cost
     outside = np.cumsum(cost[order]) <= _OUTSIDE * component.packing.num_sensors * gap
@@ -102,27 +112,33 @@ def _complete(component: Component, inside: NDArray[np.bool_]) -> None:
     inside[-1] = False
 
 
-def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _Searched:
+def _search(component: Component, prices: Prices, inside: NDArray[np.bool_], solve: Solve) -> _Searched:
     """Solve all regions; where an answer stays inside, it replaces that part of the best cover."""
-    packing, duals, best = component.packing, component.duals, component.best_columns()
-    touching = inside[packing.cols].any(axis=1) & (component.reduced <= component.weight - component.bound)
-    touching[best] |= inside[packing.cols[best]].any(axis=1)
-    places = np.flatnonzero(touching).astype(np.int32)
+    packing, duals, best = component.packing, prices.duals, component.best_columns()
+    places = packing.touching(np.flatnonzero(inside[:-1]))
     cols = packing.cols[places]
     own = inside[cols]
-    weights = packing.weights[places] - np.where(own, 0.0, np.append(duals, 0.0)[cols]).sum(axis=1)
-    useful = (weights < 0.0) | np.isin(places, best)
+    cuts = prices.inside(inside)
+    weights = prices.weights(places, own, packing, cuts)
+    worse = prices.reduced[places] > component.weight - prices.bound
+    useful = ((weights < 0.0) & ~worse) | np.isin(places, best)
     regions = assemble(np.where(own, cols, np.int32(-1))[useful], weights[useful], packing.arrays.slack, places[useful])
     found = solve(regions)
     region = np.searchsorted(regions.col_start, found.columns, side="right") - 1
     gained = -np.add.reduceat(duals[regions.row_origin], regions.row_start[:-1])
+    place = np.full(packing.num_rows, regions.num_components)
+    place[regions.row_origin] = np.repeat(np.arange(regions.num_components), np.diff(regions.row_start))
+    for cut in cuts:
+        # a cut holds in the part of each region, too
+        gained -= cut.dual * (np.bincount(place[cut.rows], minlength=regions.num_components + 1)[:-1] // 2)
     np.add.at(gained, region, regions.weights[found.columns])
     # a column that is not useful costs its weight on top of an answer without it, any other at most its own region
-    extra = component.reduced.copy()
-    extra[places] = weights
-    extra[regions.origin] = component.reduced[regions.origin] - np.repeat(gained, np.diff(regions.col_start))
-    rounding = 2.0 * margin(float(np.abs(duals).sum()), packing.num_sensors)
-    bound = component.bound - math.fsum(duals[inside[:-1]]) + found.lower_bound - rounding
+    extra = prices.reduced.copy()
+    extra[places] = np.where(worse, extra[places], weights)
+    extra[regions.origin] = prices.reduced[regions.origin] - np.repeat(gained, np.diff(regions.col_start))
+    size = float(np.abs(duals).sum()) - math.fsum(cut.bound for cut in prices.cuts)
+    own_part = math.fsum(duals[inside[:-1]]) + math.fsum(cut.bound for cut in cuts)
+    bound = prices.bound - own_part + found.lower_bound - 4.0 * margin(size, packing.num_sensors)
 
     chosen = regions.origin[found.columns]
     reaches = ((packing.cols[chosen] >= 0) & ~inside[packing.cols[chosen]]).any(axis=1)
@@ -134,5 +150,5 @@ def _search(component: Component, inside: NDArray[np.bool_], solve: Solve) -> _S
     choose_all(packing.arrays.cols, chosen[settled[region]], owner)
     component.offer(owner, component.weight_of(owner))
     left = float(regions.weights[found.columns].sum()) - found.lower_bound
-    most = max(_OUTSIDE * (component.weight - component.bound), _HARD * (component.weight - bound))
+    most = max(_OUTSIDE * (component.weight - prices.bound), _HARD * (component.weight - bound))
     return _Searched(bound, extra, chosen[reaches], hard=left > most)

@@ -21,6 +21,7 @@ from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.turns import Turns
 from assoc.solvers.exact.reduction import Reduction
 from assoc.solvers.exact.regions import close_by_regions
+from assoc.solvers.exact.tightening import MANY
 
 # rows from which the run's improver works from the start: below, branching closes most gaps without a good
 # incumbent, and they join it only after `_ALONE` turns (about a second), for users who stop a long search
@@ -271,11 +272,11 @@ def _is_large(component: Component, run: Run) -> bool:
 
 def _by_regions(component: Component, searches: _Searches) -> list[Component]:
     """Search the places that cause a large component's gap; the components that are left."""
-    useful = None
     if component.closed or searches.run.should_stop():
         return [component]
+    useful = None
     if component.packing.num_rows >= _LARGE and component.best is not None and not component.packing.is_axial:
-        useful = close_by_regions(component, partial(_search_shortly, searches))
+        useful = close_by_regions(component, partial(_search_shortly, searches), searches.run)
     parts = (None if component.closed else split_component(component, useful=useful)) or [component]
     return [smaller for part in parts for smaller in _with_program(part, searches)]
 
@@ -290,7 +291,9 @@ def _search_shortly(searches: _Searches, packing: Packing) -> Outcome:
 
 def _with_program(component: Component, searches: _Searches) -> list[Component]:
     """Adopt the multipliers of the linear program; the components that are left, or the component itself."""
-    if searches.may_keep_gap(component):
+    # cuts have shown more than the linear program can
+    tight = component.packing.num_rows >= MANY and component.proven > component.bound
+    if searches.may_keep_gap(component) or tight:
         return [component]
     if not component.closed and not searches.run.should_stop():
         bound_by_linear_program(component, searches.run)
