@@ -67,6 +67,8 @@ class Solution:
     compile_time : float
         Seconds spent on compiling kernels (once after installation) or loading them (once in a process); they count in
         a time limit, not in ``runtime``.
+    gains : mapping
+        What moves of ``exact`` ("tabu", "genetic", "sub-steps", "regions", "branching") lowered the cost by, in all.
     """
 
     tuples: NDArray[np.int32]
@@ -81,6 +83,7 @@ class Solution:
     trace: tuple[TracePoint, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
     compile_time: float = 0.0
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def gap(self) -> float:

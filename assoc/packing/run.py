@@ -130,6 +130,8 @@ class Run:
         The thread that began the run.
     methods : Methods
         Exact methods that a search may use beside itself.
+    gains : dict
+        Moves that lowered the weight of the best solution, and by how much in all.
     """
 
     seed: int | np.random.SeedSequence | np.random.Generator
@@ -148,6 +150,7 @@ class Run:
     compiled: float = field(default_factory=compile_seconds)
     thread: int = field(default_factory=get_ident)
     methods: Methods = Methods()
+    gains: dict[str, float] = field(default_factory=dict)
     _rng: np.random.Generator | None = None
 
     @property
@@ -193,6 +196,11 @@ class Run:
     def memory_allows(self, needed: float) -> bool:
         """Whether a search may allocate ``needed`` bytes more; for searches that can do without."""
         return memory_allows(needed)
+
+    def note_gain(self, move: str, gain: float) -> None:
+        """Add what a move has gained to the gains."""
+        if 0.0 < gain < math.inf:
+            self.gains[move] = self.gains.get(move, 0.0) + gain
 
     def is_silent(self) -> bool:
         """Whether the trace has had no new point for so long that a search should add one."""

@@ -61,6 +61,7 @@ def certify(
         trace=tuple(run.trace),
         parameters=values_of(parameters),
         compile_time=run.compile_time(),
+        gains={move: gain * run.unit for move, gain in run.gains.items()},
     )
 
 

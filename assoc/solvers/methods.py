@@ -32,14 +32,17 @@ class IncumbentSearch:
     """
 
     def __init__(self, component: Component, run: Run) -> None:
-        self._component = component
+        self._component, self._run = component, run
         search = LocalSearch(component, run, clusters=TabuParameters.clusters)
         tabu, breeding = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
         if component.packing.num_rows >= _FAR:
             # from the rounded multipliers exact sub-steps reach less, and what is better of them is kept in any case
             tabu.owner = search.greedy()
-        self._moves = _Move(partial(tabu.iterate, search)), _Move(partial(breeding.iterate, search))
-        self._sub_steps = _Move(search.refine)
+        self._moves = (
+            _Move("tabu", partial(tabu.iterate, search)),
+            _Move("genetic", partial(breeding.iterate, search)),
+        )
+        self._sub_steps = _Move("sub-steps", search.refine)
         self._iterations = 0
 
     def iterate(self) -> None:
@@ -55,6 +58,7 @@ class IncumbentSearch:
         """Do a move; returns whether it gained."""
         before = self._component.weight
         move.make()
+        self._run.note_gain(move.name, before - self._component.weight)
         gained = self._component.weight < before - self._component.tolerance
         move.rest = 1 if gained else min(2 * move.rest, _REST)
         move.due = now + move.rest
@@ -65,6 +69,7 @@ class IncumbentSearch:
 class _Move:
     """A move, the iteration in which it is due, and the iterations that it rests."""
 
+    name: str
     make: Callable[[], object]
     due: int = 0
     rest: int = 1

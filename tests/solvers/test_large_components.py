@@ -14,6 +14,7 @@ from assoc.solvers.exact import regions, tightening
 from assoc.solvers.exact.regions import close_by_regions
 from assoc.solvers.exact.search import search_to_the_end
 from assoc.solvers.exact.tightening import Prices, tighten
+from experiments.common.instances.large import cameras
 from experiments.common.instances.synthetic import wide_gates
 from tests.sizes import sample
 from tests.solvers.pieces import with_greedy_cover
@@ -96,3 +97,13 @@ def test_an_allowed_gap_spares_large_components_their_linear_program():
     assert proved.status == "optimal" and proved.iterations > answer.iterations == 0
     assert answer.stopped_by == "gap" and answer.lower_bound <= proved.cost <= answer.cost
     assert answer.gap <= 0.01 * abs(answer.cost)
+
+
+def test_gains_of_moves_add_up_to_what_the_cost_fell_by():
+    """From the first cover of the trace on; what branching finds and what the improver's moves find are told apart."""
+    told = set()
+    for problem in (wide_gates(300, 4), cameras(150, 3, 3.0, 1)):
+        answer = assoc.assign(problem)
+        assert sum(answer.gains.values()) == pytest.approx(answer.trace[0].cost - answer.cost, abs=1e-9)
+        told |= answer.gains.keys()
+    assert {"branching", "tabu"} <= told <= {"branching", "tabu", "genetic", "sub-steps", "regions"}

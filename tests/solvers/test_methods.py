@@ -30,7 +30,7 @@ def test_turns_go_to_what_gains(gains, expected):
             calls[name] += 1
             component.weight -= float(name == gains)
 
-        return _Move(make)
+        return _Move(name, make)
 
     search._moves, search._sub_steps = (move("first"), move("second")), move("steps")
     for _ in range(57):

@@ -134,7 +134,9 @@ class _Task:
 
     def _branch(self, branching: Branching, nodes: int) -> bool:
         """Search some nodes; returns whether nothing is left to search."""
+        before = self.component.weight
         self.all.iterations += branching.advance(min(nodes, self.all.nodes_left))
+        self.all.run.note_gain("branching", before - self.component.weight)
         return branching.search.done
 
     @property
@@ -276,7 +278,9 @@ def _by_regions(component: Component, searches: _Searches) -> list[Component]:
         return [component]
     useful = None
     if component.packing.num_rows >= _LARGE and component.best is not None and not component.packing.is_axial:
+        before = component.weight
         useful = close_by_regions(component, partial(_search_shortly, searches), searches.run)
+        searches.run.note_gain("regions", before - component.weight)
     parts = (None if component.closed else split_component(component, useful=useful)) or [component]
     return [smaller for part in parts for smaller in _with_program(part, searches)]
 
