@@ -35,9 +35,10 @@ def test_frames_follow_each_other():
 
 def test_curves(capsys):
     clock = Run.runtime
-    found = anytime.curves(lambda seed: records(60, 3, seed), 1, [0.5, 1.0], ["exact", "tabu"])
+    found = anytime.curves(lambda seed: records(60, 3, seed), 1, [0.5, 1.0], ["exact", "tabu", *anytime.PEERS])
     assert Run.runtime is clock
     optimum = assoc.assign(records(60, 3, 1), "milp").cost
     assert [cost for cost, _ in found["exact"]] == pytest.approx([optimum] * 2)
-    assert all(cost >= optimum - 1e-6 for cost, _ in found["tabu"])
+    for name in ("tabu", *anytime.PEERS):
+        assert all(cost >= optimum - 1e-6 and gap >= 0.0 for cost, gap in found[name])
     assert "tabu, 1 s" in capsys.readouterr().out
