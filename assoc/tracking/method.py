@@ -22,7 +22,7 @@ from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step, decision
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import false_alarms_at
+from assoc.tracking.stages.coverage import new_targets_at
 from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 
@@ -62,7 +62,7 @@ class Method(ABC):
     def life_cycle(self, progress: Progress, association: Association) -> Progress:
         """Confirm tracks, report decisions, delete tracks."""
         settings, scan = progress.settings, progress.scan
-        tracks = association.tracks.confirm(settings.life_cycle, false_alarms_at(progress, association.tracks))
+        tracks = association.tracks.confirm(settings.life_cycle, new_targets_at(progress, association.tracks))
         now = decision(scan.index, scan.time, association.assigned, tracks.track_id[tracks.confirmed])
         gone = to_delete(progress, tracks)
         ended = np.sort(tracks.track_id[gone & tracks.confirmed])

@@ -37,7 +37,7 @@ def test_a_track_of_a_false_alarm_begins_anew(name, own):
             step(tracker, 5.1 + 1.7 * k, z, own)
         (one,), (other,) = old.tracks, fresh.tracks
         assert one.score == pytest.approx(other.score) and one.hits == other.hits
-        assert one.confirmed == other.confirmed == (k > 2)
+        assert one.confirmed == other.confirmed == (k > 1)
         assert one.position == pytest.approx(other.position) and one.covariance == pytest.approx(other.covariance)
 
 

@@ -35,7 +35,7 @@ from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step
 from assoc.tracking.records.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import false_alarms_at
+from assoc.tracking.stages.coverage import new_targets_at
 from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.tracker import Tracker
@@ -125,7 +125,7 @@ class TrackTrees(DeferringMethod):
         """Confirm trees, decide the oldest scan of the window, delete branches that contradict it, and tracks."""
         tracks, trees, scan = association.tracks, association.method_state, progress.state.scan
         new = trees.chosen & ~tracks.confirmed
-        new &= progress.settings.life_cycle.confirms(tracks.score, tracks.detections, false_alarms_at(progress, tracks))
+        new &= progress.settings.life_cycle.confirms(tracks.score, tracks.detections, new_targets_at(progress, tracks))
         if new.any():
             tracks = tracks.with_confirmed(tracks.confirmed | same_tree(tracks.track_id.copy(), new))
         now = trees.window.decision(0, scan, tracks, np.flatnonzero(trees.chosen))

@@ -36,7 +36,7 @@ from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.track import Decision, Step
 from assoc.tracking.records.track_batch import STARTED, TrackBatch
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages.coverage import false_alarms_at
+from assoc.tracking.stages.coverage import new_targets_at
 from assoc.tracking.stages.ending import to_delete
 from assoc.tracking.state import TrackerState
 from assoc.tracking.tracker import Tracker
@@ -135,7 +135,7 @@ class ClusteredHypotheses(DeferringMethod):
         before, scan = progress.state.tracks, progress.state.scan
         tracks, hypotheses = association.tracks, association.method_state
         known = before.track_id[before.confirmed]
-        sure = tracks.confirm(progress.settings.life_cycle, false_alarms_at(progress, tracks)).confirmed
+        sure = tracks.confirm(progress.settings.life_cycle, new_targets_at(progress, tracks)).confirmed
         good = hypotheses.best[sure[hypotheses.best]]
         tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, tracks.track_id[good]))
         now = hypotheses.window.decision(0, scan, tracks, hypotheses.best)

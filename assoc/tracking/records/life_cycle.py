@@ -19,7 +19,7 @@ Deletion = Literal["time", "count", "score"]
 HISTORY = 62
 """Scans whose detections are remembered, one a bit."""
 
-# share of false tracks that may be confirmed while nobody knows how many false alarms there are, and at the most
+# share of confirmed tracks that may be false while nobody knows how many there are in an hour, and at the most
 _UNKNOWN, _MOST = 1e-6, 1e-2
 
 OVERLOOKED = 1e-4
@@ -35,13 +35,14 @@ class LifeCycle:
     Parameters
     ----------
     confirmation : "score" or "m-of-n"
-        "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test. alpha is the
-        share of false tracks confirmed: each false alarm may begin one, so that it is `false_tracks_per_hour` over the
-        false alarms of all sensors in an hour (S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems,
-        1999, section 6.2), at most 0.01.
+        "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test (S. Blackman, R.
+        Popoli, Design and Analysis of Modern Tracking Systems, 1999, section 6.2). A score begins with the density of
+        new targets over that of false alarms, so that it is the log odds of a target. alpha is `false_tracks_per_hour`
+        over the new targets that are expected in an hour, at most 0.01: of false alarms so many tracks are confirmed
+        in an hour on average, at the most (J. Ville, Étude critique de la notion de collectif, 1939).
         "m-of-n": detected in `m` of the last `n` scans.
     false_tracks_per_hour : float
-        False tracks that may be confirmed in an hour. There are fewer: few false alarms begin a track.
+        False tracks that may be confirmed in an hour. There are fewer, if false alarms are as declared.
     false_probability : float, optional
         alpha itself.
     missed_probability : float
@@ -96,22 +97,22 @@ class LifeCycle:
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 
-    def false_share(self, alarms: Array | float) -> Array:
-        """Share of false tracks that may be confirmed, with so many false alarms in an hour (inf: not known)."""
-        alarms = np.asarray(alarms, dtype=np.float64)
+    def false_share(self, hourly: Array | float) -> Array:
+        """Share of confirmed tracks that may be false, with so many new targets in an hour (inf: not known)."""
+        hourly = np.asarray(hourly, dtype=np.float64)
         if self.false_probability is not None:
-            return np.full(alarms.shape, self.false_probability)
-        share = np.minimum(_MOST, self.false_tracks_per_hour / np.maximum(alarms, 1e-300))
-        return np.where(np.isinf(alarms), _UNKNOWN, share)
+            return np.full(hourly.shape, self.false_probability)
+        share = np.minimum(_MOST, self.false_tracks_per_hour / np.maximum(hourly, 1e-300))
+        return np.where(np.isinf(hourly), _UNKNOWN, share)
 
-    def confirms(self, score: Array, detections: Array, alarms: Array | float) -> Array:
+    def confirms(self, score: Array, detections: Array, hourly: Array | float) -> Array:
         """Which tracks are to be confirmed.
 
-        `detections` has one bit for each scan, the last scan lowest; `alarms` are the false alarms in an hour, of all
+        `detections` has one bit for each scan, the last scan lowest; `hourly` are the new targets in an hour, of all
         or for each track.
         """
         if self.confirmation == "score":
-            reached: Array = score >= sequential_threshold(self.false_share(alarms), self.missed_probability)
+            reached: Array = score >= sequential_threshold(self.false_share(hourly), self.missed_probability)
             return reached
         window = (detections & np.int64((1 << self.n) - 1)).astype(np.uint64)
         return np.asarray(count_bits(window) >= self.m)

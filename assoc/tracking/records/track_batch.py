@@ -178,9 +178,9 @@ class TrackBatch:
             counts[self.track_id == i, PARENT] = parent
         return TrackBatch(self.states, self.numbers, counts)
 
-    def confirm(self, life_cycle: LifeCycle, alarms: Array | float) -> TrackBatch:
+    def confirm(self, life_cycle: LifeCycle, hourly: Array | float) -> TrackBatch:
         """Confirm the tracks that meet the criterion."""
-        return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections, alarms))
+        return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections, hourly))
 
     def to_delete(self, life_cycle: LifeCycle, time: float, patience: Array) -> Array:
         """Which tracks are to be deleted; see `LifeCycle.deletes`."""

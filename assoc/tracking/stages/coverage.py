@@ -16,6 +16,7 @@ from assoc.costs.views import log_missed, places_of
 from assoc.scene.own_times import FULL_TURN, looked_at
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.clutter import YOUNG, ClutterMap
+from assoc.tracking.records.echoes import STRAYS
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.settings import TrackerSettings
 
@@ -106,30 +107,46 @@ def covered(progress: Progress, misses: Array) -> Array:
     return np.asarray((misses <= log_missed(terms.miss, least)).any(axis=1))
 
 
-def false_alarms(progress: Progress) -> float:
-    """False alarms of all sensors that are expected in an hour; inf while the pace of the scans is not known."""
-    state = progress.state
-    if state.pace <= 0.0:
-        return math.inf
-    rates = np.array([sensor.false_alarm_rate for sensor in progress.settings.sensors])
-    return float(rates @ state.turns) * _HOUR / state.pace
+def an_hour(progress: Progress) -> tuple[float, float]:
+    """New targets in the region that are expected in an hour, and false alarms of all sensors.
 
-
-def false_alarms_at(progress: Progress, tracks: TrackBatch) -> Array | float:
-    """The same where tracks are that may be confirmed: denser at some places, as false tracks are; (T,).
-
-    At what may yet turn out to be a place, all that a track has gained so far may be as much too much.
+    Scores of the tracks that a scan begins count a target once, whatever the number of sensors. Both are inf while the
+    pace of the scans is not known.
     """
-    alarms, life, clutter = false_alarms(progress), progress.settings.life_cycle, progress.clutter
-    new = np.flatnonzero(~tracks.confirmed & life.confirms(tracks.score, tracks.detections, alarms))
-    before = progress.state.clutter
-    if before is None or clutter is None or not len(new):
-        return alarms
-    used = densities_at(progress, tracks[new], clutter)[0]
-    doubtful = used @ (before.clock < YOUNG) * tracks.hits[new]
-    usual = life.false_tracks_per_hour / float(life.false_share(alarms)) if math.isinf(alarms) else alarms
+    state, settings = progress.state, progress.settings
+    if state.pace <= 0.0:
+        return math.inf, math.inf
+    alarms = np.array([sensor.false_alarm_rate for sensor in settings.sensors])
+    in_a_scan = settings.initiation.birth_rate * min(1.0, float(state.turns.sum())), float(alarms @ state.turns)
+    return in_a_scan[0] * _HOUR / state.pace, in_a_scan[1] * _HOUR / state.pace
+
+
+def new_targets_at(progress: Progress, tracks: TrackBatch) -> Array | float:
+    """New targets in an hour for tracks that may be confirmed; false alarms where more of these begin tracks, (T,).
+
+    So it is outside of the region, for which there is no number of new targets, beside a track whose echo it may be,
+    and at places where false alarms are denser. At what may yet turn out to be a place, all that a track has gained so
+    far may be as much too much.
+    """
+    hourly, alarms = an_hour(progress)
+    life, clutter, before = progress.settings.life_cycle, progress.clutter, progress.state.clutter
+    new = np.flatnonzero(~tracks.confirmed & life.confirms(tracks.score, tracks.detections, hourly))
+    if not len(new):
+        return hourly
+    usual = life.false_tracks_per_hour / float(life.false_share(hourly)) if math.isinf(hourly) else hourly
+    doubted, echoes, denser = (
+        ~inside(progress.settings, tracks.states[new], 3),
+        progress.state.echoes,
+        np.zeros(len(new)),
+    )
+    if echoes is not None:
+        doubted |= np.isin(tracks.track_id[new], echoes.ids[echoes.counts[:, STRAYS] == 0.0, 0])
+    if before is not None and clutter is not None:
+        used = densities_at(progress, tracks[new], clutter)[0]
+        denser = np.maximum(used.max(axis=1), used @ (before.clock < YOUNG) * tracks.hits[new])
     at = np.full(len(tracks), usual)
-    at[new] *= np.exp(np.minimum(np.maximum(used.max(axis=1), doubtful), _SURELY_FALSE))
+    at[new[doubted | (denser > 0.0)]] = usual if math.isinf(alarms) else max(usual, alarms)
+    at[new] *= np.exp(np.minimum(denser, _SURELY_FALSE))
     return at
 
 
