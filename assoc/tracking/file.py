@@ -227,8 +227,9 @@ def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> Clut
         good = clocks.shape == (count,) and (np.diff(clocks) >= 0).all() and (clocks <= saved["clock"][s]).all()
         saved.require(good, f"clocks.{s}", f"{count} turns that do not descend")
         votes = saved[f"votes.{s}"]
-        good = votes.shape == (count, 2) and bool((np.abs(votes) <= ONE_SAYS).all())
-        saved.require(good, f"votes.{s}", f"{count} pairs of numbers from {-ONE_SAYS:.3g} to {ONE_SAYS:.3g}")
+        good = votes.shape == (count,) and bool((np.abs(votes) <= ONE_SAYS).all())
+        saved.require(good, f"votes.{s}", f"{count} numbers from {-ONE_SAYS:.3g} to {ONE_SAYS:.3g}")
+        saved.require(saved[f"sites.{s}"].shape == (count,), f"sites.{s}", f"{count} numbers of sites")
     return model.restored(saved)
 
 

@@ -4,60 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from assoc.costs.views import BANDS, bands_of
 from assoc.errors import InvalidInputError
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.scene import Scene
-from assoc.scene.scan import Scan
-from assoc.sensors import PositionSensor, Radar2D
 from assoc.sensors.base import wrap_angle
-from assoc.simulation.observation import observe
-from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
-from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.prequential import trusted
 from tests.sizes import sample
-from tests.tracking.stepping import stepped
-
-REGION = np.array([[-30e3, 30e3], [-30e3, 30e3], [0.0, 12e3]])
-TARGETS = 8
-
-
-def radars(noise=80.0, detection_probability=0.9, count=3):
-    return [
-        radar_over(
-            REGION, place, range_noise=noise, angle_noise=noise / 50e3, detection_probability=detection_probability,
-            false_alarm_rate=10.0, name=f"radar {s + 1}",
-        )
-        for s, place in enumerate(on_circle(np.zeros(3), 40e3, count))
-    ]  # fmt: skip
-
-
-def scene_of(sensors, seed, scans=30, turn=0.0):
-    """Targets that fly straight, or turn for four of ten scans at a rate (rad/s)."""
-    rng = np.random.default_rng(seed)
-    times = 4.0 * np.arange(scans)
-    rate = np.where(np.arange(scans) % 10 > 5, turn, 0.0)
-    heading = rng.uniform(-np.pi, np.pi, TARGETS) + np.cumsum(rate * 4.0)[:, None]
-    velocity = 200.0 * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=-1)
-    start = rng.uniform([-10e3, -10e3, 1e3], [10e3, 10e3, 2e3], (TARGETS, 3)) + 1e3 * np.arange(TARGETS)[:, None] * [
-        0,
-        0,
-        1,
-    ]
-    paths = start + np.cumsum(4.0 * velocity, axis=0)
-    return observe(sensors, times, [np.arange(TARGETS)] * scans, list(paths), rng, region=REGION)
-
-
-def tracked(scene, sensors, name="nearest-neighbour", **options):
-    """A tracker that adapts, after a scene of which it is told these sensors."""
-    tracker = TRACKERS[name].for_scene(replace(scene, sensors=sensors), adapt=True, **options)
-    stepped(tracker, scene, times=True)
-    return tracker
+from tests.tracking.learning import REGION, TARGETS, group, planar, radars, scene_of, tracked, with_returns
 
 
 def inside(quantity, truth):
@@ -161,157 +118,6 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
     assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
 
 
-def with_returns(scene, count, seed):
-    """The scene with plots of each radar from one patch of 3 x 3 km in every scan."""
-    rng, low = np.random.default_rng(seed), np.array([14e3, -17e3, 0.0])
-    more = [
-        [sensor.measure(rng.uniform(low, low + [3e3, 3e3, 200.0], (count, 3))) for sensor in scene.sensors]
-        for _ in scene.times
-    ]
-    both = [
-        [np.concatenate(pair) for pair in zip(scan, added, strict=True)]
-        for scan, added in zip(scene.measurements, more, strict=True)
-    ]
-    return Scene(scene.sensors, scene.times, both, scene.region)
-
-
-def in_patch(tracker):
-    """Reported tracks in the patch."""
-    where = np.array([track.position for track in tracker.tracks if track.reported])[:, :2]
-    return int((np.abs(where - [15.5e3, -15.5e3]) < 2e3).all(axis=1).sum())
-
-
-@sample("name", sorted(TRACKERS), every=3)
-def test_no_track_stays_where_clutter_is_dense(name):
-    scene = with_returns(scene_of(radars(), 7, scans=15), 10, 1)
-    told = TRACKERS[name].for_scene(scene)
-    stepped(told, scene)
-    assert in_patch(told) > 4
-    tracker = tracked(scene, radars(), name)
-    assert in_patch(tracker) == 0
-    assert sum(track.reported for track in tracker.tracks) == TARGETS
-    assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
-
-
-def test_density_of_clutter_by_place():
-    """Several plots a turn from a patch are as dense as they are; one a turn may be a target."""
-    rng, sensor = np.random.default_rng(5), PositionSensor(
-        position=np.zeros(3), noise=[1.0, 1.0], false_alarm_rate=1.0, field_of_view=[[0.0, 1e3], [0.0, 1e3]]
-    )  # fmt: skip
-    empty, turns = ClutterMap.empty([sensor]), np.ones(1)
-    patch, alone = empty, empty
-    for k in range(30):
-        plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, 1e3, (1, 2))])
-        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full((6, 2), 0.5)])
-        alone = alone.after([sensor], Scan(k, float(k), (rng.normal(25.0, 1.0, (1, 2)),)), turns)
-    there = Scan(30, 30.0, (np.array([[25.0, 25.0], [700.0, 700.0]]),))
-    inside, outside = patch.used_and_found([sensor], there)[0][0]
-    # five in 50 x 50 m against one in 1000 x 1000 m
-    assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
-    assert not alone.used_and_found([sensor], there)[1][0].any()
-
-
-def test_no_track_starts_in_a_closed_area():
-    scene = with_returns(scene_of(radars(), 7, scans=10), 10, 1)
-    patch = [[13e3, -18e3], [18e3, -18e3], [18e3, -13e3], [13e3, -13e3]]
-    tracker = TRACKERS["nearest-neighbour"].for_scene(scene, initiation=Initiation(closed=[patch]))
-    stepped(tracker, scene)
-    assert in_patch(tracker) == 0
-    assert sum(track.reported for track in tracker.tracks) == TARGETS
-
-
-def planar(noise):
-    """A filter of nearly constant velocity in the plane."""
-    return ExtendedKalmanFilter(ConstantVelocity(noise, dimensions=2, kind="continuous"))
-
-
-def group(seed, speed, spacing, noise, scans=25):
-    """Twelve targets in rows of three, seen by one sensor each second: the sensor, and its measurements."""
-    rng, view = np.random.default_rng(seed), [[-10e3, 10e3], [-10e3, 10e3]]
-    sensor = PositionSensor(
-        position=np.zeros(3), noise=[noise] * 2, detection_probability=0.9, false_alarm_rate=5.0, field_of_view=view
-    )
-    at, plots = spacing * np.stack([np.arange(12) % 3, np.arange(12) // 3], axis=1), []
-    for k in range(scans):
-        seen = at + [k * speed, 0.0] + rng.normal(0.0, noise, (12, 2))
-        plots.append(np.concatenate([seen[rng.random(12) < 0.9], rng.uniform(-10e3, 10e3, (rng.poisson(5.0), 2))]))
-    return sensor, plots
-
-
-@pytest.mark.parametrize(("speed", "spacing", "noise"), [(120.0, 60.0, 50.0), (0.0, 60.0, 10.0)])
-def test_targets_close_together_are_no_clutter(speed, spacing, noise):
-    """Neither those that go on, nor those that stand, each near its own track."""
-    sensor, plots = group(3, speed, spacing, noise)
-    tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=True, initiation=Initiation(speed=max(speed, 10.0)))
-    for k, z in enumerate(plots):
-        tracker.step(float(k), [z])
-    assert sum(track.reported for track in tracker.tracks) >= 11
-
-
-def test_what_stands_is_no_place_though_its_tracks_predict_badly():
-    """Ships at a pier, by a filter that lets them manoeuvre: what comes back to where it was is no clutter."""
-    for seed in range(3):
-        sensor, plots = group(seed, 0.0, 60.0, 15.0)
-        shown = []
-        for adapt in (True, False):
-            options = {"adapt": adapt, "initiation": Initiation(speed=10.0)}
-            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), **options)
-            for k, z in enumerate(plots):
-                tracker.step(10.0 * k, [z])
-            shown.append(sum(track.reported for track in tracker.tracks))
-        assert shown[0] >= shown[1] - 1 and shown[1] >= 10
-
-
-@pytest.mark.parametrize("middle", [0.0, np.pi])
-def test_density_of_plots_of_what_stands(middle):
-    """That of a normal distribution about the mean of the plots so far, also where azimuths begin again."""
-    sensor = Radar2D(
-        position=np.zeros(3), noise=[10.0, 1e-3], detection_probability=0.8, false_alarm_rate=2.0,
-        field_of_view=[[0.0, 20e3], [-np.pi, np.pi]],
-    )  # fmt: skip
-    rng, known, at = np.random.default_rng(2), ClutterMap.empty([sensor]), np.array([5e3, middle])
-    for k in range(10):
-        z = at + 0.05 * rng.normal(0.0, [10.0, 1e-3], (1, 2))
-        z[:, 1] = wrap_angle(z[:, 1])
-        known = known.after([sensor], Scan(k, float(k), (z,)), np.ones(1))
-    off = np.array([[0.0, 0.0], [15.0, 1e-3], [0.0, 0.1]])
-    z = np.stack([off[:, 0] + at[0], wrap_angle(off[:, 1] + at[1])], axis=1)
-    expected = 0.8 * multivariate_normal([0.0, 0.0], np.diag([100.0, 1e-6]) * 1.1).pdf(off) / (2.0 / sensor.volume)
-    assert known.standing(sensor, 0, z) == pytest.approx(expected, rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("turns", "least", "most"), [(range(10), 1.0, 1.0), ((0, 4, 9), 0.0, 0.01), ((0, 1, 9), 0.0, 0.01)]
-)
-def test_what_comes_back_seldom_is_no_target_that_stands(turns, least, most):
-    """A turbine that flickers: a target would have been detected in nine of ten turns, not in three."""
-    sensor, _ = group(0, 0.0, 60.0, 10.0)
-    known, always = ClutterMap.empty([sensor]), ClutterMap.empty([sensor])
-    for k in range(10):
-        z = np.full((1, 2), 100.0)
-        known = known.after([sensor], Scan(k, float(k), (z if k in turns else z[:0],)), np.ones(1))
-        always = always.after([sensor], Scan(k, float(k), (z,)), np.ones(1))
-    there = np.full((1, 2), 100.0)
-    share = known.standing(sensor, 0, there) / always.standing(sensor, 0, there)
-    assert least <= share[0] <= most
-
-
-def test_turbines_that_flicker_are_clutter():
-    """Twelve points that return a plot in a third of the turns, each its own: tracked without a map, not with one."""
-    shown = []
-    for adapt in (True, False):
-        found = 0
-        for seed in range(4):
-            sensor, plots = group(seed, 0.0, 60.0, 15.0, scans=40)
-            rng = np.random.default_rng(seed)
-            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), adapt=adapt, initiation=Initiation(speed=10.0))
-            for k, z in enumerate(plots):
-                tracker.step(10.0 * k, [z[rng.random(len(z)) < 0.4]])
-            found += sum(track.reported for track in tracker.tracks)
-        shown.append(found)
-    assert shown[0] < 0.6 * shown[1]
-
-
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
     """Eleven tracks of twelve targets are missed seldom, and leave plots over: neither is of the sensor."""
     sensor, plots = group(3, 120.0, 60.0, 50.0, scans=60)
@@ -336,33 +142,6 @@ def test_noise_is_learnt_in_formations():
     for k, z in enumerate(plots):
         tracker.step(float(k), [z])
     assert tracker.state.estimates.used[0, 0] > 3.0
-
-
-def test_targets_that_fly_together_are_confirmed_as_without_the_map():
-    """What may be a place in the first turns is none unless it predicts surely better than tracks do."""
-    for seed in range(4):
-        sensor, plots = group(seed, 120.0, 60.0, 50.0)
-        shown = []
-        for adapt in (True, False):
-            options = {"adapt": adapt, "initiation": Initiation(speed=120.0)}
-            tracker = TRACKERS["multi-sensor"]([sensor], planar(5.0), **options)
-            for k, z in enumerate(plots[:4]):
-                tracker.step(float(k), [z])
-            shown.append(sum(track.reported for track in tracker.tracks))
-        assert shown[0] == shown[1] > 6
-
-
-def test_no_doubt_where_tracks_predict_well_from_the_first():
-    """Four abreast on each of three heights are as dense as a place of clutter, but each is near its own track."""
-    times = 4.0 * np.arange(3)
-    row = np.stack([np.arange(12) % 4 * 350.0, np.zeros(12), 3e3 * (np.arange(12) // 4 + 1.0)], axis=1)
-    paths = list(row + times[:, None, None] * [0.0, 200.0, 0.0])
-    for seed in range(4):
-        scene = observe(radars(), times, [np.arange(12)] * 3, paths, np.random.default_rng(seed), region=REGION)
-        tracker = TRACKERS["multi-sensor"].for_scene(scene, adapt=True)
-        stepped(tracker, scene)
-        # one may be new; without the map 12
-        assert sum(track.reported for track in tracker.tracks) >= 11
 
 
 @pytest.mark.parametrize("bias", [0.0, 1.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -143,20 +144,21 @@ def learn(progress: Progress) -> Progress:
 
 
 def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> list[Array]:
-    """How much better places predicted each measurement than predicted tracks, or targets that stand, (n_s, 2) each.
+    """How much better places predicted each measurement than predicted tracks did, (n_s,) for each sensor.
 
-    Differences of log likelihoods, limited; 0 outside of places, but for the first turns. All are intensities of
-    Poisson processes, so that tracks `there`, bool (T, S), must not be more than have measurements.
+    Differences of log likelihoods, limited; 0 outside of places, but for the first turns. Places return Poisson numbers
+    of plots; tracks are detected or missed: each of those `there`, bool (T, S), that has no measurement counts against
+    tracks.
     """
     settings, clutter = progress.settings, progress.state.clutter
     assert clutter is not None
-    votes = [np.zeros((len(z), 2)) for z in progress.crowds]
+    votes = [np.zeros(len(z)) for z in progress.crowds]
     for s, (sensor, found) in enumerate(zip(settings.sensors, progress.crowds, strict=True)):
         # in the first turns tracks may well predict what no place does yet
         rows = np.flatnonzero(found) if clutter.clock[s] >= YOUNG - 1.0 else np.arange(len(found))
         if not len(rows):
             continue
-        dense, z = np.zeros(len(rows)), scan.measurements[s][rows]
+        dense, z, missed = np.zeros(len(rows)), scan.measurements[s][rows], 0.0
         if len(tracks):
             expected = settings.filter.expected(tracks.states, sensor)
             gate = gate_of(sensor, settings.gate_probability)
@@ -165,12 +167,12 @@ def _votes(progress: Progress, scan: Scan, tracks: TrackBatch, there: Array) -> 
             square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[track], off)
             size = 0.5 * np.linalg.slogdet(2.0 * np.pi * expected.covariance)[1][track]
             density = sensor.detection_probability * sensor.volume / sensor.false_alarm_rate
-            np.add.at(dense, near, density * np.exp(-0.5 * square - size))
-        crowd = np.count_nonzero(found)
-        more = (found[rows] > 0.0) * (sensor.detection_probability * there[:, s].sum() / max(crowd, 1) - 1.0)
-        stand = clutter.standing(progress.work.settings.sensors[s], s, z)
-        others = np.stack([np.log1p(dense) - more, np.log1p(stand)], axis=1)
-        votes[s][rows] = np.clip(found[rows, None] - others, -ONE_SAYS, ONE_SAYS)
+            own = density * np.exp(-0.5 * square - size)
+            np.add.at(dense, near, own)
+            hit = np.minimum(np.bincount(track, own / (1.0 + dense[near]), len(tracks)), 1.0)
+            missed = -math.log1p(-sensor.detection_probability) * ((1.0 - hit) * there[:, s]).sum()
+        more = (found[rows] > 0.0) * (missed / max(int(np.count_nonzero(found)), 1) - 1.0)
+        votes[s][rows] = np.clip(found[rows] - np.log1p(dense) + more, -ONE_SAYS, ONE_SAYS)
     return votes
 
 

@@ -4,11 +4,14 @@ The last plots of each sensor are kept. Of those near a measurement, the nearest
 only the others show clutter, and the density follows from the distance within which there are six of them, in units of
 the sensor's noise. A wind farm, a shore or a road returns many plots from the same place in every turn; targets that
 fly together are as dense, but go on: a place must surely have returned plots in more than half of the turns before.
-And it must have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), and than
-targets that stand would, each by what came before: where targets circle, each is near its own track, and what stands
-comes back to where it was, tracked or not, as often as the sensor detects targets; clutter lies anywhere in its place,
-or flickers. In the first turns nobody can be sure, and what may be a place is in doubt unless either has predicted its
-plots better.
+
+Some of it stands: plots that lie together are of one site. There the density is that of the site, by as many plots as
+came from it. Ships at anchor are sites, too, but are detected as often as any target, whereas turbines flicker: of the
+sites about a measurement, clutter must explain hits and misses better than targets do.
+
+A place must also have predicted its plots surely better than tracks did (`assoc.tracking.records.prequential`), each by
+what came before: where targets circle, each is near its own track. In the first turns nobody can be sure, and what may
+be a place is in doubt unless tracks, or surely targets that stand, have predicted its plots better.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.special import gammaincinv, xlog1py, xlogy
+from scipy.special import betainc, betaln, gammaincinv
 
 from assoc._types import Array
 from assoc.scene.scan import Scan
@@ -45,8 +48,10 @@ ONE_SAYS = 0.5 * NEEDED
 """Largest vote: no measurement alone shows that a place predicts better than tracks, it may be of a new target."""
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
-# no two plots of one target are so far apart, in units of the noise
-_FAR = 8.0
+# a plot is of a site if it lies where so many of a target's would; of the nearest so many sites
+_OWN, _SITES = 0.99, 8
+# a target falls silent for longer, or is hidden, once in a hundred turns
+_SILENT = -math.log(100.0)
 
 
 class ClutterMap(NamedTuple):
@@ -59,28 +64,30 @@ class ClutterMap(NamedTuple):
     clock: Array
     """Turns of each sensor so far, (S,)."""
     votes: tuple[Array, ...]
-    """Evidence of each plot that its place predicted it better than tracks, and what stands, did; (n_s, 2) each."""
+    """Evidence of each plot that its place predicted it better than tracks did; (n_s,) each."""
+    sites: tuple[Array, ...]
+    """Number of the point to which each plot came back, (n_s,) each."""
 
     @staticmethod
     def empty(sensors: Sequence[Sensor]) -> ClutterMap:
         """No plots."""
         none = [np.zeros((0, sensor.position_part.dim)) for sensor in sensors]
         nothing = tuple(np.zeros(0) for _ in sensors)
-        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), tuple(np.zeros((0, 2)) for _ in sensors))
+        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), nothing, nothing)
 
     def arrays(self) -> dict[str, Array]:
         """Everything as plain arrays."""
         found = {f"places.{s}": array for s, array in enumerate(self.places)}
-        for name, arrays in (("clocks", self.clocks), ("votes", self.votes)):
+        for name, arrays in (("clocks", self.clocks), ("votes", self.votes), ("sites", self.sites)):
             found |= {f"{name}.{s}": array for s, array in enumerate(arrays)}
         return found | {"clock": self.clock}
 
     def restored(self, arrays: Mapping[str, Array]) -> ClutterMap:
         """The map, of as many sensors as this one, from the `arrays` of another."""
         sensors = range(len(self.places))
-        names = ("places", "clocks", "votes")
-        places, clocks, votes = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in names)
-        return ClutterMap(places, clocks, arrays["clock"], votes)
+        names = ("places", "clocks", "votes", "sites")
+        places, clocks, votes, sites = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in names)
+        return ClutterMap(places, clocks, arrays["clock"], votes, sites)
 
     def used_and_found(
         self, sensors: Sequence[Sensor], scan: Scan, elsewhere: Sequence[Array] | None = None
@@ -97,59 +104,82 @@ class ClutterMap(NamedTuple):
                 # what reports by itself, and does not look, returns no clutter of a place
                 found.append((np.zeros(len(at)), np.zeros(len(at))))
             else:
-                known = self.places[s], self.clocks[s], self.votes[s]
-                found.append(_densities(sensor, at, *known, float(self.clock[s])))
+                found.append(self._densities(sensor, s, at))
         used, every = zip(*found, strict=True)
         return used, every
 
-    def standing(self, sensor: Sensor, s: int, at: Array) -> Array:
-        """Density of plots of targets that stand, at measurements of sensor s, relative to its false alarms, (n,).
-
-        Each plot so far may have been of one, that stands where the plots near by are on average; unless these came
-        more seldom than by the sensor's detection probability: turbines and masts flicker.
-        """
-        turns, part, places = min(round(float(self.clock[s])), _TURNS), sensor.position_part, self.places[s]
-        if not len(at) or not len(places) or turns < 1:
-            return np.zeros(len(at))
-        around, z, most = _around(sensor), _places(sensor, at), min(_LOOKED_AT, len(places))
-        tree = cKDTree(places, boxsize=around)
-        nearest = [*range(1, most + 1)]
-        apart, near = (np.asarray(found) for found in tree.query(z, nearest, distance_upper_bound=_FAR))
-        who, which = np.nonzero(np.isfinite(apart))
-        some, row = np.unique(near[who, which], return_inverse=True)
-        apart, mates = (np.asarray(found) for found in tree.query(places[some], nearest))
-        weights = np.exp(-0.25 * apart**2)
-        count = weights.sum(axis=1)
-        mean = (weights[:, :, None] * _off(places[mates], places[some][:, None], around)).sum(axis=1) / count[:, None]
-        off = _off(z[who], (places[some] + mean)[row], around)
-        age = np.rint(float(self.clock[s]) - self.clocks[s]).astype(np.int64)
-        # two plots of one target are nearer to each other than this, 95 % sure
-        own, mate = np.nonzero(apart**2 <= 4.0 * gammaincinv(0.5 * part.dim, _SURE))
-        seen = np.zeros((len(some), int(_TURNS) + 2), dtype=np.bool_)
-        seen[own, np.clip(age[mates[own, mate]], 0, int(_TURNS) + 1)] = True
-        share = _steadiness(seen, sensor.detection_probability)[row] * sensor.detection_probability
-        spread = 1.0 + 1.0 / count[row]
-        usual = part.false_alarm_rate / part.volume * float(np.prod(_units(sensor))) * turns
-        density = share * (2.0 * math.pi * spread) ** (-0.5 * part.dim) * np.exp(-0.5 * (off**2).sum(axis=1) / spread)
-        return np.bincount(who, density, len(at)) / usual
+    def _densities(self, sensor: Sensor, s: int, at: Array) -> tuple[Array, Array]:
+        """See `used_and_found`: of these places ``at``."""
+        places, clocks, votes, sites = (known[s] for known in (self.places, self.clocks, self.votes, self.sites))
+        now = float(self.clock[s])
+        n, part = len(at), sensor.position_part
+        result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        before = int(min(round(now), _TURNS))
+        age, turns = np.rint(now - clocks), max(before, 1)
+        if len(places) <= _OTHERS or not n:
+            return result, result
+        units, d, around = _units(sensor), part.dim, _around(sensor)
+        # volume of a ball of radius 1, and false alarms there in these turns
+        ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
+        usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
+        least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
+        tree, near_by = cKDTree(places, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
+        # few places are dense: only there many neighbours are sought
+        farther = np.asarray(tree.query(at, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
+        dense = np.flatnonzero(farther < near_by)
+        if not len(dense):
+            return result, result
+        distance, near = (np.asarray(array) for array in tree.query(at[dense], min(_LOOKED_AT, len(places))))
+        turn = age[near]
+        nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
+        others = np.cumsum(nearer >= _TARGETS, axis=1)
+        last = np.argmax(others == _OTHERS, axis=1)
+        within = np.arange(near.shape[1]) <= last[:, None]
+        hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
+        often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
+        dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
+        radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
+        # the volume of an ellipsoid as they lie: many places are flat
+        off = _off(places[near], at[dense, None], around)
+        spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
+        size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
+        ratio = (last + 1) / (size * usual)
+        # or of the sites there
+        _, row, count, middle = _middles(sites, places, around)
+        square = (_off(middle[row[near]], at[dense, None], around) ** 2).sum(axis=2)
+        spread = 1.0 + 1.0 / count[row[near]]
+        standing = (np.exp(-0.5 * square / spread) * (2.0 * math.pi * spread) ** (-0.5 * d)).sum(axis=1) * ball / usual
+        result[dense] = np.where(ratio > least, np.log(np.maximum(np.maximum(ratio, standing), 1.0)), 0.0)
+        flickers = flicker_ratio(sites, clocks, sensor.detection_probability, now if before < YOUNG else None)[near]
+        if before >= YOUNG:
+            # tracks know too little of the first turns
+            told = (votes[near] * (clocks[near] >= YOUNG - 1.0)).sum(axis=1)
+            used[dense] = (told > NEEDED) & (flickers.sum(axis=1) > 0.0)
+        else:
+            # of what is about the place, nothing: targets that fly alone are predicted well, and near by
+            used[dense] = ((votes[near] * within).sum(axis=1) >= 0.0) & ((flickers * within).sum(axis=1) > -NEEDED)
+        return np.where(used, result, 0.0), result
 
     def after(
         self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None
     ) -> ClutterMap:
         """The map after a scan in which each sensor made so many turns, (S,).
 
-        `votes` (n_s, 2) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
+        `votes` (n_s,) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
         """
         kept: list[tuple[Array, ...]] = []
-        votes = [np.zeros((len(z), 2)) for z in scan.measurements] if votes is None else votes
+        votes = [np.zeros(len(z)) for z in scan.measurements] if votes is None else votes
         for s, sensor in enumerate(sensors):
             fresh = np.arange(len(votes[s]) if turns[s] > 0.0 else 0)
             when = np.concatenate([self.clocks[s], np.full(len(fresh), self.clock[s])])
             last = slice(max(int(np.searchsorted(when, self.clock[s] - _TURNS)), len(when) - _PLOTS), None)
-            places = np.concatenate([self.places[s], _places(sensor, scan.measurements[s][fresh])])
-            kept.append((places[last], when[last], np.concatenate([self.votes[s], votes[s][fresh]])[last]))
-        places_of_all, clocks, votes_of_all = zip(*kept, strict=True)
-        return ClutterMap(places_of_all, clocks, self.clock + turns, votes_of_all)
+            at = _places(sensor, scan.measurements[s][fresh])
+            own = _found_at(sensor, at, self.places[s], self.sites[s])
+            pairs = (self.places[s], at), (self.votes[s], votes[s][fresh]), (self.sites[s], own)
+            places, said, sites = (np.concatenate(pair)[last] for pair in pairs)
+            kept.append((places, when[last], said, sites))
+        places_of_all, clocks, votes_of_all, sites_of_all = zip(*kept, strict=True)
+        return ClutterMap(places_of_all, clocks, self.clock + turns, votes_of_all, sites_of_all)
 
 
 def _units(sensor: Sensor) -> Array:
@@ -163,17 +193,61 @@ def _around(sensor: Sensor) -> Any:
     return [(2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in pairs][: sensor.position_part.dim]
 
 
-def _steadiness(seen: Array, probability: float) -> Array:
-    """How likely plots in these turns, bool (n, T), are of a target that is detected with this probability, (n,).
+def _found_at(sensor: Sensor, at: Array, places: Array, sites: Array) -> Array:
+    """Sites of plots ``at`` in a scan, given those of all before: numbers, the same or new ones, (n,).
 
-    Relative to one that returns plots half as often or less; at most 1. The first and the last plot do not count.
+    No two of a scan are of one; those that more plots came back to are likelier, as tables of a Chinese restaurant are.
     """
-    between = seen.shape[1] - np.argmax(seen[:, ::-1], axis=1) - np.argmax(seen, axis=1) - 2
-    hits = np.maximum(seen.sum(axis=1) - 2.0, 0.0)
-    missed = np.maximum(between - hits, 0.0)
-    rate = np.minimum(hits / np.maximum(between, 1), 0.5 * probability)
-    gain = xlogy(hits, probability) - xlogy(hits, rate) + xlog1py(missed, -probability) - xlog1py(missed, -rate)
-    return np.asarray(np.exp(np.minimum(gain, 0.0)))
+    d, around, none = places.shape[1], _around(sensor), float(sites.max(initial=0.0)) + 1.0
+    fresh = none + np.arange(len(at))
+    if not len(sites) or not len(at):
+        return fresh
+    number, _, count, mean = _middles(sites, places, around)
+    gate = 2.0 * gammaincinv(0.5 * d, _OWN)
+    tree, most = cKDTree(mean, boxsize=around), [*range(1, min(_SITES, len(number)) + 1)]
+    apart, near = (np.asarray(found) for found in tree.query(at, most, distance_upper_bound=math.sqrt(2.0 * gate)))
+    who, which = np.nonzero(np.isfinite(apart))
+    site, spread = near[who, which], 1.0 + 1.0 / count[near[who, which]]
+    square = apart[who, which] ** 2 / spread
+    fit = square + d * np.log(spread) - 2.0 * np.log(count[site])
+    free = np.ones(len(number), dtype=np.bool_)
+    for k in np.argsort(fit, kind="stable").tolist():
+        if square[k] <= gate and fresh[who[k]] >= none and free[site[k]]:
+            free[site[k]] = False
+            fresh[who[k]] = number[site[k]]
+    return fresh
+
+
+def _middles(sites: Array, places: Array, around: Any) -> tuple[Array, Array, Array, Array]:
+    """Of each site its number; the row of each plot among these; and of each site how many plots, and their mean."""
+    number, first, row, count = np.unique(sites, return_index=True, return_inverse=True, return_counts=True)
+    off, period = _off(places, places[first][row], around), np.array(around)
+    mean = places[first] + np.stack([np.bincount(row, column) for column in off.T], axis=1) / count[:, None]
+    turning = period > 0.0
+    # twice: what is hardly below 0 comes to a full turn
+    mean[:, turning] = np.mod(np.mod(mean[:, turning], period[turning]), period[turning])
+    return number, row, count, mean
+
+
+def flicker_ratio(sites: Array, clocks: Array, probability: float, now: float | None) -> Array:
+    """How likely the turns with plots of each plot's site are, (n,), if it flickers rather than stands as targets do.
+
+    Logarithms of ratios, those of a site shared among its plots. A target is detected with this probability, or silent
+    for some turns, which is rare; what flickers returns plots at any rate up to half of it. The first plot of a site
+    and the last do not count: what moves comes by once, what stood may have left. With ``now`` it is still there.
+    """
+    _, row, count = np.unique(sites, return_inverse=True, return_counts=True)
+    order = np.lexsort((clocks, row))
+    when, site = clocks[order], row[order]
+    ends = np.append(np.diff(site) > 0, True)
+    # turns without a plot until the next of the site
+    later = np.where(ends, when + 1.0 if now is None else now, np.roll(when, -1))
+    gap = np.maximum(np.rint(later - when) - 1.0, 0.0)
+    missed = np.bincount(site, gap)
+    hits, most = np.maximum(count - (2.0 if now is None else 1.0), 0.0), 0.5 * probability
+    target = hits * math.log(probability) + np.bincount(site, np.maximum(gap * math.log1p(-probability), _SILENT))
+    flicker = betaln(hits + 1.0, missed + 1.0) + np.log(betainc(hits + 1.0, missed + 1.0, most) / most)
+    return np.asarray(((flicker - target) / count)[row])
 
 
 def _off(one: Array, other: Array, around: Any) -> Array:
@@ -189,50 +263,3 @@ def _places(sensor: Sensor, measured: Array) -> Array:
     turning = list(part.angular[: part.dim])
     z[:, turning] = np.mod(z[:, turning], 2.0 * math.pi)
     return np.asarray(z / _units(sensor))
-
-
-def _densities(
-    sensor: Sensor, at: Array, places: Array, clocks: Array, votes: Array, now: float
-) -> tuple[Array, Array]:
-    """See `ClutterMap.used_and_found`: of these places ``at``."""
-    n, part = len(at), sensor.position_part
-    result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
-    before = int(min(round(now), _TURNS))
-    age, turns = np.rint(now - clocks), max(before, 1)
-    if len(places) <= _OTHERS or not n:
-        return result, result
-    units, d, around = _units(sensor), part.dim, _around(sensor)
-    # volume of a ball of radius 1, and false alarms there in these turns
-    ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
-    usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
-    least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
-    tree, near_by = cKDTree(places, boxsize=around), (_OTHERS / (least * usual)) ** (1.0 / d)
-    # few places are dense: only there many neighbours are sought
-    farther = np.asarray(tree.query(at, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
-    dense = np.flatnonzero(farther < near_by)
-    if not len(dense):
-        return result, result
-    distance, near = (np.asarray(array) for array in tree.query(at[dense], min(_LOOKED_AT, len(places))))
-    turn = age[near]
-    nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
-    others = np.cumsum(nearer >= _TARGETS, axis=1)
-    last = np.argmax(others == _OTHERS, axis=1)
-    within = np.arange(near.shape[1]) <= last[:, None]
-    hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
-    often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
-    dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
-    radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
-    # the volume of an ellipsoid as they lie: many places are flat
-    off = _off(places[near], at[dense, None], around)
-    spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
-    size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
-    ratio = (last + 1) / (size * usual)
-    result[dense] = np.where(ratio > least, np.log(np.maximum(ratio, 1.0)), 0.0)
-    if before >= YOUNG:
-        # of the first turns tracks know too little, but what stands shows from the second on
-        counts = np.stack([clocks[near] >= YOUNG - 1.0, np.ones(near.shape, dtype=np.bool_)], axis=2)
-        used[dense] = ((votes[near] * counts).sum(axis=1) > NEEDED).all(axis=1)
-    else:
-        # of what is about the place, nothing: targets that fly alone are predicted well, and near by
-        used[dense] = ((votes[near] * within[:, :, None]).sum(axis=1) >= 0.0).all(axis=1)
-    return np.where(used, result, 0.0), result
