@@ -3,12 +3,15 @@
 A move chooses up to five measurements near each other, takes the tuples that contain them apart, and draws tuples for
 them anew, from all combinations that the rest of the solution allows, each with its conditional probability.
 Insertions, ejections and exchanges between some tuples are such moves. Which measurements are chosen does not
-depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). Half of the chains
-start from a good solution, the others from random ones, up to as far from it as costs go; how far apart their
-frequencies are says how far the estimates can be trusted.
+depend on the solution, so that solutions are drawn with probabilities proportional to exp(-cost). A tuple's probability
+is the mean of its conditional ones in the moves that began with one of its measurements, which varies less than how
+often it was drawn (Gelfand and Smith). Half of the chains start from a good solution, the others from random ones, up
+to as far from it as costs go; how far apart their means are says how far the estimates can be trusted.
 
 References
 ----------
+A. E. Gelfand, A. F. M. Smith, Sampling-based approaches to calculating marginal densities, J. American Statistical
+Association 85, 1990.
 S. Oh, S. Russell, S. Sastry, Markov chain Monte Carlo data association for multi-target tracking, IEEE Trans. Automatic
 Control 54, 2009.
 """
@@ -30,7 +33,7 @@ from assoc.solvers.greedy.solve import greedy_choice
 
 _CHAINS = 8
 # moves of a chain: a few, some more for each measurement, and at most; those between two checks of the time
-_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 400, 400_000, 1_000
+_LEAST, _MOVES, _MOST, _AT_ONCE = 40_000, 140, 120_000, 1_000
 # columns that all chains look at, after which they end: at most, and so many more for each measurement
 _LOOKS, _MORE_LOOKS = 300_000_000, 300_000
 # what a step from one combination to the next counts for, by its time
@@ -64,10 +67,10 @@ class _Chain(NamedTuple):
 
     owner: NDArray[np.int32]
     counter: NDArray[np.uint64]
-    since: Floats
-    """The move that chose each column that is chosen."""
-    spent: Floats
-    """Moves for which each column was chosen before."""
+    chance: Floats
+    """Sum of each column's conditional probabilities, in the moves that began with one of its rows."""
+    visits: Floats
+    """Moves that began with each row."""
     moved: NDArray[np.bool_]
     """Whether the column of each row ever changed."""
 
@@ -99,43 +102,41 @@ def estimates(
                 start = own[other[which[other]]]
         for j in start:
             owner[cols[j][cols[j] >= 0]] = j
-        since, spent = np.zeros((2, len(cols)))
         counter, moved = np.array([c << 32], dtype=np.uint64), np.zeros(size, dtype=np.bool_)
-        chains.append(_Chain(owner.copy(), counter, since, spent, moved))
+        chains.append(_Chain(owner.copy(), counter, np.zeros(len(cols)), np.zeros(size), moved))
     made = forgotten = looks = 0
     most_looks = length * (_LOOKS + _MORE_LOOKS * size)
     while made < moves and looks < most_looks and not run.should_stop():
         ahead = min(_AT_ONCE, moves - made)
         for chain in chains:
-            looks += _walk(problem, chain, made, made + ahead)
+            looks += _walk(problem, chain, ahead)
         made += ahead
         if forgotten == 0 and made >= _FORGOTTEN * moves:
             forgotten = made if made < moves else 0
             for chain in chains if forgotten else ():
-                chain.spent[:], chain.since[:] = 0.0, made
+                chain.chance[:], chain.visits[:] = 0.0, 0.0
     if made == forgotten:  # nothing, or no more than is forgotten
         return None
-    for chain in chains:
-        there = np.unique(chain.owner[chain.owner >= 0])
-        chain.spent[there] += made - chain.since[there]
-    share = np.array([chain.spent for chain in chains]) / (made - forgotten)
+    visits = np.array([np.append(chain.visits, 0.0)[cols].sum(axis=1) for chain in chains])
+    share = np.array([chain.chance for chain in chains]) / np.maximum(visits, 1.0)
     column, sensor = np.nonzero(cols >= 0)
     alone = np.ones((size, _CHAINS))
     np.subtract.at(alone, cols[column, sensor], share.T[column])
     share = np.concatenate([share, np.clip(alone.T, 0.0, 1.0)], axis=1)
     seen = np.any([chain.moved for chain in chains], axis=0) | (begun != begun[0]).any(axis=0)
+    seen &= np.all([chain.visits > 0.0 for chain in chains], axis=0)
     ends = np.concatenate([cols, np.column_stack([np.arange(size), np.full((size, cols.shape[1] - 1), -1)])])
     return np.array([share.mean(axis=0), _errors(share, ends, seen, _CHAINS * (made - forgotten))])
 
 
 def _errors(share: Floats, ends: Ints, seen: NDArray[np.bool_], moves: int) -> Floats:
-    """Standard errors of the mean frequencies ``share`` (C, n) of C chains; ``ends`` (n, S) are the rows of each.
+    """Standard errors of the means of ``share`` (C, n) of C chains; ``ends`` (n, S) are the rows of each.
 
     The spread of few chains may be small by chance, and that of a rare tuple is 0: errors are at least those of as many
     independent solutions as the chains are worth, by the spread of all tuples together and by that of the tuples of
     each row alone, since some rows mix later than others, and no more than there were ``moves``. Of rows that no chain
-    changed, and that all began with the same column (not ``seen``), nothing is known: that chains agree there is no
-    sign of anything.
+    changed, and that all began with the same column, or with which some chain's moves never began (not ``seen``),
+    nothing is known: that chains agree there is no sign of anything.
     """
     chains = len(share)
     mean, square = share.mean(axis=0), share.var(axis=0, ddof=1) / chains
@@ -200,8 +201,8 @@ def _problem(cols: NDArray[np.int32], weights: Floats, reduced: Floats, must: ND
 
 
 @njit
-def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> int:
-    """Make the moves from this one to before that one; return at how many columns they looked."""
+def _walk(problem: _Problem, chain: _Chain, moves: int) -> int:
+    """Make so many moves; return at how many columns they looked."""
     cols, owner, num_sensors = problem.cols, chain.owner, problem.cols.shape[1]
     block, freed, old = np.empty(_TAKEN, np.int64), np.empty(_TAKEN * num_sensors, np.int64), np.empty(_TAKEN, np.int64)
     # a measurement alone can always be covered anew
@@ -211,7 +212,7 @@ def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> int:
     room = max(_ROOM, most + 1)
     choice, value, fitting = np.empty((room, _TAKEN), np.int64), np.empty(room), np.empty((_TAKEN, most), np.int64)
     looks = 0
-    for move in range(first, last):
+    for _ in range(moves):
         taken = _take(problem, chain.counter, owner.size, block) + 1
         count, num_old = room + 1, 0
         # how many measurements are taken follows from those chosen and from the tuples that stay: it would be the same
@@ -234,19 +235,19 @@ def _walk(problem: _Problem, chain: _Chain, first: int, last: int) -> int:
         while drawn < count - 1 and left >= value[drawn]:
             left -= value[drawn]
             drawn += 1
-        for i in range(num_old):
-            chain.spent[old[i]] += move - chain.since[old[i]]
-            chain.since[old[i]] = -1.0
+        chain.visits[block[0]] += 1.0
+        for i in range(count):
+            if choice[i, 0] >= 0:
+                chain.chance[choice[i, 0]] += value[i] / total
         for i in range(taken):
             j = choice[drawn, i]
             if j >= 0:
                 _put(cols, owner, j, j)
-                if chain.since[j] != -1.0:
+                if not (old[:num_old] == j).any():
                     _put(cols, chain.moved, j, True)
-                chain.since[j] = move
-        for i in range(num_old):
-            if chain.since[old[i]] == -1.0:
-                _put(cols, chain.moved, old[i], True)
+        for j in old[:num_old]:
+            if not (choice[drawn, :taken] == j).any():
+                _put(cols, chain.moved, j, True)
     return looks
 
 
@@ -348,54 +349,55 @@ def _combinations(
 
     Returns how many, one more than there is room for where they are too many; and at how many columns it looked.
     """
-    cols, num_sensors, taken, count = problem.cols, problem.cols.shape[1], block.size, 0
+    cols, num_sensors, last, count = problem.cols, problem.cols.shape[1], block.size - 1, 0
     entry, chosen, fits = np.full(_TAKEN, -1, np.int64), np.full(_TAKEN, -1, np.int64), np.zeros(_TAKEN, np.int64)
-    looks = 0
-    for level in range(taken):
+    before = np.zeros(_TAKEN)
+    looks, need = 0, False
+    for f in freed:
+        need = need or problem.must[f]
+    for level in range(block.size):
         fits[level] = _fitting(problem, owner, block, level, fitting)
         looks += problem.row_ptr[block[level] + 1] - problem.row_ptr[block[level]]
     level = 0
     while level >= 0:
-        if level == taken and count == choice.shape[0]:
-            for i in range(taken):
-                if chosen[i] >= 0:
-                    _put(cols, owner, chosen[i], -1)
-            return count + 1, looks
-        if level == taken:
-            complete, total = True, 0.0
-            for f in freed:
-                complete = complete and (owner[f] >= 0 or not problem.must[f])
-            if complete:
-                for i in range(taken):
-                    choice[count, i] = chosen[i]
-                    if chosen[i] >= 0:
-                        total += problem.log_weight[chosen[i]]
-                value[count] = total
-                count += 1
-            level -= 1
-            continue
         if chosen[level] >= 0:
             _put(cols, owner, chosen[level], -1)
             chosen[level] = -1
         x = entry[level]
         entry[level] += 1
         looks += _STEP
-        if x < 0:
-            # uncovered, or covered by a column of a row before
-            if owner[block[level]] >= 0:
-                entry[level] = fits[level]
-        elif x < fits[level]:
+        if x >= fits[level]:
+            level -= 1
+            continue
+        j, total = -1, before[level]
+        if x >= 0:
             j, free = fitting[level, x], True
             for s in range(num_sensors):
                 free = free and (cols[j, s] < 0 or owner[cols[j, s]] < 0)
             if not free:
                 continue
-            chosen[level] = j
-            _put(cols, owner, j, j)
-        else:
-            level -= 1
+            total += problem.log_weight[j]
+            if level < last or need:
+                chosen[level] = j
+                _put(cols, owner, j, j)
+        elif owner[block[level]] >= 0:
+            # covered by a column of a row before
+            entry[level] = fits[level]
+        if level < last:
+            level += 1
+            entry[level], before[level] = -1, total
             continue
-        level += 1
-        if level < taken:
-            entry[level] = -1
+        complete = True
+        for f in freed if need else freed[:0]:
+            complete = complete and (owner[f] >= 0 or not problem.must[f])
+        if complete and count == choice.shape[0]:
+            for i in range(block.size):
+                if chosen[i] >= 0:
+                    _put(cols, owner, chosen[i], -1)
+            return count + 1, looks
+        if complete:
+            for i in range(last):
+                choice[count, i] = chosen[i]
+            choice[count, last], value[count] = j, total
+            count += 1
     return count, looks

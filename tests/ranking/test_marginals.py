@@ -201,3 +201,14 @@ def test_arrays_frame_and_errors():
         marginals(AssignmentProblem([[1, 1]], [0.0], [1, 1]), k=3)
     with pytest.raises(InfeasibleError):
         marginals(AssignmentProblem([[1, 1]], [0.0], [2, 2], dummy=False))
+
+
+def test_measurements_that_no_move_began_with_are_not_known():
+    """300 moves of a chain among 120 measurements: those that they did not begin with have error 1."""
+    problem = gated_problem(np.random.default_rng(9), (40, 40, 40), 0.2, "mixed")
+    few = weighed(problem, None, 0, 300 / 40_000)
+    many = weighed(problem, None, 0, 0.2)
+    assert 0.1 < (few.error[~few.exact] == 1.0).mean() < 0.9
+    assert (many.error[~many.exact] == 1.0).mean() < 0.1
+    known = few.error < 1.0
+    assert (np.abs(few.probability - many.probability) <= 4.0 * (few.error + many.error))[known].mean() > 0.9
