@@ -14,26 +14,27 @@ from assoc.errors import MissingExtraError, RemovedError
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a package, given the module that defines each public name.
+    """Return ``__getattr__`` and ``__dir__`` of a package, given the public names, with blanks, that a module defines.
 
-    Modules are within the package, or elsewhere if they begin with ``assoc.``; a name without a module is a subpackage.
+    Modules are within the package, or elsewhere if they begin with ``assoc.``; the names of "" are subpackages.
     """
     content = vars(sys.modules[package])
+    home_of = {name: home for home, names in homes.items() for name in names.split()}
 
     def load(name: str) -> Any:
-        if name not in homes:
+        if name not in home_of:
             if line := removed(f"{package}.{name}"):
                 # from package import name hides what an AttributeError says
                 raise RemovedError(line)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        home = homes[name]
+        home = home_of[name] or name
         module = importlib.import_module(home if home.startswith("assoc.") else f"{package}.{home}")
-        content[name] = value = module if home == name else getattr(module, name)
+        content[name] = value = getattr(module, name) if home_of[name] else module
         return value
 
     def names() -> list[str]:
         # names that the package imports for itself are not offered
-        return sorted({*homes, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
+        return sorted({*home_of, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
 
     return load, names
 

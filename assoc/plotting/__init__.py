@@ -27,10 +27,10 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "plot_convergence": "convergence",
-        "plot_pheromone": "pheromone",
-        "plot_scene": "scene",
-        "plot_solution": "solution",
-        "plot_tracks": "tracks",
+        "convergence": "plot_convergence",
+        "pheromone": "plot_pheromone",
+        "scene": "plot_scene",
+        "solution": "plot_solution",
+        "tracks": "plot_tracks",
     },
 )

@@ -23,8 +23,8 @@ __all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "paramet
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "Cover": "assoc.packing.cover",
-        "Packing": "assoc.packing.packing",
-        "pheromone": "assoc.solvers.aco.pheromone_history",
+        "assoc.packing.cover": "Cover",
+        "assoc.packing.packing": "Packing",
+        "assoc.solvers.aco.pheromone_history": "pheromone",
     },
 )

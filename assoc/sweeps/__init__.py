@@ -31,13 +31,10 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "Setting": "design",
-        "Study": "study",
-        "compare": "summary",
-        "grid": "design",
-        "load": "frame",
-        "load_traces": "frame",
-        "summarize": "summary",
-        "tune": "tuning",
+        "design": "Setting grid",
+        "frame": "load load_traces",
+        "study": "Study",
+        "summary": "compare summarize",
+        "tuning": "tune",
     },
 )

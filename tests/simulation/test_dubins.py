@@ -12,7 +12,7 @@ from assoc.simulation import simulate
 from assoc.simulation.dubins.kernels import WORDS
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose, Segment, path, paths, shortest
-from assoc.simulation.scenarios.dubins_uav import DubinsParameters, no_fly_zones
+from assoc.simulation.scenarios.dubins_uav import DubinsUavParameters, no_fly_zones
 from tests.sizes import sample
 
 FIRST, LAST = Pose(-500.0, 100.0, math.pi / 3), Pose(0.0, 200.0, 0.0)
@@ -167,7 +167,7 @@ def test_scenario():
     scene, again = simulate("dubins-uav", 3), simulate("dubins-uav", 3)
     assert all(np.array_equal(a, b) for s, t in zip(scene.measurements, again.measurements, strict=True)
                for a, b in zip(s, t, strict=True))  # fmt: skip
-    p = DubinsParameters()
+    p = DubinsUavParameters()
     zones = no_fly_zones(p, np.random.default_rng(3))
     places: dict[int, list] = {}
     for k in range(scene.num_scans):

@@ -17,9 +17,9 @@ __all__ = ["write_association_report", "write_registration_report", "write_sweep
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "write_association_report": "association",
-        "write_registration_report": "registration",
-        "write_sweep_report": "sweep",
-        "write_tracking_report": "tracking",
+        "association": "write_association_report",
+        "registration": "write_registration_report",
+        "sweep": "write_sweep_report",
+        "tracking": "write_tracking_report",
     },
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import MISSING, fields
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -16,24 +17,16 @@ from assoc.scene.scene import Scene
 if TYPE_CHECKING:
     from assoc.simulation.scenarios.rotating_radar import SimulatedPlots
 
-# name -> module with a class `parameters` and a function `simulate`
-_MODULES = {
-    "three-radar": "assoc.simulation.scenarios.three_radar",
-    "crowd": "assoc.simulation.scenarios.crowd",
-    "bearing-only": "assoc.simulation.scenarios.bearing_only",
-    "dubins-uav": "assoc.simulation.scenarios.dubins_uav",
-    "rotating-radars": "assoc.simulation.scenarios.rotating_radars",
-    "arrival-times": "assoc.simulation.scenarios.arrival_times",
-    "from-tracks": "assoc.simulation.scenarios.from_tracks",
-}
+# scenario ``some-name`` is the file some_name.py, with a class ``SomeNameParameters`` and a function ``simulate``
+_SCENES = ("three-radar", "crowd", "bearing-only", "dubins-uav", "rotating-radars", "arrival-times", "from-tracks")
 # the same for those that make a recording of plots, each with its own time, and not a scene
-_RECORDINGS = {"rotating-radar": "assoc.simulation.scenarios.rotating_radar"}
+_RECORDINGS = ("rotating-radar",)
 
 
 @explains_wrong_types
 def names() -> list[str]:
     """Names of all scenarios that make a scene."""
-    return list(_MODULES)
+    return list(_SCENES)
 
 
 @explains_wrong_types
@@ -51,10 +44,14 @@ def parameters(name: str) -> type[Parameters]:
     InvalidInputError
         There is no scenario of that name.
     """
-    every = {**_MODULES, **_RECORDINGS}
-    if name not in every:
-        raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(every)}")
-    return cast("type[Parameters]", import_module(every[name]).parameters)
+    if name not in _SCENES + _RECORDINGS:
+        raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(_SCENES + _RECORDINGS)}")
+    kind = f"{name.title().replace('-', '')}Parameters"
+    return cast("type[Parameters]", getattr(_module(name), kind))
+
+
+def _module(name: str) -> ModuleType:
+    return import_module(f"{__name__}.{name.replace('-', '_')}")
 
 
 @explains_wrong_types
@@ -101,7 +98,7 @@ def simulate_recording(name: str, seed: int | None = 0, **values: Any) -> Simula
     SimulatedPlots
         The recording, and the truth.
     """
-    if name in _MODULES:
+    if name in _SCENES:
         raise InvalidInputError(f"scenario: {name!r} makes a scene, not a recording: use simulate")
     return cast("SimulatedPlots", _simulate(name, seed, values))
 
@@ -117,8 +114,7 @@ def _simulate(name: str, seed: int | None, values: dict[str, Any]) -> Any:
         raise InvalidInputError(f"{missing[0]}: scenario {name!r} needs a value")
     seed = whole_seed(seed)
     chosen = kind(**values)
-    module = import_module({**_MODULES, **_RECORDINGS}[name])
-    return module.simulate(chosen, np.random.default_rng(seed), _title(name, seed, chosen))
+    return _module(name).simulate(chosen, np.random.default_rng(seed), _title(name, seed, chosen))
 
 
 def _title(name: str, seed: int, chosen: Parameters) -> str:

@@ -38,9 +38,8 @@ class ArrivalTimesParameters(Parameters):
         self._probability("detection_probability")
 
 
-def simulate(parameters: ArrivalTimesParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: ArrivalTimesParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     require_scene_memory(p.scans, p.stations, p.events, p.false_alarms, "scans stations events false_alarms")
     region = np.array([[0.0, p.width], [0.0, p.width], [-p.depth, 0.0]])
     sites = np.column_stack([rng.uniform(0.0, p.width, (p.stations, 2)), np.zeros(p.stations)])
@@ -65,6 +64,3 @@ def _station(p: ArrivalTimesParameters, site: Array, region: Array, name: str) -
         wave_speed=p.wave_speed,
         name=name,
     )
-
-
-parameters = ArrivalTimesParameters

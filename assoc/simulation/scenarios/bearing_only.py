@@ -52,9 +52,8 @@ def sensor_positions(parameters: BearingOnlyParameters) -> Array:
     return np.stack([along, 0.0 - parameters.depth * (number % 2), np.zeros(parameters.sensors)], axis=1)
 
 
-def simulate(parameters: BearingOnlyParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: BearingOnlyParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     require_scene_memory(p.scans, p.sensors, p.targets, p.false_alarms, "scans sensors targets false_alarms")
     region = np.array([[0.0, p.width], [0.0, p.width], [0.0, HEIGHT]])
     start = rng.uniform(region[:, 0], region[:, 1], size=(p.targets, 3))
@@ -77,6 +76,3 @@ def simulate(parameters: BearingOnlyParameters, rng: np.random.Generator, name: 
     ids = [np.flatnonzero(here) for here in inside]
     present = [path[here] for path, here in zip(paths, inside, strict=True)]
     return observe(sensors, times, ids, present, rng, region=region, name=name)
-
-
-parameters = BearingOnlyParameters

@@ -52,9 +52,8 @@ class CrowdParameters(Parameters):
             raise InvalidInputError("range_rate_noise: only radars measure range rate, set sensor to 'radar'")
 
 
-def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     rate = p.false_alarms_per_target * p.targets
     require_scene_memory(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
     width = p.width * (np.sqrt(p.targets / REFERENCE_TARGETS) if p.constant_density else 1.0)
@@ -106,6 +105,3 @@ def horizontal_velocities(count: int, speed: float, rng: np.random.Generator) ->
     heading = rng.uniform(-np.pi, np.pi, count)
     size = rng.uniform(0.5 * speed, speed, count)
     return np.stack([size * np.cos(heading), size * np.sin(heading), np.zeros(count)], axis=1)
-
-
-parameters = CrowdParameters

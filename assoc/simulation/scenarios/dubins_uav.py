@@ -25,7 +25,7 @@ _TRIES = 200
 
 
 @dataclass(frozen=True)
-class DubinsParameters(Parameters):
+class DubinsUavParameters(Parameters):
     """Parameters of the Dubins scene."""
 
     targets: int = option(4, "number of aircraft")
@@ -56,9 +56,8 @@ class DubinsParameters(Parameters):
             raise InvalidInputError(f"width: expected at least four turning radii, got {self.width!r}")
 
 
-def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: DubinsUavParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     zones = no_fly_zones(p, rng)
     flights = [_flight(p, zones, rng) for _ in range(p.targets)]
     beats = max(path.length for path in flights) / p.speed / p.interval + 1
@@ -91,14 +90,14 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
     return observe(sensors, times, ids, positions, rng, region=region, name=name)
 
 
-def no_fly_zones(p: DubinsParameters, rng: np.random.Generator) -> Array:
+def no_fly_zones(p: DubinsUavParameters, rng: np.random.Generator) -> Array:
     """Circles (x, y, radius), metres, in the middle half of the region; they may overlap."""
     centre = rng.uniform(0.25 * p.width, 0.75 * p.width, (p.obstacles, 2))
     radius = rng.uniform(p.obstacle_radius / 3, p.obstacle_radius, (p.obstacles, 1))
     return np.concatenate([centre, radius], axis=1)
 
 
-def _flight(p: DubinsParameters, zones: Array, rng: np.random.Generator) -> Path:
+def _flight(p: DubinsUavParameters, zones: Array, rng: np.random.Generator) -> Path:
     """Draw a start and a goal on opposite sides until a path is found; nearly always the first."""
     for _ in range(_TRIES):
         side = rng.integers(4)
@@ -122,6 +121,3 @@ def _flight(p: DubinsParameters, zones: Array, rng: np.random.Generator) -> Path
         except (InfeasibleError, InvalidInputError):
             continue
     raise InfeasibleError(f"obstacles: no paths between the sides of the region found in {_TRIES} tries")
-
-
-parameters = DubinsParameters

@@ -82,9 +82,8 @@ class FromTracksParameters(Parameters):
         self._probability("detection_probability")
 
 
-def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: FromTracksParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     named = {meaning: getattr(p, f"{meaning}_column") for meaning in COLUMNS}
     recording, names, notes = read_flight_reports(p.file, named, p.altitude_unit, p.speed_unit)
     flown, cleaned = clean(recording) if p.clean else (recording, {})
@@ -150,6 +149,3 @@ def _epochs(parameters: FromTracksParameters, recording: Reports) -> Array:
     if count > MAX_SCANS:
         raise LimitExceededError(f"{count} scans exceed {MAX_SCANS}: raise --interval or give --scans")
     return start + parameters.interval * np.arange(count)
-
-
-parameters = FromTracksParameters

@@ -108,12 +108,11 @@ class SimulatedPlots:
     """Of the rows of the truth, (n, 3), m/s."""
 
 
-def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name: str) -> SimulatedPlots:
+def simulate(p: RotatingRadarParameters, rng: np.random.Generator, name: str) -> SimulatedPlots:
     """Simulate the plots; see `assoc.simulation.simulate_recording`."""
     # with the metrics comes scipy, too slow for --help
     from assoc.metrics.trajectories import Trajectories
 
-    p = parameters
     turns = p.duration / p.rotation
     memory.require(
         _STEP * p.duration / STEP + _PLOT * turns * (p.count + p.false_plots),
@@ -215,6 +214,3 @@ def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
             Flight(there - speed * p.duration / 2 * forward, float(direction), float(speed), level + 304.8 * number)
         )
     return flights
-
-
-parameters = RotatingRadarParameters

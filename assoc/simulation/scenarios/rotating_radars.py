@@ -37,9 +37,8 @@ class RotatingRadarsParameters(Parameters):
         self._probability("detection_probability")
 
 
-def simulate(parameters: RotatingRadarsParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: RotatingRadarsParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     turns = parse_turns(p.turns)
     times = p.interval * np.arange(1, max(int(p.duration / p.interval + 1e-9), 1) + 1)
     require_scene_memory(len(times), len(turns), p.aircraft, p.false_alarms, "duration turns aircraft false_alarms")
@@ -55,6 +54,3 @@ def simulate(parameters: RotatingRadarsParameters, rng: np.random.Generator, nam
         false_alarm_rate=p.false_alarms,
     )
     return observe_in_turns(sensors, turns, 0.0, times, paths, rng, region=region, name=name)
-
-
-parameters = RotatingRadarsParameters

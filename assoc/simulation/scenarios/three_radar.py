@@ -65,27 +65,26 @@ REFERENCE_RANGE = 50_000.0
 """Range (m) at which the angles' noise across the line of sight equals the range's noise."""
 
 
-def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
+def simulate(p: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
-    p = parameters
     require_scene_memory(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
-    times = parameters.interval * np.arange(parameters.scans)
+    times = p.interval * np.arange(p.scans)
     wave = np.floor(times / DURATION).astype(np.int64)
     since = times - DURATION * wave
     paths = np.stack([trajectory.positions(since) for trajectory in TRAJECTORIES], axis=1)
     speeds = np.stack([trajectory.velocities(since) for trajectory in TRAJECTORIES], axis=1)
     fastest = float(np.linalg.norm(speeds, axis=2).max())
     whole = since if not wave[-1] else np.arange(0.0, DURATION, 1.0)
-    region = around(np.stack([trajectory.positions(whole) for trajectory in TRAJECTORIES], axis=1), parameters.margin)
-    positions = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
+    region = around(np.stack([trajectory.positions(whole) for trajectory in TRAJECTORIES], axis=1), p.margin)
+    positions = on_circle(region.mean(axis=1), p.radar_distance, p.radars)
     sensors = radars_over(
         region,
         positions,
-        range_noise=parameters.noise,
-        angle_noise=parameters.noise / REFERENCE_RANGE,
-        detection_probability=parameters.detection_probability,
-        false_alarm_rate=parameters.false_alarms,
-        range_rate_noise=parameters.range_rate_noise,
+        range_noise=p.noise,
+        angle_noise=p.noise / REFERENCE_RANGE,
+        detection_probability=p.detection_probability,
+        false_alarm_rate=p.false_alarms,
+        range_rate_noise=p.range_rate_noise,
         fastest=fastest,
     )
     ids = [np.arange(len(TRAJECTORIES)) + len(TRAJECTORIES) * number for number in wave.tolist()]
@@ -102,6 +101,3 @@ def around(positions: Array, margin: float) -> Array:
     pad = margin * (high - low)
     pad[high - low == 0] = 1_000.0
     return np.stack([low - pad, high + pad], axis=1)
-
-
-parameters = ThreeRadarParameters
