@@ -3,8 +3,8 @@
 Two sensors: Murty's algorithm (murty/murty.py). More sensors: the excess of a solution over the dual bound is the sum
 of its reduced costs. Solutions of excess at most D use only columns of reduced cost <= D. D grows until it admits k
 solutions. For each D the remaining columns split into components, each component's solutions are ranked
-(component_ranking.py), and the ranked lists are merged (merging.py). Nothing is sampled or guessed: every solution
-that is not listed is excluded by a bound.
+(component_ranking.py), and the ranked lists are merged (iterative_deepening.py). Nothing is sampled or guessed: every
+solution that is not listed is excluded by a bound.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assoc._system.compiled import njit
-from assoc.packing.kernels.extremes import position_of_largest, position_of_smallest
+from assoc.packing.simplex.dual import position_of_largest, position_of_smallest
 
 
 @njit

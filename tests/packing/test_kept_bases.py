@@ -3,8 +3,7 @@
 import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.kept_bases import keep_basis, no_kept_bases, take_kept
-from assoc.packing.branching.node import branch, new_work, open_node, relax
+from assoc.packing.branching.node import branch, keep_basis, new_work, no_kept_bases, open_node, relax, take_kept
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root
 from assoc.packing.simplex.basis import new_basis, refactor

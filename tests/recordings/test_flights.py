@@ -9,7 +9,7 @@ from assoc.recordings.flights.cleaning import ALTITUDES, JUMPS, REPEATED, clean
 from assoc.recordings.flights.reports import Reports
 from assoc.scene.geodesy import east_north_up
 from assoc.simulation import simulate
-from assoc.simulation.interpolation import frame_velocities, resample
+from assoc.simulation.scenarios.from_tracks import frame_velocities, resample
 
 ORIGIN = (0.8, 0.1, 0.0)
 NONE = np.full((1, 3), np.nan)

@@ -14,9 +14,8 @@ except ImportError as error:
 from assoc._text.removed import removed
 from assoc.errors import RemovedError
 from assoc.integrations.stonesoup.adapted import AdaptedSensor, adapt
-from assoc.integrations.stonesoup.associator import AssignmentAssociator
+from assoc.integrations.stonesoup.associator import AssignmentAssociator, AssignmentInitiator
 from assoc.integrations.stonesoup.fusion import FusionFeeder
-from assoc.integrations.stonesoup.initiator import AssignmentInitiator
 from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing, measurement_model
 from assoc.integrations.stonesoup.readers import SceneDetectionReader, SceneGroundTruthReader
 from assoc.integrations.stonesoup.scenes import scene_from_detections

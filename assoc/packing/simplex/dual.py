@@ -16,11 +16,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._system.kernels.copying import copy_to
-from assoc.packing.kernels.extremes import position_of_largest, position_of_smallest
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
     Basis,
@@ -250,3 +250,29 @@ def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float
         begin_from_duals(program, allowed, duals, basis)
         price(program, basis.duals, basis.position, basis.pricing)
     note_free(program, allowed, basis)
+
+
+# Non-negative floats have the same order as their bits read as integers. Compilers vectorise the minimum of integers
+# without branches; for floats they may not, because of NaN.
+@inner_njit
+def position_of_smallest(bits: NDArray[np.int64], count: int) -> int:
+    """Index of the smallest of the first ``count`` numbers, given as their bits; ``count`` if that is 0."""
+    least = np.int64(2**63 - 1)
+    for a in range(count):
+        least = min(least, bits[a])
+    index = count
+    for a in range(count):
+        index = min(index, a if bits[a] == least else count)
+    return index
+
+
+@inner_njit
+def position_of_largest(bits: NDArray[np.int64], count: int) -> int:
+    """Index of the largest of the first ``count`` numbers, given as their bits; -1 if all are 0."""
+    most = np.int64(0)
+    for a in range(count):
+        most = max(most, bits[a])
+    index = count
+    for a in range(count):
+        index = min(index, a if bits[a] == most else count)
+    return index if most > 0 else -1

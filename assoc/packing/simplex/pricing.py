@@ -36,7 +36,7 @@ class Pricing(NamedTuple):
     ratios: Floats
     """Steps of the multipliers to reduced costs 0, then possible pivots; else scores of basis positions."""
     bits: NDArray[np.int64]
-    """The memory of ``ratios``, read as whole numbers (kernels/extremes.py)."""
+    """The memory of ``ratios``, read as whole numbers (dual.py)."""
     terms: Floats
     """Buffer for the terms of sums, by row, (m + 1,); the last is 0."""
     listed: NDArray[np.int64]
