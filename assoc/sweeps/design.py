@@ -129,7 +129,13 @@ def read_text(parameter: Parameter, text: str, label: str) -> Space:
         if len(parts) == 3 and parts[2] != "log":
             raise InvalidInputError(f"{label}: expected LOW:HIGH or LOW:HIGH:log, got {text!r}")
         low, high = (_parse(parameter, part, label) for part in parts[:2])
-        return make_range(parameter, low, high, len(parts) == 3, label)
+        if parameter.kind is int and max(abs(low), abs(high)) >= 2**62:
+            raise InvalidInputError(f"{label}: expected whole numbers within +-4e18, got a larger one")
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InvalidInputError(f"{label}: expected low < high, got {low}:{high}")
+        if len(parts) == 3 and low <= 0:
+            raise InvalidInputError(f"{label}: a logarithmic range needs low > 0, got {low}")
+        return Range(low, high, len(parts) == 3, parameter.kind is int)
     words = [word.strip() for word in text.split(",")]
     if not any(words):
         raise InvalidInputError(f"{label}: no values given, expected {parameter.name}=VALUE[,VALUE...]")
@@ -145,17 +151,6 @@ def read_values(parameter: Parameter, value: Any, label: str) -> Values:
     if not value:
         raise InvalidInputError(f"{label}: the list is empty, expected at least one value")
     return tuple(dict.fromkeys(parameter.check(item, label) for item in value))
-
-
-def make_range(parameter: Parameter, low: float, high: float, logarithmic: bool, label: str) -> Range:
-    """Check and return a range."""
-    if parameter.kind is int and max(abs(low), abs(high)) >= 2**62:
-        raise InvalidInputError(f"{label}: expected whole numbers within +-4e18, got a larger one")
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise InvalidInputError(f"{label}: expected low < high, got {low}:{high}")
-    if logarithmic and low <= 0:
-        raise InvalidInputError(f"{label}: a logarithmic range needs low > 0, got {low}")
-    return Range(low, high, logarithmic, parameter.kind is int)
 
 
 def _parse(parameter: Parameter, text: str, label: str) -> Any:
@@ -192,11 +187,10 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     LimitExceededError
         More than a million settings.
     """
-    return combinations(solver, _read(solver, space or {}), "grid")
-
-
-def _read(solver: str, space: Mapping[str, Any]) -> dict[str, Values]:
-    return {name: read_values(parameter(solver, name), value, f"{solver}.{name}") for name, value in space.items()}
+    values = {
+        name: read_values(parameter(solver, name), value, f"{solver}.{name}") for name, value in (space or {}).items()
+    }
+    return combinations(solver, values, "grid")
 
 
 def combinations(solver: str, spaces: Mapping[str, Space], label: str) -> list[Setting]:

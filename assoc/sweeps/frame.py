@@ -70,7 +70,7 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frame = pd.DataFrame({"solver": [settings[key][0] for key in columns["setting"]]}, dtype="str")
     for name in dict.fromkeys(name for _, parameters in settings.values() for name in parameters):
         values = {key: _plain(parameters.get(name)) for key, (_, parameters) in settings.items()}
-        frame[column_of(name)] = pd.Series([values[key] for key in columns["setting"]])
+        frame[f"parameter_{name}" if name in RESULTS else name] = pd.Series([values[key] for key in columns["setting"]])
     for name in ("repeat", "seed"):
         frame[name] = np.array(columns[name], dtype=np.int64)
     frame["scene"] = pd.Series([sources.get(key, key) for key in columns["source"]], dtype="str")
@@ -78,7 +78,7 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frame["cost"] = np.array(columns["cost"], dtype=float)
     bound = np.array(columns["lower_bound"], dtype=float)
     frame["lower_bound"] = np.where(np.isnan(bound) & ~np.isnan(frame["cost"]), -np.inf, bound)
-    frame["excess"] = _excess(frame)
+    frame["excess"] = _excess(frame["cost"], frame.groupby(["scene", "scan"])["cost"].transform("min"))
     frame["gap"] = frame["cost"] - frame["lower_bound"]
     frame["optimal"] = frame["gap"] <= OPTIMALITY_TOLERANCE * np.maximum(1.0, frame["cost"].abs())
     frame["iterations"] = pd.array(columns["iterations"], dtype="Int64")
@@ -91,10 +91,9 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     return frame.sort_values(order, kind="stable", ignore_index=True)
 
 
-def _excess(frame: pd.DataFrame) -> pd.Series[Any]:
+def _excess(cost: pd.Series[Any], best: pd.Series[Any]) -> pd.Series[Any]:
     """Cost above the best known one of the same scan; rounding errors do not count."""
-    best = frame.groupby(["scene", "scan"])["cost"].transform("min")
-    excess = frame["cost"] - best
+    excess = cost - best
     return excess.mask(excess <= 1e-9 * best.abs().clip(lower=1.0), 0.0)
 
 
@@ -103,11 +102,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return str(value)
     return value if value is None or isinstance(value, (str, bool, int, float)) else str(value)
-
-
-def column_of(parameter: str) -> str:
-    """Column name of a parameter."""
-    return f"parameter_{parameter}" if parameter in RESULTS else parameter
 
 
 @explains_wrong_types
@@ -142,9 +136,8 @@ def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
     """Traces of the runs of a frame; the column ``excess`` is the cost above the best known one of the scan."""
     best = (frame["cost"] - frame["excess"]).groupby([frame["scene"], frame["scan"]]).min().rename("best")
     traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
-    excess = traces["cost"] - traces["best"]
-    # rounding errors do not count as excess
-    return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
+    # of a scan that came since the frame was read none is known
+    return traces.assign(excess=_excess(traces["cost"], traces["best"]).fillna(0.0))
 
 
 def mean_excess(traces: pd.DataFrame, column: str) -> tuple[Floats, Floats]:

@@ -51,12 +51,11 @@ def fingerprint(content: Source) -> str:
 
 
 def load_sources(files: Sequence[str]) -> tuple[StudySource, ...]:
-    """Load scenes and problems from files; the same content twice is refused."""
-    return named_sources([load_source(file) for file in files], files)
+    """Load scenes and problems, named by their files, by the last part of the path where that is unique.
 
-
-def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
-    """Sources named by their files, by the last part of the path where that is unique; equal ones are refused."""
+    The same content twice is refused.
+    """
+    contents = [load_source(file) for file in files]
     short = [os.path.basename(file) for file in files]
     names = files if len(set(short)) < len(short) else short
     sources = tuple(StudySource(content, name) for content, name in zip(contents, names, strict=True))

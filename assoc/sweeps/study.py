@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -137,7 +138,7 @@ class Study(Shown):
 
     def run(
         self,
-        folder: str | os.PathLike[str],
+        folder: str | os.PathLike[str] | Store,
         *,
         jobs: int = 1,
         scheduler: str | None = None,
@@ -151,7 +152,8 @@ class Study(Shown):
         Parameters
         ----------
         folder : path-like
-            Created if missing; a study in it is continued if it is this one (the design may have changed).
+            Created if missing; a study in it is continued if it is this one (the design may have changed). Or an open
+            `Store`, which stays open.
         jobs : int, default 1
             Number of processes on this machine.
         scheduler : str, optional
@@ -170,45 +172,33 @@ class Study(Shown):
         InvalidInputError
             The folder holds something else or is not writable, or the scheduler does not answer.
         """
-        with Store(folder, self.manifest) as store:
-            return self.run_in(store, jobs=jobs, scheduler=scheduler, progress=progress, batch_seconds=batch_seconds)
-
-    def run_in(
-        self,
-        store: Store,
-        *,
-        jobs: int = 1,
-        scheduler: str | None = None,
-        progress: Progress | None = None,
-        batch_seconds: float | None = None,
-    ) -> Counts:
-        """Do the same as `run` with an open store."""
-        done = store.done()
-        missing = sum(self.key(run) not in done for run in self.all_runs())
-        counts = Counts(self.size, self.size - missing)
-        if progress is not None:
-            progress(counts)
-        if missing == 0:
-            return counts
-        left = (run for run in self.all_runs() if self.key(run) not in done)
-        batches = Batches(left, batch_seconds or (0.2 if scheduler is None else 0.5))
-        work = partial(run_batch, Job(tuple(self.sources), self.manifest))
-        results = parallel_map(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
-        try:
-            for batch, rows, seconds in results:
-                settings = {one.key: (one.key, one.solver, one.parameters) for one, *_ in batch}
-                new = store.append(settings.values(), rows)
-                counts.new += new
-                # the others were done by another process meanwhile
-                counts.before += len(rows) - new
-                counts.solving += sum(row[COLUMNS.index("time")] or 0.0 for row in rows)
-                batches.learn(batch, seconds)
-                if progress is not None:
-                    progress(counts)
-        except (LimitExceededError, LostError) as error:
-            raise type(error)(f"{error}; {KEPT}") from None
-        finally:
-            results.close()
+        with nullcontext(folder) if isinstance(folder, Store) else Store(folder, self.manifest) as store:
+            done = store.done()
+            missing = sum(self.key(run) not in done for run in self.all_runs())
+            counts = Counts(self.size, self.size - missing)
+            if progress is not None:
+                progress(counts)
+            if missing == 0:
+                return counts
+            left = (run for run in self.all_runs() if self.key(run) not in done)
+            batches = Batches(left, batch_seconds or (0.2 if scheduler is None else 0.5))
+            work = partial(run_batch, Job(tuple(self.sources), self.manifest))
+            results = parallel_map(work, batches, jobs=jobs, scheduler=scheduler, ordered=False)
+            try:
+                for batch, rows, seconds in results:
+                    settings = {one.key: (one.key, one.solver, one.parameters) for one, *_ in batch}
+                    new = store.append(settings.values(), rows)
+                    counts.new += new
+                    # the others were done by another process meanwhile
+                    counts.before += len(rows) - new
+                    counts.solving += sum(row[COLUMNS.index("time")] or 0.0 for row in rows)
+                    batches.learn(batch, seconds)
+                    if progress is not None:
+                        progress(counts)
+            except (LimitExceededError, LostError) as error:
+                raise type(error)(f"{error}; {KEPT}") from None
+            finally:
+                results.close()
         return counts
 
 

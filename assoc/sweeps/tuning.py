@@ -190,7 +190,7 @@ def _runs_of(
         if progress is not None:
             progress(total)
 
-    study.run_in(store, **where, progress=shown)
+    study.run(store, **where, progress=shown)
     query = f"setting, source, repeat, scan, {', '.join(_SCORED)} FROM runs WHERE setting = ?"
     known = {row[:4]: row[4:] for one in study.settings for row in store.select(query, (one.key,))}
     cost, bound, time = np.array([known[study.key(run)] for run in study.all_runs()], dtype=float).T

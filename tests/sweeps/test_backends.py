@@ -7,7 +7,6 @@ import pytest
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.sweeps import Study, grid, load, load_traces
 from assoc.sweeps.sources import StudySource
-from assoc.sweeps.store import Store
 from assoc.sweeps.study import Batches
 
 # many batches, so that there is a middle to interrupt in
@@ -120,8 +119,7 @@ def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
             start_worker()
             seen["all lost"] = counts.new
 
-    with Store(tmp_path / "s", study.manifest) as store:
-        counts = study.run_in(store, scheduler=scheduler, progress=lose, **SMALL)
+    counts = study.run(tmp_path / "s", scheduler=scheduler, progress=lose, **SMALL)
     assert 1 <= seen["packed"] <= 2
     # it went on with the one worker that was left, and then with a new one alone
     assert seen["left"] is None and 40 <= seen["one lost"] < seen["all lost"] < slow.size
