@@ -98,7 +98,7 @@ def _solve(words: list[str]) -> None:
 
 def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     from assoc.association.association import Totals
-    from assoc.association.solving import associate_scans, gathered
+    from assoc.association.solving import ScanOptions, associate_scans, gathered
     from assoc.association.source import load_source
 
     files, jobs = given["files"], given["jobs"] or 1
@@ -107,7 +107,13 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     given.check_use(_OPTIONS, input="scenes" if scenes else "problems, which have their tuples already")
     started = time.perf_counter()
     bar = ProgressBar("associating", "scans", shown=not given["quiet"])
-    options = _scan_options(solver, parameters, given)
+    options = ScanOptions(
+        solver,
+        parameters=parameters,
+        gating=given.some(parameter.name for parameter in _GATING),
+        marginals=bool(given["marginals"]),
+        **given.some(("seed", "time_limit", "kbest")),
+    )
     items = _items(sources, given)
     if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
@@ -207,18 +213,6 @@ def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) ->
         for key, value in table.items()
         for name in [key.replace("-", "_")]
     }
-
-
-def _scan_options(solver: str, parameters: dict[str, Any], given: Given) -> ScanOptions:
-    from assoc.association.solving import ScanOptions
-
-    return ScanOptions(
-        solver,
-        parameters=parameters,
-        gating=given.some(parameter.name for parameter in _GATING),
-        marginals=bool(given["marginals"]),
-        **given.some(("seed", "time_limit", "kbest")),
-    )
 
 
 def _items(sources: list[Source], given: Given) -> list[tuple[int, int]]:

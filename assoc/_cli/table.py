@@ -40,7 +40,7 @@ class _Layout:
         texts = [cells[i].ljust(self.widths[i]) if self.left[i] else cells[i].rjust(self.widths[i]) for i in columns]
         return _BETWEEN.join(texts).rstrip()
 
-    def heading(self, columns: Sequence[int], *, ruled: bool = True) -> Iterator[str]:
+    def lines(self, columns: Sequence[int], *, ruled: bool = True) -> Iterator[str]:
         high = max(len(self.headers[i]) for i in columns)
         for cells in zip(*([""] * (high - len(header)) + header for header in self.headers), strict=False):
             yield self.line(cells, columns)
@@ -48,9 +48,6 @@ class _Layout:
             # rich's substitute for stdout, while a progress bar is shown, has no encoding
             stream = getattr(sys.stdout, "rich_proxied_file", sys.stdout)
             yield ("─" if (stream.encoding or "").lower().startswith("utf") else "-") * self.width(columns)
-
-    def lines(self, columns: Sequence[int], *, ruled: bool = True) -> Iterator[str]:
-        yield from self.heading(columns, ruled=ruled)
         for row in self.rows:
             yield self.line(row, columns)
 

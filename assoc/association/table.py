@@ -28,7 +28,9 @@ def rows(
     ``files`` are those of all scans, of which the first are here; they are shown if there are several.
     """
     if brief:
-        files = _short_names(files)
+        # the last parts of paths, if these differ
+        short = {file: os.path.basename(file) for file in files}
+        files = [short[file] for file in files] if len({*short.values()}) == len(short) else files
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
     truth = any(scan.true_tuples is not None for scan in scans)
@@ -66,12 +68,6 @@ def rows(
         kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
         headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
-
-
-def _short_names(files: Sequence[str]) -> list[str]:
-    """The last parts of paths, if these differ."""
-    short = {file: os.path.basename(file) for file in files}
-    return [short[file] for file in files] if len({*short.values()}) == len(short) else list(files)
 
 
 def _lines(scans: Sequence[ScanAssociation], files: Sequence[str]) -> Iterator[tuple[ScanAssociation, str, int]]:

@@ -64,14 +64,10 @@ def close(component: Component, run: Run) -> None:
     if kind is None or component.closed or run.should_stop():
         return
     branching = Branching(component, run, kind)
-    at_once = nodes_at_once(component.packing.num_columns)
+    # few nodes between two checks for a stop where each takes long, since Ctrl-C does not interrupt kernels
+    at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
     while not branching.search.done and branching.search.nodes < _NODES and not run.should_stop():
         branching.advance(at_once, gives=False)
-
-
-def nodes_at_once(columns: int) -> int:
-    """Nodes between two checks for a stop: few where each takes long, since Ctrl-C does not interrupt kernels."""
-    return min(max(_AT_ONCE // columns, 1), 50)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:

@@ -76,7 +76,8 @@ def plot_solution(
     f = unit.factor
     for ray, sensor, (at, label) in zip(rays, standing, drawn, strict=True):
         if ray:
-            _bearings(ax, f * sensor.position, f * at, label)
+            for chosen, how in ((label >= 0, {"color": SKY}), (label < 0, {"color": GREY, "linestyle": ":"})):
+                draw_rays(ax, f * sensor.position, f * at[chosen], linewidth=0.6, zorder=1, **how)
     links, lost = [], []
     for s, (sensor, (at, label)) in enumerate(zip(scene.sensors, drawn, strict=True)):
         kept = label >= 0
@@ -96,11 +97,6 @@ def plot_solution(
     set_plan_view(ax, box, unit)
     legend(ax)
     return ax
-
-
-def _bearings(ax: Any, site: Array, ends: Array, label: Array) -> None:
-    for chosen, style in ((label >= 0, {"color": SKY}), (label < 0, {"color": GREY, "linestyle": ":"})):
-        draw_rays(ax, site, ends[chosen], linewidth=0.6, zorder=1, **style)
 
 
 def measured_positions(scene: Scene, association: ScanAssociation) -> list[tuple[Array, Array]]:

@@ -161,7 +161,9 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
                 line = {"color": colour(rank), "linestyle": DASHES[rank % len(DASHES)]}
                 style = {**line, "linewidth": 1.6, "zorder": 3}
                 style["label"] = setting_title(row, names, several)
-            draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
+            own = traces[traces["setting"] == row["setting"]]
+            if not own.empty:
+                ax.plot(*mean_excess(own, column), drawstyle="steps-post", **style)
         if column == "seconds" or traces[column].max() > 30:
             set_log_x(ax)
         else:
@@ -182,12 +184,6 @@ def setting_title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -
     words = [str(row["solver"])] if several or not names else []
     words += [f"{n} {short_text(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
     return ", ".join(words)
-
-
-def draw_curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
-    """Draw the mean excess of runs over iterations or milliseconds; see `mean_excess`."""
-    if not traces.empty:
-        ax.plot(*mean_excess(traces, column), drawstyle="steps-post", **style)
 
 
 def cells(

@@ -42,24 +42,12 @@ _ENOUGH, _TRIED = 20, 2000
 
 
 class Cleaning:
-    """Rows (n, `WIDTH`) of one radar, given in parts, as recordings.
+    """Rows (n, `WIDTH`) of one radar, given in parts, as recordings of a `name`.
 
-    Parameters
-    ----------
-    name : str
-        Of the recordings; of a file for errors, with ``strict``.
-    notes : Counter
-        Gets what was corrected, complete after the last part.
-    clock : bool
-        Whether times are times of day.
-    disorder : float
-        Plots up to so many seconds late are sorted in. Later ones are left out, or an error if `strict`.
-    codes : array_like of int
-        Flight levels that are taken for garbled.
-    sources : bool
-        Whether rows know their aircraft.
-    at_once : int
-        Recordings have at least so many plots, but for the last.
+    `notes` get what was corrected, and are complete after the last part. With `clock` times are times of day. Plots up
+    to `disorder` seconds late are sorted in; later ones are left out, or an error of the file `strict`. `codes` are
+    flight levels that are taken for garbled; with `sources` rows know their aircraft. Recordings have at least
+    `at_once` plots, but for the last.
     """
 
     def __init__(

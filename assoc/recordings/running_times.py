@@ -20,12 +20,7 @@ class RunningTimes:
     out where the next rows go on as before it, and taken where they follow it, as after a gap or at midnight. So one
     wrong time of day neither moves the plots after it by a day, nor lets them look late.
 
-    Parameters
-    ----------
-    disorder : float
-        Seconds by which plots may be out of order.
-    clock : bool
-        Whether times begin anew each day.
+    Plots may be out of order by `disorder` seconds; with `clock` times begin anew each day.
     """
 
     def __init__(self, disorder: float, clock: bool = False) -> None:

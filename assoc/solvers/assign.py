@@ -103,7 +103,9 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
-    _require_functions(callback=callback, watch=watch)
+    for name, function in (("callback", callback), ("watch", watch)):
+        if function is not None and not callable(function):
+            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
     if proof is not None:
         check_writable(proof)
     make_run = partial(Run, _seed(seed), time_limit=limit, callback=callback, watch=watch, **begun)
@@ -117,12 +119,6 @@ def assign(
         for line in cost_warnings(problem):
             warn(line)
     return solution
-
-
-def _require_functions(**functions: object) -> None:
-    for name, function in functions.items():
-        if function is not None and not callable(function):
-            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
 
 
 def _prove(file: FilePath, problem: AssignmentProblem, solution: Solution) -> None:

@@ -30,11 +30,8 @@ ADDRESS = ("address", "icao_address", "icao", "icao24", "mode_s", "address_hex",
 class LineForm:
     """How the lines of one stream are to be read; it remembers the header.
 
-    Parameters
-    ----------
-    scene : Scene
-    places, biases : sequences over sensors of the scene, optional
-        Where each stands on the earth (by default from the scene's origin), and what it states too much.
+    `places` say where each sensor of the scene stands on the earth (by default from the scene's origin), `biases` what
+    it states too much.
     """
 
     def __init__(
@@ -49,10 +46,7 @@ class LineForm:
     def takes_header(self, cells: list[str]) -> bool:
         """Whether a line of CSV is a header, which holds for the lines that follow.
 
-        Raises
-        ------
-        InvalidInputError
-            It is one, and has no column for the sensor although there are several.
+        One without a column for the sensor, where there are several, is refused.
         """
         if any(_is_number(cell) for cell in cells):
             return False

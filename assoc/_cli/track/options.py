@@ -219,16 +219,7 @@ def live_parser() -> Parser:
 def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any]]:
     """Read a command line; returns the options, and the arguments for the tracker.
 
-    Parameters
-    ----------
-    words : list of str
-    parser : Parser
-        Parser with the program's options, without the further ones.
-
-    Raises
-    ------
-    InvalidInputError
-        An option is unknown or has an invalid value.
+    The parser has the program's options, without the further ones.
     """
     first = read_first(words, "solver", "import")
     import_modules(first["import"])
@@ -302,10 +293,7 @@ def make_tracker(
 ) -> Tracker:
     """Make the tracker that the options describe; `scene` is for ``--targets auto``.
 
-    Raises
-    ------
-    InvalidInputError
-        An option does not apply to this tracker.
+    An option that does not apply to this tracker is refused.
     """
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter

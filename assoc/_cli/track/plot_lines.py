@@ -85,10 +85,7 @@ def parse_line(line: str, scene: Scene, form: LineForm | None = None) -> Plot | 
     The own position of a platform: CSV "platform", a sensor that it carries, time, x, y, z, and optionally the heading;
     JSON an object with platform (the sensor), time, position (an array) and optionally heading.
 
-    Raises
-    ------
-    InvalidInputError
-        The line has neither form; an `IdentityError` if only the identity is none.
+    A line that has neither form is refused, by an `IdentityError` if only the identity is none.
     """
     text = line.strip()
     if not text or text.startswith("#"):
@@ -173,13 +170,7 @@ def _index(name: str, scene: Scene) -> int | None:
 
 
 def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
-    """Mode 3/A code and address, as text or numbers; 0 if empty.
-
-    Raises
-    ------
-    ValueError
-        A value is out of range or not a number.
-    """
+    """Mode 3/A code and address, as text or numbers; 0 if empty, ValueError if out of range or no number."""
     found = []
     for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, 999_999_999)):
         number = 0
@@ -224,14 +215,9 @@ class _Waiting(queue.Queue[bytes | None]):
 
 
 class Lines:
-    """Lines that a thread reads, so that a signal can end the wait for them.
+    """Lines of stdin, or of a UDP `port` on 127.0.0.1, where the line "end" ends the stream.
 
-    Parameters
-    ----------
-    port : int or None
-        UDP port on 127.0.0.1; None: stdin. Over UDP the line "end" ends the stream.
-    waiting : int
-        Bytes that may wait, here and in the system.
+    A thread reads them, so that a signal can end the wait for them; `waiting` bytes may wait, here and in the system.
     """
 
     def __init__(self, port: int | None, *, waiting: int = _WAITING) -> None:
@@ -330,17 +316,8 @@ def header_of(origin: Origin | None) -> str:
 class TrackWriter:
     """Writes a line of CSV for each track that is new, was detected, or has ended.
 
-    Parameters
-    ----------
-    stream : file
-    positions : sequence of int
-        Indices of x, y (and z) in the state.
-    origin : tuple, optional
-        Of the scene.
-    known : iterable of Track
-        Tracks that have their line already.
-    begun : bool
-        Whether the stream has its header.
+    `positions` are the indices of x, y (and z) in the state, `origin` is the scene's, `known` tracks have their line
+    already; `begun`: the stream has its header.
     """
 
     def __init__(

@@ -99,10 +99,7 @@ class Radars(NamedTuple):
 def read_radars(path: str) -> Radars:
     """Read a description and its files, which are found from the folder that it is in.
 
-    Raises
-    ------
-    InvalidInputError
-        A key or a file is not as expected; the message names the file, the radar and the key.
+    Where a key or a file is not as expected the message names the file, the radar and the key.
     """
     import numpy as np
 
@@ -168,8 +165,7 @@ def _heights(top: dict[str, Any], path: str) -> tuple[float, float] | None:
     value = top.get("heights")
     if value is None:
         return None
-    good = isinstance(value, list) and [type(number) in (int, float) for number in value] == [True, True]
-    if not good or not -1e3 <= value[0] < value[1] <= 1e6:
+    if not _is_pair(value) or not -1e3 <= value[0] < value[1] <= 1e6:
         raise InvalidInputError(
             f"{path}: heights: expected [lowest, highest] altitude of targets, metres, got {value!r}"
         )
@@ -256,10 +252,7 @@ def _bias(table: dict[str, Any], where: str) -> Bias:
 def write_biases(path: str, biases: list[Bias]) -> None:
     """Write the biases of all radars into a description, which stays as it is otherwise.
 
-    Raises
-    ------
-    InvalidInputError
-        Its tables are not written as ``[[radar]]``, or a bias is written in several lines.
+    Refused if its tables are not written as ``[[radar]]``, or a bias is written in several lines.
     """
     import tomllib
 
@@ -314,7 +307,7 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
     for number, area in enumerate(value, 1):
         where = f"{label}: area {number}"
         corners = area if isinstance(area, list) else []
-        if len(corners) < 2 or not all(_is_corner(corner) for corner in corners):
+        if len(corners) < 2 or not all(_is_pair(corner) for corner in corners):
             raise InvalidInputError(
                 f"{where}: expected 2 corners of a box, or 3 or more, [latitude, longitude] in degrees, got {area!r}"
             )
@@ -324,8 +317,8 @@ def _areas(value: object, label: str, origin: tuple[float, float, float]) -> lis
     return found
 
 
-def _is_corner(value: object) -> bool:
-    """Whether it is two numbers."""
+def _is_pair(value: Any) -> bool:
+    """Whether it is a list of two numbers."""
     return isinstance(value, list) and [type(number) in (int, float) for number in value] == [True, True]
 
 

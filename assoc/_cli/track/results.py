@@ -59,13 +59,7 @@ class Judged(NamedTuple):
 def write_and_print(found: Tracked, given: Given, elapsed: float, compiling: float) -> None:
     """Write all files asked for and print what has been found, whatever of it fails.
 
-    Parameters
-    ----------
-    found : Tracked
-    given : Given
-        The options.
-    elapsed, compiling : float
-        Seconds of tracking, and of compiling beside it.
+    `elapsed` and `compiling` are seconds of tracking, and of compiling beside it.
     """
     write_all(
         (given["map"], lambda: _write_map(given["map"], found.table)),

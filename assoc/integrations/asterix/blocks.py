@@ -44,18 +44,6 @@ def edition(category: int) -> Any:
     return next(iter(editions(category).values()))
 
 
-def check_editions(given: Mapping[int, str]) -> dict[int, str]:
-    """Check editions that a user gave by category."""
-    for category, name in given.items():
-        if category not in CATEGORIES:
-            known = ", ".join(f"{one:03d}" for one in CATEGORIES)
-            raise InvalidInputError(f"editions: expected a category of {known}, got {category!r}")
-        if name not in editions(category):
-            known = ", ".join(editions(category))
-            raise InvalidInputError(f"editions: category {category:03d}: expected one of {known}, got {name!r}")
-    return dict(given)
-
-
 class Records:
     """The records of a file, each with its category and its edition; what cannot be read is counted in `notes`.
 
@@ -73,7 +61,14 @@ class Records:
     ) -> None:
         check_extra("asterix", "asterix")
         self._notes, self._categories, self._left = notes, categories, _TRIED
-        self._given = check_editions(given or {})
+        self._given = dict(given or {})
+        for category, name in self._given.items():
+            if category not in CATEGORIES:
+                known = ", ".join(f"{one:03d}" for one in CATEGORIES)
+                raise InvalidInputError(f"editions: expected a category of {known}, got {category!r}")
+            if name not in editions(category):
+                known = ", ".join(editions(category))
+                raise InvalidInputError(f"editions: category {category:03d}: expected one of {known}, got {name!r}")
         self._content = reading.read_bytes(path)
 
     def __iter__(self) -> Iterator[list[tuple[int, str, Any]]]:

@@ -14,22 +14,9 @@ from assoc.recordings.recording import Recording
 class AsterixPlots:
     """The plots of one radar in a file in parts, in the order of time, so that memory grows by the file's bytes alone.
 
-    Parameters
-    ----------
-    path : path-like
-    radar : str, optional
-        SAC/SIC of the radar; needed if the file has plots of several.
-    label : str
-        What gives the radar, for errors.
-    editions : dict of int to str, optional
-        As for `read_asterix`.
-    at_once : int
-        About how many plots a part has.
-
-    Attributes
-    ----------
-    notes : dict of str to int
-        As those of `AsterixContent`, and plots that came too late; complete after the last part.
+    `radar` is its SAC/SIC, needed if the file has plots of several; errors name the `label`, which gave it. `editions`
+    are as for `read_asterix`. A part has about `at_once` plots. `notes` are those of `AsterixContent`, and plots that
+    came too late; complete after the last part.
     """
 
     def __init__(

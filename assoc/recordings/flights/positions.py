@@ -110,20 +110,10 @@ def read_positions(
 ) -> Positions:
     """Read a CSV or .parquet file of AIS, ADS-B (OpenSky's states) or x, y; an altitude is not needed.
 
-    Rows without a time or a position, and those that repeat an earlier report, are left out and counted.
+    Rows without a time or a position, and those that repeat an earlier report, are left out and counted. `columns` are
+    by meaning (`NAMES`), where they are not the usual ones; `units` are those of altitude: m (default), ft or fl.
 
-    Parameters
-    ----------
-    path : str
-    columns : mapping of str to str, optional
-        Columns by meaning (`NAMES`), where they are not the usual ones.
-    units : mapping of str to str, optional
-        Of altitude: m (default), ft or fl.
-
-    Raises
-    ------
-    InvalidInputError
-        The file or a column is missing, or no row is left.
+    InvalidInputError: the file or a column is missing, or no row is left.
     """
     given = dict(columns or {})
     for meaning in given:
