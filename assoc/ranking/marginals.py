@@ -19,9 +19,8 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run, infeasible
 from assoc.problem import AssignmentProblem, taken_problem
 from assoc.ranking.columns import AllColumns, price_all_columns
-from assoc.ranking.log_sums import is_short, swept_in_logarithms
 from assoc.ranking.sampler import estimates
-from assoc.ranking.sums import Plan, plan_clusters, sum_clusters
+from assoc.ranking.sums import Plan, is_short, plan_clusters, sum_clusters, swept_in_logarithms
 from assoc.ranking.sweep import Graph
 from assoc.solvers.exact.parameters import ExactParameters
 from assoc.solvers.exact.solve import solve as exact
@@ -104,7 +103,7 @@ def marginals(problem: AssignmentProblem | ArrayLike, *, time_limit: float | Non
     With all solutions x and their costs c(x), P(t) = sum_{x contains t} exp(-c(x)) / sum_x exp(-c(x)). Clusters of
     tuples are independent. Those that an elimination over measurements sums with a table of at most 2^22 entries are
     summed (`assoc.ranking.sweep`), in logarithms where costs are so large that all weights underflow and the tables
-    are small (`assoc.ranking.log_sums`); all others are sampled by several Markov chains (`assoc.ranking.sampler`),
+    are small (`assoc.ranking.sums`); all others are sampled by several Markov chains (`assoc.ranking.sampler`),
     whose differences give the standard error. Where chains all stay in one part of a large set of solutions, such an
     error is too small: no sample can show what it never met.
     """
