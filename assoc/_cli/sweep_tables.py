@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from assoc._cli.lines import print_lines
 from assoc._cli.table import print_table
 from assoc._text.plain import printable
-from assoc.sweeps.summary import FACTORS, MEASURES
+from assoc.sweeps.summary import FACTORS, MEASURES, parameter_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ def summary_rows(summary: pd.DataFrame, measures: Sequence[str] = MEASURES) -> R
     headers += [header for name in measures for header in (_TITLES.get(name, name), INTERVAL)]
     cells = []
     for row in summary.to_dict("records"):
-        line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
+        line = [str(row["solver"]), *(parameter_text(row[name]) for name in parameters), str(row["runs"])]
         line += [str(row[name]) for name in infeasible]
         for name in measures:
             line += [_number(row[name], name), _interval(row[f"{name}_low"], row[f"{name}_high"], name)]
@@ -75,12 +75,6 @@ def comparison_rows(table: pd.DataFrame) -> Rows:
         means = [_number(row[column], name) for column in ("first", "second", "difference")]
         cells.append([_TITLES.get(name, name), *means, _interval(row["low"], row["high"], name), str(row["pairs"])])
     return ["", "first", "second", "difference", INTERVAL, "pairs"], cells
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, float):
-        return "" if np.isnan(value) else f"{value:.6g}"
-    return "" if value is None else str(value)
 
 
 def _number(value: float, name: str) -> str:

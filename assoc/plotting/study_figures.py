@@ -17,7 +17,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.axes import set_log_x
 from assoc.plotting.colours import DASHES, colour
 from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
-from assoc.sweeps.summary import FACTORS, by_problem, mean_interval, measured, numbers, summarize, varied, weighted_mean
+from assoc.sweeps.summary import FACTORS, estimated, measured, summarize, varied
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -201,11 +201,8 @@ def cells(
         cell = [*ys].index(y), [*xs].index(x)
         # settings that differ only in other parameters count as repeats
         runs = runs.assign(repeat=runs.groupby(["setting", "repeat"]).ngroup())
-        table = by_problem(runs, measured(runs, measure))
-        weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
-        middle[cell] = factor * weighted_mean(table, weights)
-        if intervals:
-            low[cell], high[cell] = (factor * end for end in mean_interval(table, weights))
+        found = estimated(runs, measure, interval=intervals)
+        middle[cell], low[cell], high[cell] = (factor * value for value in found)
     return xs, ys, middle, low, high
 
 

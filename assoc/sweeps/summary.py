@@ -59,24 +59,40 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
         row["runs"] = len(runs)
         row["infeasible"] = int(runs["cost"].isna().sum())
         for measure in MEASURES:
-            table = by_problem(runs, measured(runs, measure))
-            weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
-            row[measure] = weighted_mean(table, weights)
-            row[f"{measure}_low"], row[f"{measure}_high"] = mean_interval(table, weights)
+            row[measure], row[f"{measure}_low"], row[f"{measure}_high"] = estimated(runs, measure)
         rows.append(row)
     columns = ["solver", *names, "setting", "runs", "infeasible"]
     columns += [f"{measure}{end}" for measure in MEASURES for end in ("", "_low", "_high")]
     return pd.DataFrame(rows, columns=columns)
 
 
-def varied(frame: pd.DataFrame) -> list[str]:
-    """Columns of the parameters that have several values within one solver."""
+def parameter_columns(frame: pd.DataFrame) -> list[str]:
+    """Columns of the parameters."""
     if "repeat" not in frame.columns:
         raise InvalidInputError("study: expected the runs of assoc.sweeps.load, got a table without 'repeat'")
     last = list(frame.columns).index("repeat")
-    names = [str(name) for name in frame.columns[1:last] if name not in RESULTS]
-    groups = [part for _, part in frame.groupby("solver")]
+    return [str(name) for name in frame.columns[1:last] if name not in RESULTS]
+
+
+def varied(frame: pd.DataFrame) -> list[str]:
+    """Columns of the parameters that have several values within one solver."""
+    names, groups = parameter_columns(frame), [part for _, part in frame.groupby("solver")]
     return [name for name in names if any(part[name].nunique() > 1 for part in groups)]
+
+
+def parameter_text(value: Any) -> str:
+    """Text of a parameter; empty where a solver does not have it."""
+    if value is None or value != value:
+        return ""
+    plain = value.item() if isinstance(value, np.generic) else value
+    return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
+
+
+def estimated(runs: pd.DataFrame, measure: str, *, interval: bool = True) -> tuple[float, float, float]:
+    """Mean of a measure over runs, and the ends of its 95 % interval, which takes most of the time; NaN without."""
+    table = by_problem(runs, measured(runs, measure))
+    weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
+    return weighted_mean(table, weights), *(mean_interval(table, weights) if interval else (np.nan, np.nan))
 
 
 def by_problem(runs: pd.DataFrame, values: Floats) -> Floats:

@@ -6,7 +6,7 @@ import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from assoc.plotting.colours import SERIES
 from assoc.plotting.report.figures import FAINT, Choices, Dicts, layout, line, menu, plain_numbers, scatter
 from assoc.plotting.report.page import Part, cards, check_report, definitions, note, settings_part, table, write_page
 from assoc.plotting.study_figures import LABELS, cells, setting_title
-from assoc.sweeps.frame import RESULTS, load, load_traces, mean_excess, with_excess
+from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
 from assoc.sweeps.store import Store
-from assoc.sweeps.summary import FACTORS, measured, summarize, varied
+from assoc.sweeps.summary import FACTORS, measured, parameter_columns, parameter_text, summarize, varied
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,11 +99,10 @@ def write_sweep_report(
 
 def _fixed(frame: pd.DataFrame) -> list[tuple[str, dict[str, str]]]:
     """Parameters that are the same in all settings of a solver."""
-    last = list(frame.columns).index("repeat")
-    names = [str(name) for name in frame.columns[1:last] if name not in RESULTS]
+    names = parameter_columns(frame)
     groups = frame.groupby("solver") if len(frame) else ()
     return [
-        (str(solver), {name: _value(part[name].iloc[0]) for name in names if part[name].nunique() == 1})
+        (str(solver), {name: parameter_text(part[name].iloc[0]) for name in names if part[name].nunique() == 1})
         for solver, part in groups
     ]
 
@@ -129,20 +128,12 @@ def _table(summary: pd.DataFrame, names: Sequence[str]) -> str:
         headers += [LABELS[name], "95 %"]
     rows = []
     for rank, row in enumerate(summary.to_dict("records"), start=1):
-        line = [str(rank), str(row["solver"]), *(_value(row[name]) for name in names), str(row["runs"])]
+        line = [str(rank), str(row["solver"]), *(parameter_text(row[name]) for name in names), str(row["runs"])]
         for name in shown:
             middle, low, high = (FACTORS.get(name, 1.0) * row[f"{name}{end}"] for end in ("", "_low", "_high"))
             line += [f"{middle:.4g}", "" if np.isnan(low) else f"{low:.4g} .. {high:.4g}"]
         rows.append(line)
     return table(headers, rows, rest="; --csv writes all")
-
-
-def _value(value: Any) -> str:
-    """Text of a parameter; a solver may not have it."""
-    if value is None or value != value:
-        return ""
-    plain = value.item() if isinstance(value, np.generic) else value
-    return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
 
 
 def _pairs(frame: pd.DataFrame) -> list[tuple[str, pd.DataFrame, str, str]]:
@@ -170,8 +161,8 @@ def _map(solver: str, part: pd.DataFrame, across: str, up: str, measures: Sequen
         ]
         data.append(
             {
-                "type": "heatmap", "name": LABELS[measure], "x": [escape(_value(x)) for x in xs],
-                "y": [escape(_value(y)) for y in ys], "z": plain_numbers(middle, 6), "hovertext": texts,
+                "type": "heatmap", "name": LABELS[measure], "x": [escape(parameter_text(x)) for x in xs],
+                "y": [escape(parameter_text(y)) for y in ys], "z": plain_numbers(middle, 6), "hovertext": texts,
                 "texttemplate": "%{z:.3g}", "colorscale": "Cividis", "colorbar": {"thickness": 12},
                 "hovertemplate": "%{hovertext}<extra></extra>", "visible": not data,
             }
