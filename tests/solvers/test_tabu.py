@@ -5,7 +5,7 @@ import pytest
 
 from assoc._system.compiled import draws
 from assoc.packing.neighbourhoods.insertion import search_arrays
-from assoc.solvers.tabu.moves import TabuSearch, _moves, _Rules
+from assoc.solvers.tabu.moves import TabuSearch, _moves
 from assoc.solvers.tabu.parameters import TabuParameters
 from tests.solvers.pieces import (
     columns_of,
@@ -103,7 +103,7 @@ def test_move_by_move(name, tenure):
         until = np.zeros(one.packing.num_columns, dtype=np.int64)
         expected = Reference(one, columns_of(one.best), until.copy())
         owner, best = one.best.copy(), one.best.copy()
-        rules = _Rules(1, 60, tenure, forced)
+        rules = (1, 60, tenure, forced)
         clock = _moves(
             search_arrays(one.packing), owner, best, until, rules, draws(np.random.default_rng(seed)), np.inf
         )

@@ -51,14 +51,6 @@ class SmoothPoint(NamedTuple):
     """Those of the rows' slack, (R,)."""
 
 
-class _Near(NamedTuple):
-    """The columns of small reduced cost: numbered by ``place`` (-1: not near), and listed by row."""
-
-    place: Ints
-    row_ptr: Ints
-    cols: Ints
-
-
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
     """Return feasible multipliers u, (R,), whose bound, ``certified_bound(packing, u)``, is nearly the LP bound.
 
@@ -210,10 +202,9 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
     slack, row_start, row_ptr = packing.slack, packing.row_start, packing.row_ptr
     duals, reduced, primal, slack_primal = point
     scale = np.empty(slack.size)
-    near = _Near(
-        np.empty(reduced.size, np.int32), np.empty(slack.size + 1, np.int64), np.empty(packing.row_cols.size, np.int32)
-    )
-    place, near_ptr, near_cols = near
+    # the columns of small reduced cost: numbered (-1: not near), and listed by row
+    place = np.empty(reduced.size, np.int32)
+    near_ptr, near_cols = np.empty(slack.size + 1, np.int64), np.empty(packing.row_cols.size, np.int32)
     visits = 0
     unseen = 0
     over = False
@@ -226,7 +217,7 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
         worst = 1.0
         while done < passes and worst >= 0.01 and not over:
             # columns far above the minimum weigh nothing: they are left out and checked again now and then
-            _list_near(packing, duals, reduced, c, NEAR * t, near)
+            _list_near(packing, duals, reduced, c, NEAR * t, (place, near_ptr, near_cols))
             for j in range(packing.col_start[c], packing.col_start[c + 1]):
                 if place[j] >= 0:
                     primal[place[j]] = math.exp(min(-reduced[j] / t, 500.0))
@@ -268,7 +259,9 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
 
 
 @lean_inner_njit
-def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, limit: float, near: _Near) -> None:
+def _list_near(
+    packing: PackingArrays, duals: Floats, reduced: Floats, c: int, limit: float, near: tuple[Ints, Ints, Ints]
+) -> None:
     """Number the columns of component c whose reduced cost is at most ``limit``, and list them by row."""
     cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
     place, near_ptr, near_cols = near

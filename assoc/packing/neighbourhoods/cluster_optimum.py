@@ -184,19 +184,19 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
     return count, base
 
 
-class _Buffers(NamedTuple):
-    """For one node: columns of each row and the least cost of these, and sums of them by sensor."""
-
-    number: Ints
-    least: Floats
-    per_sensor: Floats
-
-
 @inner_njit
 def _to_branch_on(
-    listed: Ints, members: Ints, cost: Floats, covered: NDArray[np.bool_], sensor: Ints, buffers: _Buffers
+    listed: Ints,
+    members: Ints,
+    cost: Floats,
+    covered: NDArray[np.bool_],
+    sensor: Ints,
+    buffers: tuple[Ints, Floats, Floats],
 ) -> Any:
-    """The open row with the fewest columns among those listed, and a bound on what covering all open rows costs."""
+    """The open row with the fewest columns among those listed, and a bound on what covering all open rows costs.
+
+    Buffers: columns of each row and the least cost of these, and sums of them by sensor.
+    """
     number, least, per_sensor = buffers
     num = covered.size
     for i in range(num):
@@ -268,7 +268,7 @@ def depth_first(
     spent, pick = np.zeros(depths), np.zeros(depths, np.int64)
     covered, num_covered = np.zeros(num, np.bool_), 0
     sensor = np.zeros(num, np.int64)
-    buffers = _Buffers(np.empty(num, np.int64), np.empty(num), np.empty(members.shape[1]))
+    buffers = (np.empty(num, np.int64), np.empty(num), np.empty(members.shape[1]))
     for t in range(1, lists[0, 0] + 1):
         for s in range(members.shape[1]):
             if members[lists[0, t], s] >= 0:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,17 +11,6 @@ from assoc.packing.cover import chosen_columns
 from assoc.packing.kernels.columns import choose_matched
 from assoc.packing.kernels.matching import match_sparse
 from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
-
-
-class _Partial(NamedTuple):
-    """The partial tuples."""
-
-    of_row: NDArray[np.int64]
-    """Partial tuple of each row so far, (R,)."""
-    size: NDArray[np.int64]
-    """Rows of each partial tuple, (R,)."""
-    must: NDArray[np.bool_]
-    """Whether a partial tuple has a row that must be covered, (R,)."""
 
 
 def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
@@ -102,10 +89,10 @@ def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> boo
     cols, weights, slack, sensor, _, _ = arranged
     num_rows, num_sensors = duals.size, cols.shape[1]
     num_columns = weights.size
+    # partial tuple of each row so far, rows of each partial tuple, and whether it has a row that must be covered
     of_row = np.full(num_rows, -1, np.int64)
     size = np.zeros(num_rows, np.int64)
     must = np.zeros(num_rows, np.bool_)
-    partial = _Partial(of_row, size, must)
     local = np.empty(num_rows, np.int64)
     rows = np.empty(num_rows, np.int64)
     num_partial = number_rows(sensor, 0, local, rows)
@@ -159,14 +146,14 @@ def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> boo
         for p in range(num_partial):
             if row_edge[p] >= 0:
                 partner[p] = indices[row_edge[p]]
-        num_partial = _grow(arranged, partial, partner, left_column, rows[:num_right], level)
+        num_partial = _grow(arranged, (of_row, size, must), partner, left_column, rows[:num_right], level)
     return True
 
 
 @inner_njit
 def _grow(
     arranged: Arranged,
-    partial: _Partial,
+    partial: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]],
     partner: NDArray[np.int64],
     column: NDArray[np.int64],
     right: NDArray[np.int64],

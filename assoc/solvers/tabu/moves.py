@@ -7,7 +7,7 @@ leads to a solution better than the best (aspiration). Rows that a move leaves o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +33,6 @@ _FRESH = 3
 _COVERS = 12
 # how many of them come from elsewhere (`LocalSearch.escape`), where they can
 _ESCAPES = 3
-
-
-class _Rules(NamedTuple):
-    """Moves done before, moves to do, tenure, and the column that is inserted first (-1: none)."""
-
-    clock: int
-    moves: int
-    tenure: int
-    forced: int
 
 
 class TabuSearch:
@@ -74,7 +65,7 @@ class TabuSearch:
             self.escapes += 1
             search.settle(search.escape(self.escapes))
         best = self.owner.copy()
-        rules = _Rules(self.clock, p.moves, p.tenure, forced)
+        rules = (self.clock, p.moves, p.tenure, forced)
         self.clock = _moves(search.arrays, self.owner, best, self.until, rules, rng, search.deadline)
         weight = search.improve(best, exactly=False)
         component.offer(best, weight)
@@ -165,13 +156,14 @@ def _moves(
     owner: NDArray[np.int32],
     best: NDArray[np.int32],
     until: NDArray[np.int64],
-    rules: _Rules,
+    rules: tuple[int, int, int, int],
     rng: Any,
     deadline: float,
 ) -> int:
     """Do moves: ``owner`` becomes the last solution, ``best`` the best one; returns the number of moves done so far.
 
-    A ``forced`` column is inserted first and held for a third of the moves.
+    The rules are the moves done before, moves to do, the tenure, and a column that is inserted first (-1: none) and
+    held for a third of the moves.
     """
     cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
     clock, moves, tenure, forced = rules
