@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -54,9 +53,8 @@ def _faster(settings: TrackerSettings, speed: float) -> TrackerSettings:
 def falling(filter: Filter[Any]) -> Filter[Any]:
     """A filter like this one, with free flight in place of constant velocity in space."""
     if type(filter) is InteractingMultipleModel:
-        made = copy.copy(filter)
-        made.filters = tuple(falling(model) for model in filter.filters)  # type: ignore[misc]
-        return made
+        models: list[Any] = [falling(model) for model in filter.filters]
+        return InteractingMultipleModel(models, filter.transition, filter.weights, interval=filter.interval)
     motion = filter.motion
     if type(filter) is not ExtendedKalmanFilter or type(motion) is not ConstantVelocity or len(motion.position) < 3:
         return filter

@@ -9,9 +9,10 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.views import log_missed, places_of
-from assoc.filters import FreeFlight
 from assoc.tracking.progress import Progress
+from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import inside
 
 # turns in a scan; with fewer all sensors are taken to be off, and no track is deleted
@@ -50,14 +51,25 @@ def to_delete(progress: Progress, tracks: TrackBatch) -> Array:
         if len(left):
             seen = settings.views.at_means(tracks.states[left])[:, settings.ranging].any(axis=1)
             gone[left] |= ~seen & ~inside(settings, tracks.states[left], 2)
-    # what falls freely, is missed and surely below the region has come down
-    floor = settings.scene.region[2, 0]
-    if isinstance(settings.filter.motion, FreeFlight) and settings.height is None:
-        missed = np.flatnonzero(tracks.last_detection < time)
-        where, spread = places_of(settings.filter, tracks.states[missed])
-        gone[missed] |= where[:, 2] + _SURELY * np.sqrt(spread[:, 2, 2]) < floor
+    if settings.height is None:
+        gone |= _came_down(settings, tracks, time)
     # out of view for so long that nobody knows where it is
     hidden = np.flatnonzero(tracks.hidden > 0.0)
     if len(hidden):
         gone[hidden] |= ~settings.births.narrow(places_of(settings.filter, tracks.states[hidden])[1])
     return gone
+
+
+def _came_down(settings: TrackerSettings, tracks: TrackBatch, time: float) -> Array:
+    """Which tracks are missed and surely below the region's floor, above which they were last detected, bool (T,)."""
+    down = np.zeros(len(tracks), dtype=np.bool_)
+    missed, velocities = np.flatnonzero(tracks.last_detection < time), velocity_components(settings.filter.motion)
+    if len(velocities) < 3 or not len(missed):
+        return down
+    states, floor = tracks.states[missed], settings.scene.region[2, 0]
+    where, spread = places_of(settings.filter, states)
+    height, climb = where[:, 2], states.mean[:, velocities[2]]
+    # where the floor is wrong, targets are detected below it
+    above = height - climb * (time - tracks.last_detection[missed]) >= floor
+    down[missed] = above & (height + _SURELY * np.sqrt(spread[:, 2, 2]) < floor)
+    return down
