@@ -90,6 +90,10 @@ class Progress(NamedTuple):
     """Set for measurements with times of their own; None if all sensors covered everything at one instant."""
     before: TrackBatch | None = None
     """The tracks that association began with, of a tracker that adapts."""
+    late: TrackBatch | None = None
+    """Those of them that may be of targets, predicted to the scan."""
+    placed: Array | None = None
+    """Whether each sensor expects these where false alarms are denser than usual, bool (T, S)."""
     dense: Sequence[Array] = ()
     """Whether false alarms are denser than usual at each measurement, of a tracker that adapts; bool (n_s,) each."""
     crowds: tuple[Array, ...] = ()

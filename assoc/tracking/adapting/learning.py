@@ -76,12 +76,12 @@ def remember_tracks(progress: Progress) -> Progress:
     """Stage: keep the tracks that association begins with; the map goes on with what they and places predicted."""
     tracks, clutter = progress.settings.method.current(progress.state), progress.state.clutter
     assert clutter is not None
-    progress = progress._replace(before=tracks)
-    tracks = _late(progress, tracks[tracks.confirmed | (tracks.hits >= 2)])
-    scan = progress.scan
+    late = _late(progress, tracks[tracks.confirmed | (tracks.hits >= 2)])
+    used, every = densities_at(progress, late, clutter) > 0.0
+    progress, scan = progress._replace(before=tracks, late=late, placed=used), progress.scan
     if progress.shared is not None and progress.shared.measured is not None:
         scan = progress.shared.measured
-    votes = _votes(progress, scan, tracks, densities_at(progress, tracks, clutter)[1] > 0.0)
+    votes = _votes(progress, scan, late, every)
     return progress._replace(clutter=clutter.after(progress.work.settings.sensors, scan, _turns(progress), votes))
 
 
@@ -95,12 +95,10 @@ def _late(progress: Progress, tracks: TrackBatch) -> TrackBatch:
 def learn(progress: Progress) -> Progress:
     """Stage: count detections, misses and false alarms, and weigh residuals."""
     state, step, settings = progress.state, progress.step, progress.settings
-    estimates, tracks = state.estimates, progress.before
-    assert estimates is not None and step is not None and tracks is not None
+    estimates, tracks, late, used = state.estimates, progress.before, progress.late, progress.placed
+    assert estimates is not None and step is not None and tracks is not None and late is not None and used is not None
     assert state.clutter is not None and progress.clutter is not None
-    tracks = tracks[tracks.confirmed]
-    late, clutter = _late(progress, tracks), progress.clutter
-    used = densities_at(progress, late, state.clutter)[0] > 0.0
+    tracks, late, used, clutter = tracks[tracks.confirmed], late[late.confirmed], used[late.confirmed], progress.clutter
     dwelled = dwells(progress, late.states)
     rows = taken_by(tracks.track_id, step.assigned)[:-1]
     if len(tracks):
@@ -135,10 +133,11 @@ def learn(progress: Progress) -> Progress:
         if state.biases is not None:
             progress = progress.with_state(biases=state.biases.after(declared, *shown.biases))
     grown = np.flatnonzero((state.clutter.clock < YOUNG) & (clutter.clock >= YOUNG))
-    if len(grown) and not state.tracks.confirmed.all():
+    tentative = np.flatnonzero(~state.tracks.confirmed)
+    if len(grown) and len(tentative):
         # what tracks gained before a place was sure, they gained too easily
-        crowd = densities_at(progress, state.tracks, clutter)[0][:, grown].sum(axis=1)
-        gained = np.where(state.tracks.confirmed, 0.0, crowd * state.tracks.hits)
+        gained, young = np.zeros(len(state.tracks)), state.tracks[tentative]
+        gained[tentative] = densities_at(progress, young, clutter)[0][:, grown].sum(axis=1) * young.hits
         progress = progress.with_state(tracks=state.tracks.scored(state.tracks.states, -gained))
     return progress.with_state(estimates=estimates.forgotten(turns).settled(declared), clutter=clutter)
 
@@ -200,8 +199,10 @@ def _contested(progress: Progress, late: TrackBatch) -> tuple[Array, list[Array]
         # two gates of one size overlap within twice that
         first, second = near_pairs(expected, expected.mean, periods, 4.0 * gate)
         first, second = np.stack([first, second])[:, first != second]
+        if not len(first):
+            continue
         off = sensor.residual(expected.mean[second], expected.mean[first])
-        square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[first], off)
+        square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance[first]), off)
         near = square <= 4.0 * gate
         contested[first[near], s] = contested[second[near], s] = True
         rows = np.flatnonzero(contested[:, s])

@@ -33,6 +33,8 @@ _TURNS, _PLOTS = 10.0, 2000
 """Plots are kept for so many turns, and at most so many of a sensor."""
 # of so many neighbours, and this many of a turn may be of targets; the density follows from so many others
 _LOOKED_AT, _TARGETS, _OTHERS = 64, 3, 6
+# a site so many standard deviations away adds less than floats can tell
+_FAR = 20.0
 # it is clutter of a place at so many times the density of false alarms, and so many plots a turn within this distance:
 # traffic is less dense
 _LEAST, _IN_GATE, _GATE = 30.0, 0.002, 4.0
@@ -116,7 +118,9 @@ class ClutterMap(NamedTuple):
         result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
         before = int(min(round(now), _TURNS))
         age, turns = np.rint(now - clocks), max(before, 1)
-        if len(places) <= _OTHERS or not n:
+        # plots are kept in order; where few turns are left of them, as in crowds, no place can be sure
+        known = np.count_nonzero(np.diff(age)) + 1
+        if len(places) <= _OTHERS or not n or known - (age[-1] == 0.0) < _NEEDED[before]:
             return result, result
         units, d, around = _units(sensor), part.dim, _around(sensor)
         # volume of a ball of radius 1, and false alarms there in these turns
@@ -129,14 +133,18 @@ class ClutterMap(NamedTuple):
         dense = np.flatnonzero(farther < near_by)
         if not len(dense):
             return result, result
-        distance, near = (np.asarray(array) for array in tree.query(at[dense], min(_LOOKED_AT, len(places))))
+        # among so many are enough others, whatever their turns; in eights, as numpy sums: zeros change nothing then
+        most = min(8 * math.ceil((known * _TARGETS + _OTHERS) / 8.0), len(places))
+        distance, near = (np.asarray(array) for array in tree.query(at[dense], most))
         turn = age[near]
-        nearer = np.tril(turn[:, :, None] == turn[:, None, :], -1).sum(axis=2)
+        nearer = _nearer_of_turn(turn)
         others = np.cumsum(nearer >= _TARGETS, axis=1)
         last = np.argmax(others == _OTHERS, axis=1)
         within = np.arange(near.shape[1]) <= last[:, None]
         hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
         often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
+        if not len(often):
+            return result, result
         dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
         radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
         # the volume of an ellipsoid as they lie: many places are flat
@@ -144,20 +152,29 @@ class ClutterMap(NamedTuple):
         spread = np.einsum("kn,kni,knj->kij", within / (last[:, None] + 1.0), off, off) * (d + 2.0)
         size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
         ratio = (last + 1) / (size * usual)
-        # or of the sites there
+        # or of the sites there: those far away add nothing
         _, row, count, middle = _middles(sites, places, around)
-        square = (_off(middle[row[near]], at[dense, None], around) ** 2).sum(axis=2)
-        spread = 1.0 + 1.0 / count[row[near]]
-        standing = (np.exp(-0.5 * square / spread) * (2.0 * math.pi * spread) ** (-0.5 * d)).sum(axis=1) * ball / usual
+        found = tree.query(at[dense], min(_LOOKED_AT, len(places)), distance_upper_bound=_FAR)
+        apart, about = (np.asarray(array) for array in found)
+        some = 8 * math.ceil(np.count_nonzero(np.isfinite(apart), axis=1).max() / 8.0)
+        apart, about = apart[:, :some], np.minimum(about[:, :some], len(places) - 1)
+        square = (_off(middle[row[about]], at[dense, None], around) ** 2).sum(axis=2)
+        spread = 1.0 + 1.0 / count[row[about]]
+        each = np.exp(-0.5 * square / spread) * (2.0 * math.pi * spread) ** (-0.5 * d)
+        standing = np.where(np.isfinite(apart), each, 0.0).sum(axis=1) * ball / usual
         result[dense] = np.where(ratio > least, np.log(np.maximum(np.maximum(ratio, standing), 1.0)), 0.0)
-        flickers = flicker_ratio(sites, clocks, sensor.detection_probability, now if before < YOUNG else None)[near]
-        if before >= YOUNG:
-            # tracks know too little of the first turns
-            told = (votes[near] * (clocks[near] >= YOUNG - 1.0)).sum(axis=1)
-            used[dense] = (told > NEEDED) & (flickers.sum(axis=1) > 0.0)
-        else:
+        P = sensor.detection_probability
+        if before < YOUNG:
             # of what is about the place, nothing: targets that fly alone are predicted well, and near by
-            used[dense] = ((votes[near] * within).sum(axis=1) >= 0.0) & ((flickers * within).sum(axis=1) > -NEEDED)
+            sure = (flicker_ratio(sites, clocks, P, now)[near] * within).sum(axis=1) > -NEEDED
+            used[dense] = ((votes[near] * within).sum(axis=1) >= 0.0) & sure
+            return np.where(used, result, 0.0), result
+        # tracks know too little of the first turns
+        told = votes * (clocks >= YOUNG - 1.0)
+        if told[told > 0.0].sum() > NEEDED:
+            about = np.asarray(tree.query(at[dense], min(_LOOKED_AT, len(places)))[1])
+            flickers = flicker_ratio(sites, clocks, P, None)
+            used[dense] = (told[about].sum(axis=1) > NEEDED) & (flickers[about].sum(axis=1) > 0.0)
         return np.where(used, result, 0.0), result
 
     def after(
@@ -248,6 +265,15 @@ def flicker_ratio(sites: Array, clocks: Array, probability: float, now: float | 
     target = hits * math.log(probability) + np.bincount(site, np.maximum(gap * math.log1p(-probability), _SILENT))
     flicker = betaln(hits + 1.0, missed + 1.0) + np.log(betainc(hits + 1.0, missed + 1.0, most) / most)
     return np.asarray(((flicker - target) / count)[row])
+
+
+def _nearer_of_turn(turn: Array) -> Array:
+    """How many before each in its row are of the same turn, of neighbours by their distances (K, n)."""
+    nearer = np.zeros(turn.shape, dtype=np.int64)
+    for one in np.unique(turn).tolist():
+        own = turn == one
+        nearer += own * (np.cumsum(own, axis=1) - 1)
+    return nearer
 
 
 def _off(one: Array, other: Array, around: Any) -> Array:
