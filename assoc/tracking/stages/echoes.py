@@ -56,6 +56,8 @@ def hide_echoes(progress: Progress) -> Progress:
 
 def _living(echoes: Echoes, ids: Array, shown: Array) -> Echoes:
     """The pairs of tracks that are left; those that ended without being shown are counted."""
+    if not len(echoes.ids):
+        return echoes
     left, short = np.isin(echoes.ids, ids), echoes.short.copy()
     tied = (echoes.counts[:, FRESH] > 0.0) & (echoes.counts[:, HITS] + echoes.counts[:, FRESH] > 2.0)
     ended = ~left[:, 0] & tied & ~np.isin(echoes.ids[:, 0], shown)
@@ -109,28 +111,33 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
     for axis in (RANGE, AZIMUTH):
         values, ours, theirs = z[:, axis], plots[young, s] - 1, plots[here, s] - 1
         spread = np.sqrt(2.0 * np.diagonal(sensor.covariance)[:2])
-        first, second = _near(values, ours, theirs, _APART * spread[axis], sensor.angular[axis])
         density = len(here) * spread[axis] / width[axis]
         # where other tracks are dense around, as in a swarm, nothing can be told
-        around = _near(values, ours, theirs[tracks.confirmed[here]], _ROUND * spread[axis], sensor.angular[axis])[0]
-        crowd = np.maximum((np.bincount(around, minlength=len(young)) - 1.0) / (2.0 * _ROUND), density)
-        crowded = math.sqrt(2.0 * math.pi) * crowd >= 1.0
+        around = _windows(values, ours, theirs[tracks.confirmed[here]], _ROUND * spread[axis], sensor.angular[axis])[2]
+        crowd = np.maximum((around.sum(axis=0) - 1.0) / (2.0 * _ROUND), density)
+        sparse = np.flatnonzero(math.sqrt(2.0 * math.pi) * crowd < 1.0)
         # twice in a row, or once where tracks begin with their second plot; and others than false alarms are shown
-        once, new_hits = 2.0 * _APART * density, tracks.hits[young[fresh[young] & ~crowded]]
-        chance, crowded = np.full(len(first), math.sqrt(2.0 * math.pi) * density), crowded[first]
-        first, second = young[first], here[second]
+        once, new_hits = 2.0 * _APART * density, tracks.hits[young[sparse][fresh[young[sparse]]]]
+        reach = 1.0 if axis == RANGE else 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
+        expected[s, axis] += ((once * reach) ** np.where(new_hits > 1, 1.0, 2.0)).sum()
+        first, second = _near(values, ours[sparse], theirs, _APART * spread[axis], sensor.angular[axis])
+        if not len(first):
+            continue
+        chance = np.full(len(first), math.sqrt(2.0 * math.pi) * density)
+        first, second = young[sparse[first]], here[second]
         off = _apart(progress, s, plots[first, s] - 1, plots[second, s] - 1)[0]
         away, square = off[:, 1 - axis] / spread[1 - axis], (off[:, axis] / spread[axis]) ** 2
         if axis == AZIMUTH:
             # an echo is a little farther, at any scale: its detour is as likely between 1 and 2 km as between 2 and 4
             chance *= np.maximum(off[:, RANGE], 0.0) / width[RANGE] * math.log(width[RANGE] / spread[RANGE])
-            once *= 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
         else:
             away = np.abs(away)
-        expected[s, axis] += (once ** np.where(new_hits > 1, 1.0, 2.0)).sum()
         ids = np.stack([tracks.track_id[first], tracks.track_id[second]], axis=1)
-        new = (away > _APART) & (square < _APART**2) & ~crowded & (first != second) & ~_known(echoes, ids, s, axis)
-        counts = np.zeros((np.count_nonzero(new), 6))
+        new = np.flatnonzero((away > _APART) & (square < _APART**2) & (first != second))
+        if not len(new):
+            continue
+        new = new[~_known(echoes, ids[new], s, axis)]
+        counts = np.zeros((len(new), 6))
         counts[:, HITS], counts[:, STRAYS] = 1.0, alone[first[new]]
         counts[:, SQUARE], counts[:, CHANCE], counts[:, FRESH] = (
             square[new],
@@ -145,24 +152,30 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
     return echoes._replace(expected=expected)
 
 
+def _windows(values: Array, first: Array, second: Array, reach: float, angle: bool) -> tuple[Array, Array, Array]:
+    """Which of the second plots, given by their numbers, are near the first in one component.
+
+    They are `count` of them from `low` on in their `order`; of each turn (T, n). Returns order, low and count.
+    """
+    order = np.argsort(values[second], kind="stable")
+    ordered, turns = values[second][order], [-2.0 * math.pi, 0.0, 2.0 * math.pi] if angle else [0.0]
+    middle = values[first] + np.array(turns)[:, None]
+    low = np.searchsorted(ordered, middle - reach)
+    return order, low, np.searchsorted(ordered, middle + reach) - low
+
+
 def _near(values: Array, first: Array, second: Array, reach: float, angle: bool) -> tuple[Array, Array]:
     """Pairs of plots, given by their numbers, that are near in one component."""
-    order = np.argsort(values[second], kind="stable")
-    ordered, turns = values[second][order], (-2.0 * math.pi, 0.0, 2.0 * math.pi) if angle else (0.0,)
-    pairs: list[tuple[Array, Array]] = []
-    for turn in turns:
-        low = np.searchsorted(ordered, values[first] + turn - reach)
-        count = np.searchsorted(ordered, values[first] + turn + reach) - low
-        row = np.repeat(np.arange(len(first)), count)
-        at = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + low[row]
-        pairs.append((row, order[at]))
-    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    return rows, columns
+    order, low, count = _windows(values, first, second, reach, angle)
+    row = np.repeat(np.tile(np.arange(len(first)), len(low)), count.ravel())
+    at = np.arange(len(row)) + np.repeat(low.ravel() - np.cumsum(count) + count.ravel(), count.ravel())
+    return row, order[at]
 
 
 def _known(echoes: Echoes, ids: Array, s: int, axis: int) -> Array:
     """Which of these pairs are there already, bool (K,)."""
-    ours = echoes.ids[(echoes.kinds == [s, axis]).all(axis=1)]
+    ours = echoes.ids[(echoes.kinds[:, 0] == s) & (echoes.kinds[:, 1] == axis)]
+    ours = ours[np.isin(ours[:, 0], ids[:, 0])]
     most = 1 + max(ids.max(initial=0), ours.max(initial=0))
     return np.isin(ids @ [most, 1], ours @ [most, 1])
 
