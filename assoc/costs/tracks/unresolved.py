@@ -42,10 +42,13 @@ def unresolved_probability(difference: Array, covariance: Array, limits: Array) 
     `difference` (N, d) and `covariance` (N, d, d) are those of their expected measurements, `limits` (G, d). The sharp
     edge in place of Koch's and van Keuk's exp(-(d / r)^2 / 2) is what a resolution is said to be here.
     """
-    spread = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-18))[:, None]
-    off = difference[:, None]
-    inside = ndtr((limits - off) / spread) - ndtr((-limits - off) / spread)
-    return np.asarray(np.clip(inside.prod(axis=2), 0.0, 1.0 - 1e-9))
+    spread = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-18))
+    inside = np.ones((len(difference), len(limits)))
+    for off, own, limit in zip(difference.T[..., None], spread.T[..., None], limits.T, strict=True):
+        # a grid has few limits of each component
+        edges, row = np.unique(limit, return_inverse=True)
+        inside *= (ndtr((edges - off) / own) - ndtr((-edges - off) / own))[:, row]
+    return np.clip(inside, 0.0, 1.0 - 1e-9)
 
 
 def narrowed(difference: Array, covariance: Array, limits: Array, weights: Array) -> tuple[Array, Array]:

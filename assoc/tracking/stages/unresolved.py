@@ -227,7 +227,13 @@ def tell_apart(progress: Progress) -> Progress:
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for s in candidates if len(tracks) > 1 else ():
         pairs.append(_near(settings.sensors[s], resolutions(progress.work.settings.sensors[s]), where))
-    rows = np.unique(np.concatenate(pairs), axis=0)
+    rows = np.concatenate(pairs)
+    if not len(rows):
+        none = np.zeros(0, dtype=np.int64)
+        return progress.with_state(
+            unresolved=state.unresolved._replace(ids=rows, apart=none, confirmed=np.sort(tracks.track_id))
+        )
+    rows = np.unique(rows, axis=0)
     before, ids = state.unresolved, np.sort(tracks.track_id[rows], axis=1)
     known = dict(zip(map(tuple, before.ids.tolist()), before.apart.tolist(), strict=True))
     apart = np.zeros(len(ids), dtype=np.int64)
