@@ -4,7 +4,8 @@ Growing tuples station by station would list all parts of what many stations hea
 sought are emissions instead, places and times that many arrival times agree with. For a cell of places each arrival
 time is an interval of times of emission; where intervals overlap, the gains of their stations bound what a target there
 can be worth. Cells that can hold none are given up, others are halved until they are as small as the gates. There
-each time at which most intervals overlap is where a fit starts.
+each time at which most intervals overlap is where a fit starts. A cell whose intervals all agree with one emission is
+not halved: that, and parts of it, are all it can hold.
 
 Of what few stations hear all parts are listed. Of many, an optimal association gives a target every arrival time that
 fits it and that no other target has. So an emission is listed without an arrival time, or with a worse one of that
@@ -119,6 +120,53 @@ def _due(r: Receivers, s: int, at: Array) -> float:
     return at[3] + math.sqrt(dx * dx + dy * dy + dz * dz) / r.speed[s]
 
 
+@inner_njit
+def _whole(r: Receivers, heard: Heard, edges: Array, begin: float, finish: float, row: Array, at: Array) -> float:
+    """Worth of all arrival times whose intervals reach into one of times, if they are one emission; else 0.
+
+    Then no station has two, and all agree with the emission at the position and time to which `at` (4,) moves: what
+    else they could be is parts of it. `row` is of them.
+    """
+    first, times, worth, count = heard.first, np.empty(len(row)), 0.0, 0
+    for s in range(len(row)):
+        row[s], times[s] = -1, math.nan
+        # of the first the interval is whole, of later ones what earlier ones leave
+        length = edges[2 * first[s] + 1] - edges[2 * first[s]] if first[s] < first[s + 1] else 0.0
+        for k in range(first[s], first[s + 1]):
+            if edges[2 * k + 1] - length <= finish and edges[2 * k + 1] >= begin:
+                if row[s] >= 0:
+                    return 0.0
+                row[s], times[s] = k, heard.picks[k]
+                worth, count = worth + heard.gain[s], count + 1
+    chi, _, at[3], at[0], at[1], at[2], _ = descend(r, times, (at[0], at[1], at[2]))
+    for s in range(len(row)):
+        if row[s] >= 0 and abs(times[s] - _due(r, s, at)) > heard.reach[s]:
+            return 0.0
+    return worth - 0.5 * chi if chi <= heard.joint[max(count - 3, 0)] else 0.0
+
+
+@inner_njit
+def _intervals(r: Receivers, heard: Heard, cell: Array, edges: Array, steps: Array) -> int:
+    """When an emission in a cell may have been heard as each arrival time: from, to, and what each adds; how many."""
+    picks, first, gain, reach = heard.picks, heard.first, heard.gain, heard.reach
+    count = 0
+    for s in range(len(first) - 1):
+        near = far = 0.0
+        for i in range(3):
+            below, above = cell[2 * i] - r.site[s, i], cell[2 * i + 1] - r.site[s, i]
+            inside, outside = max(below, -above, 0.0), max(-below, above)
+            near, far = near + inside * inside, far + outside * outside
+        near, far, end = math.sqrt(near) / r.speed[s], math.sqrt(far) / r.speed[s], -math.inf
+        for k in range(first[s], first[s + 1]):
+            # one arrival time of a station counts
+            edges[count] = max(picks[k] - far - reach[s], end)
+            end = picks[k] - near + reach[s]
+            edges[count + 1] = end
+            steps[count], steps[count + 1] = gain[s], -gain[s]
+            count += 2
+    return count
+
+
 @njit
 def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: int) -> tuple[Array, Array, int]:
     """Emissions in the first `waiting` of the cells (C, 6), low and high of x, y and z; until there are many.
@@ -130,29 +178,14 @@ def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: i
     most = _AT_ONCE + len(picks)
     rows, places, found = np.empty((most, stations), np.int32), np.empty((most, 4)), 0
     edges, steps = np.empty(2 * len(picks)), np.empty(2 * len(picks))
-    row, at = np.empty(stations, np.int32), np.empty(4)
-    slowest, closest = r.speed[0], reach[0]
+    row, at, spot = np.empty(stations, np.int32), np.empty(4), np.empty(4)
+    slowest, closest, enough = r.speed[0], reach[0], 4 if r.half[2] > 0.0 else 3
     for s in range(stations):
         slowest, closest = min(slowest, r.speed[s]), min(closest, reach[s])
     while waiting > 0 and found < _AT_ONCE:
         waiting -= 1
         cell = cells[waiting]
-        # when an emission in the cell may have been heard as each arrival time: from, to
-        count = 0
-        for s in range(stations):
-            near = far = 0.0
-            for i in range(3):
-                below, above = cell[2 * i] - r.site[s, i], cell[2 * i + 1] - r.site[s, i]
-                inside, outside = max(below, -above, 0.0), max(-below, above)
-                near, far = near + inside * inside, far + outside * outside
-            near, far, end = math.sqrt(near) / r.speed[s], math.sqrt(far) / r.speed[s], -math.inf
-            for k in range(first[s], first[s + 1]):
-                # one arrival time of a station counts
-                edges[count] = max(picks[k] - far - reach[s], end)
-                end = picks[k] - near + reach[s]
-                edges[count + 1] = end
-                steps[count], steps[count + 1] = gain[s], -gain[s]
-                count += 2
+        count = _intervals(r, heard, cell, edges, steps)
         order = np.argsort(edges)
         width, widest = 0.0, 0
         for i in range(3):
@@ -160,14 +193,20 @@ def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: i
                 width, widest = cell[2 * i + 1] - cell[2 * i], i
             at[i] = 0.5 * (cell[2 * i] + cell[2 * i + 1])
         small = width <= 2.0 * slowest * closest
-        level, hopeful = 0.0, 0
+        level, hopeful, heard_by, begin, finish = 0.0, 0, 0, 0.0, 0.0
         for j in range(count):
             level += steps[order[j]]
-            if level <= base or j + 1 == count or steps[order[j]] < 0.0 or steps[order[j + 1]] > 0.0:
+            heard_by += 1 if order[j] % 2 == 0 else -1
+            # fewer determine no position: those of two are surfaces full of cells
+            if heard_by < enough or level <= base or j + 1 == count:
                 continue
+            if steps[order[j]] < 0.0 or steps[order[j + 1]] > 0.0:
+                continue
+            begin = begin if hopeful > 0 else edges[order[j]]
+            finish = edges[order[j + 1]]
             hopeful += 1
             if not small:
-                break
+                continue
             at[3] = 0.5 * (edges[order[j]] + edges[order[j + 1]])
             for i in range(3):
                 at[i] = 0.5 * (cell[2 * i] + cell[2 * i + 1])
@@ -181,6 +220,12 @@ def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: i
                     rows[found, s] = row[s]
                 places[found] = at
                 found += 1
+        if hopeful > 0 and not small:
+            copy_to(spot, at)
+            if _whole(r, heard, edges, begin, finish, row, spot) > base:
+                copy_to(rows[found], row)
+                copy_to(places[found], spot)
+                found, hopeful = found + 1, 0
         if hopeful > 0 and not small:
             cells[waiting + 1] = cell
             cells[waiting, 2 * widest + 1] = at[widest]
@@ -296,7 +341,9 @@ def grow_arrivals(
     if not len(rows):
         return none
     times = np.where(rows >= 0, picks[rows], np.nan)
-    fitted = fit(r, times, np.ascontiguousarray(places[:, :3]), True)
+    # large cells lead to any place at which arrival times agree, not only to the best
+    fitted = fit_arrivals(r, times)
+    places = np.column_stack([fitted[2], fitted[1]])
     cost = arrival_costs(scene, arrays, times, prior, fitted)
     order = np.argsort(cost, kind="stable")[: np.count_nonzero(cost < 0.0)]
     rows, places, cost = rows[order], places[order], cost[order]
