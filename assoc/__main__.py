@@ -19,6 +19,7 @@ PROGRAMS = {
     "inspect": ("say what it understands of several radars' files", "radars.toml --picture plots.png"),
     "track": ("make tracks of scenes or of recorded radar plots", "scene.npz -o tracks.csv"),
     "live": ("make tracks of radar plots as they come", "scene.npz --page 0 < plots > tracks.csv"),
+    "locate": ("find emissions from arrival times at stations", "picks.csv --stations stations.csv ... -o events.csv"),
     "register": ("find biases of sensors", "scene.npz -o registered.npz"),
     "asterix2csv": ("write the records of an ASTERIX file as CSV", "radars.pcap -o records.csv"),
     "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),

@@ -21,6 +21,7 @@ from assoc import solvers
 from assoc._version import __version__ as version
 from assoc.recordings import read_plots
 from experiments.benchmarks import markdown, rows
+from tests.recordings.test_arrivals import quakes
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -302,6 +303,7 @@ def inputs(tmp_path_factory):
     own = (ROOT / "docs" / "own_solver.md").read_text(encoding="utf-8")
     cells = re.findall(r"```\{code-cell\}\n(.*?)```", own, re.DOTALL)
     (folder / "mine.py").write_text(next(cell for cell in cells if "register(" in cell), encoding="utf-8")
+    Path(quakes(folder)[0]).rename(folder / "stations.csv")
     (folder / "day").mkdir()
     pd.read_csv(folder / "plots.csv").to_parquet(folder / "day" / "1.parquet")
     if find_spec("asterix"):
