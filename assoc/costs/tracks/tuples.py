@@ -201,7 +201,7 @@ def _depth_first(growth: _Growth, parts: Parts, states: Any, misses: Array, max_
         logs = np.log(parts.weights)
     most = growth.margin - misses.sum(axis=1)
     status, track, rows, costs = depth_first.grow(
-        depth_first.Tracks(parts.means, parts.covariances, parts.weights, logs, np.array(misses), most),
+        depth_first.Tracks(parts.means, parts.covariances, parts.weights, logs, np.array(misses, order="C"), most),
         depth_first.sensors_of(parts.observations, growth.terms.detection, growth.ahead, np.array(growth.gates)),
         depth_first.Measured(
             begin + [pairs.first for pairs in near], np.concatenate([pairs.found for pairs in near]),
