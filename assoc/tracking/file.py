@@ -23,6 +23,7 @@ from assoc.tracking.records.clutter import ONE_SAYS, ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.echoes import Echoes
 from assoc.tracking.records.estimates import DETECTION, PER_TRACK, Estimates
+from assoc.tracking.records.extents import Extents
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.track_batch import one_state
 from assoc.tracking.records.unresolved import Unresolved
@@ -118,6 +119,8 @@ def state_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Ar
         found |= {f"biases.{name}": value for name, value in state.biases._asdict().items()}
     if state.echoes is not None:
         found |= {f"echoes.{name}": np.array(value) for name, value in state.echoes._asdict().items()}
+    if state.extents is not None:
+        found |= {f"extents.{name}": value for name, value in state.extents._asdict().items()}
     if settings.starter is not None and state.starter is not None:
         inner, unseen = state.starter
         found |= {f"nursery.{name}": value for name, value in state_arrays(settings.starter, inner).items()}
@@ -152,6 +155,7 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         clutter=None if model.clutter is None else _clutter(settings, model.clutter, saved.part("clutter.")),
         biases=None if model.biases is None else _biases(model.biases, saved.part("biases.")),
         echoes=None if model.echoes is None else _echoes(model.echoes, saved.part("echoes.")),
+        extents=None if model.extents is None else _extents(model.extents, saved.part("extents.")),
     )  # fmt: skip
     state = state._replace(method_state=settings.method.restored(settings, saved, state))
     if settings.starter is None or model.starter is None:
@@ -257,6 +261,23 @@ def _echoes(model: Echoes, saved: Saved) -> Echoes:
     return Echoes(**{**saved, "targets": float(saved["targets"])})  # type: ignore[arg-type]
 
 
+def _extents(model: Extents, saved: Saved) -> Extents:
+    """Targets with an extent in these arrays, checked."""
+    count = len(saved["ids"])
+    for name, value in model._asdict().items():
+        shape = (len(saved["past"]), 3) if name == "past" else (count, *value.shape[1:])
+        good = saved[name].shape == shape and (np.abs(saved[name]) < _HUGE).all()
+        saved.require(good, name, f"numbers below {_HUGE:g} of the shape {shape}")
+        least = -_HUGE if name in ("evidence", "places", "shapes", "covariance") else 0
+        saved.require((saved[name] >= least).all(), name, "no number below 0")
+    saved.require((np.diff(saved["ids"]) > 0).all(), "ids", "ids that ascend")
+    for name in ("shapes", "covariance"):
+        saved.require((np.linalg.eigvalsh(saved[name]) > -1e-6).all(), name, "matrices that are not negative")
+    some = saved["points"].sum(axis=(3, 4))[saved["dwells"] > 0]
+    saved.require((np.abs(some - 1.0) < 1e-6).all(), "points", "probabilities")
+    return Extents(**saved)
+
+
 def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:
     """Check tracks: arrays of equal length, ids below `next_id`, states of the filter's shape."""
     ids = saved["track_id"]
@@ -308,6 +329,7 @@ def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
         "identity": repr(settings.identity),
         # left out where it is not on: files from before it are still read
         **({"adapt": "True"} if settings.adapt else {}),
+        **({"extended": "True"} if settings.extended else {}),
         **{item.name: described(getattr(settings.method, item.name)) for item in fields(settings.method)},
     }
 

@@ -78,6 +78,21 @@ def solver_options(settings: TrackerSettings, tuples: int, effort: float = 1.0) 
     return options
 
 
+class Gathered(NamedTuple):
+    """Plots of targets with an extent, put together; see `assoc.tracking.stages.extents`."""
+
+    ids: Array
+    """Tracks of E targets, int64 (E,)."""
+    groups: tuple[Array, ...]
+    """Of each plot of each sensor: the row of its target, -1 for none; int (n_s,)."""
+    numbers: tuple[Array, ...]
+    """Its number (from 0) in the scan in which they are put together; int (n_s,)."""
+    scan: Scan
+    """The scan plot by plot."""
+    wider: Array
+    """By what covariances are larger than after updates with the sensors' noise, (E, n, n)."""
+
+
 class Progress(NamedTuple):
     """A step under way."""
 
@@ -100,6 +115,8 @@ class Progress(NamedTuple):
     """Logarithms of the densities there, whether they are in use or not."""
     clutter: ClutterMap | None = None
     """The map of false alarms as it is after the scan."""
+    gathered: Gathered | None = None
+    """Plots of targets with an extent."""
     shared: Shared | None = None
     """Tracks that may be unresolved in this scan; see `assoc.tracking.stages.unresolved`."""
     association: Association | None = None

@@ -49,6 +49,8 @@ class TrackerSettings:
     identity: IdentityParameters | None
     adapt: bool = False
     """Whether to estimate what is declared of the sensors, and the manoeuvres."""
+    extended: bool = False
+    """Whether targets may return several plots a scan."""
     by_range: Any = None
     """(S, B): see `assoc.costs.tracks.scores.ScoreTerms`."""
     starter: TrackerSettings | None = None

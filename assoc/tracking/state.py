@@ -15,6 +15,7 @@ from assoc.tracking.records.clutter import ClutterMap
 from assoc.tracking.records.doubles import Doubles
 from assoc.tracking.records.echoes import Echoes
 from assoc.tracking.records.estimates import Estimates
+from assoc.tracking.records.extents import Extents
 from assoc.tracking.records.ghosts import Unseen
 from assoc.tracking.records.identity_evidence import Identities
 from assoc.tracking.records.track_batch import TrackBatch, empty_batch
@@ -55,6 +56,8 @@ class TrackerState(NamedTuple):
     """Biases of sensors that see the same targets; None where the tracker does not adapt."""
     echoes: Echoes | None = None
     """Tracks that may be echoes of others; None where the tracker does not adapt."""
+    extents: Extents | None = None
+    """Targets that return several plots a scan; None where none may."""
     starter: Starter | None = None
     rng: Any = None
     """State of the filter's random generator, if it has one."""
@@ -88,6 +91,7 @@ def first_state(settings: TrackerSettings) -> TrackerState:
         clutter=ClutterMap.empty(settings.sensors) if settings.adapt else None,
         biases=Biases.none(settings.sensors) if settings.adapt else None,
         echoes=Echoes.none(count) if settings.adapt else None,
+        extents=Extents.none(count) if settings.extended else None,
         starter=starter,
         rng=rng_of(settings),
     )

@@ -32,6 +32,8 @@ from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
 from assoc.tracking.stages.coverage import count_out_of_view, keep_pace
 from assoc.tracking.stages.echoes import hide_echoes
+from assoc.tracking.stages.extents import weigh_extents
+from assoc.tracking.stages.gathering import gather, plot_by_plot, with_widths
 from assoc.tracking.stages.merging import merge
 from assoc.tracking.stages.splitting import name_parents
 from assoc.tracking.stages.starter import current, end_ghosts, step_starter, take_over
@@ -47,6 +49,7 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
     starting = settings.starter is not None
     return [
         *([correct, use_estimates, use_speeds] if settings.adapt else []),
+        *([gather] if settings.extended and not starting else []),
         keep_pace,
         *([take_over] if starting else [share]),
         predict,
@@ -57,9 +60,11 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_starter] if starting else []),
         *([hide_echoes] if settings.adapt and not starting else []),
+        *([weigh_extents] if settings.extended and not starting else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),
         *([] if starting else [take_up, merge, name_parents, tell_apart]),
+        *([plot_by_plot] if settings.extended and not starting else []),
         report,
     ]
 
@@ -183,6 +188,8 @@ def associate(progress: Progress) -> Progress:
         raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
     first_new, shared = progress.work.next_id, progress.shared
     done = method.associate(progress)
+    if progress.gathered is not None:
+        done = with_widths(progress, done)
     if shared is None or shared.measured is None:
         return progress._replace(association=done)
     return progress._replace(association=without_copies(progress, done, first_new), scan=shared.measured)

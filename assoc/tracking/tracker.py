@@ -26,6 +26,7 @@ from assoc.tracking.adapting.health import Health, health
 from assoc.tracking.adapting.speeds import speed_of_tracks
 from assoc.tracking.filter_choice import manoeuvre_noise, open_heights, pace_of, two_speeds
 from assoc.tracking.method import Method
+from assoc.tracking.records.extents import one_by_one
 from assoc.tracking.records.identity_evidence import IdentityParameters
 from assoc.tracking.records.initiation import Initiation
 from assoc.tracking.records.life_cycle import LifeCycle
@@ -73,6 +74,9 @@ class Tracker:
     adapt : bool
         Whether to estimate noise, detection probabilities, false alarms, biases and manoeuvres while tracking, and to
         use the estimates while they predict better than what was declared; see `health`.
+    extended : bool
+        Whether targets may return several plots of one sensor in a scan, spread over their extent, as large ships do:
+        which do is found out, and how large they are. Implies `adapt`.
     **options
         Settings of this kind of tracker.
 
@@ -117,6 +121,7 @@ class Tracker:
         registration: str | None = None,
         identity: IdentityParameters | None = None,
         adapt: bool = False,
+        extended: bool = False,
         **options: Any,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
@@ -130,7 +135,7 @@ class Tracker:
             time_limit=checked_time_limit(time_limit), life_cycle=LifeCycle() if life_cycle is None else life_cycle,
             initiation=Initiation() if initiation is None else initiation, gate_probability=gate_probability,
             max_tuples=max_tuples, identity=identity,
-            adapt=bool(adapt) or registration is not None,
+            adapt=bool(adapt or extended) or registration is not None, extended=bool(extended),
         )  # fmt: skip
         text = settings.initiation.warning(scene.region)
         if text:
@@ -188,12 +193,14 @@ class Tracker:
     @property
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
-        found, echoes = self.state.estimates, self.state.echoes
+        found, echoes, extents = self.state.estimates, self.state.echoes, self.state.extents
         if found is None or echoes is None:
             return None
         flown = speed_of_tracks(self.settings, self.state.tracks, at_most=True)
         speed, known = self.settings.initiation.speed, (self.state.unresolved, self.state.biases)
-        return health(self.sensors, found, speed, echoes.found, flown, *known)
+        shown = np.unique(self.state.tracks.track_id[self.state.tracks.confirmed])
+        lengths = () if extents is None else extents.of(shown).lengths.tolist()
+        return health(self.sensors, found, speed, echoes.found, flown, *known, lengths)
 
     @property
     def solver_calls(self) -> int:
@@ -293,7 +300,8 @@ class Tracker:
     def flush(self) -> tuple[Decision, ...]:
         """Decisions about the scans that are not final yet, oldest first; for the end of a recording."""
         decisions: tuple[Decision, ...] = self.settings.method.open_decisions(self.state)
-        return decisions
+        extents = self.state.extents
+        return decisions if extents is None else tuple(one_by_one(each, extents.past) for each in decisions)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the whole state as an npz file of format "assoc.tracker"; whole or not at all."""

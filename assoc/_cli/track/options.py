@@ -23,6 +23,7 @@ from assoc._cli.options import (
     verbosity,
 )
 from assoc._cli.program import command
+from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from assoc._types import Array
@@ -72,6 +73,7 @@ TRACKING = (
     Option("closed", "AREA", "no track starts here: 'X,Y X,Y' is a box, more corners a polygon, metres; again for "
            "each", kinds.area, rest={"action": "append"}),
     Option("no_adapt", "", "keep to the noise, detection probabilities and false alarms that are declared"),
+    Option("extended", "", "targets may return several plots a scan, spread over their extent, as large ships do"),
     *(COMMON[name] for name in _OF_ALL),
     *_OF_TRACKERS,
 )  # fmt: skip
@@ -310,5 +312,7 @@ def make_tracker(
             settings = settings | {"initiation": replace(settings["initiation"], speed=kind.speed)}
     made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace, region, falls)
     of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
-    adapt = not parsed["no_adapt"]
-    return KINDS[name](sensors, made, region=region, adapt=adapt, **settings, **of_tracker)
+    adapt, extended = not parsed["no_adapt"], bool(parsed["extended"])
+    if extended and not adapt:
+        raise InvalidInputError("--extended: nothing is estimated with --no-adapt; leave one of them out")
+    return KINDS[name](sensors, made, region=region, adapt=adapt, extended=extended, **settings, **of_tracker)

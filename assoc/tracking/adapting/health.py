@@ -133,6 +133,8 @@ class Health:
     manoeuvres: Quantity
     speed: str = ""
     """What the prior of speeds has to do with the tracks, where it does not suit them."""
+    extent: str = ""
+    """How many targets return several plots, and how long they are."""
 
     if not TYPE_CHECKING:
         __getattr__ = removed_attribute
@@ -147,7 +149,7 @@ class Health:
             else ("no harder manoeuvres than the filter expects")
         )
         sensors = (f"{sensor.name}: {sensor.verdict}" for sensor in self.sensors)
-        return (*sensors, "; ".join([f"targets: {targets}", *([self.speed] if self.speed else [])]))
+        return (*sensors, "; ".join([f"targets: {targets}", *filter(None, (self.extent, self.speed))]))
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [("sensor", "noise/declared", "P_d (%)", "decl.", "false alarms", "decl.")]
@@ -176,12 +178,13 @@ def health(
     flown: float,
     unresolved: Unresolved,
     biases: Biases | None,
+    lengths: Sequence[float] = (),
 ) -> Health:
     """Compare estimates with what was declared of these sensors.
 
     `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known;
     `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`), `unresolved` says what was learnt of
-    resolutions, `biases` what measurements are corrected for.
+    resolutions, `biases` what measurements are corrected for; `lengths` (m) are those of targets with several plots.
     """
     values, spreads = estimates.found(sensors)
     declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
@@ -209,7 +212,14 @@ def health(
             )
         )
     manoeuvres = _quantity(1.0, *estimates.agile, NOISE)
-    return Health(tuple(rows), manoeuvres, _of_speed(float(np.max(speed)), flown))
+    return Health(tuple(rows), manoeuvres, _of_speed(float(np.max(speed)), flown), _of_extent(lengths))
+
+
+def _of_extent(lengths: Sequence[float]) -> str:
+    """See `Health.extent`; nothing where all targets return one plot."""
+    if not len(lengths):
+        return ""
+    return f"{len(lengths)} with several plots each, {min(lengths):.2g} to {max(lengths):.2g} m long"
 
 
 def _merges(s: int, sensor: Sensor, unresolved: Unresolved) -> str:

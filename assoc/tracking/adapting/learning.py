@@ -107,6 +107,9 @@ def learn(progress: Progress) -> Progress:
     if progress.shared is not None:
         hidden = progress.shared.hidden(tracks.track_id)
         rows[hidden], dwelled[hidden] = 0, False
+    if progress.gathered is not None:
+        large = np.isin(tracks.track_id, progress.gathered.ids)
+        rows[large], dwelled[large] = 0, False
     # tracks in dense clutter say little about sensors
     plain = ~used.any(axis=1)
     plain &= ~np.any([np.append(False, dense)[row] for dense, row in zip(progress.dense, rows.T, strict=True)], axis=0)

@@ -65,7 +65,7 @@ def merge(progress: Progress) -> Progress:
         if not {first[k], second[k]} & {row for pair in chosen for row in pair}:
             chosen.append((first[k], second[k]))
     progress = progress.with_state(doubles=doubles)
-    return _merged(progress, tracks, np.array(chosen)) if chosen else progress
+    return merged(progress, tracks, np.array(chosen)) if chosen else progress
 
 
 def _near(progress: Progress, tracks: TrackBatch) -> tuple[Array, Array]:
@@ -87,7 +87,7 @@ def _near(progress: Progress, tracks: TrackBatch) -> tuple[Array, Array]:
     return first[square <= gate], second[square <= gate]
 
 
-def _merged(progress: Progress, tracks: TrackBatch, pairs: Array) -> Progress:
+def merged(progress: Progress, tracks: TrackBatch, pairs: Array) -> Progress:
     """The step with the second track of each pair merged into the first."""
     method, step = progress.settings.method, progress.step
     assert step is not None
