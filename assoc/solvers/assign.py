@@ -98,19 +98,17 @@ def assign(
         No tuple costs less than its measurements as false alarms. The proof could not be written. An array may be
         meant in another way. Costs are so large that rounding keeps the answer from being proved.
     """
-    begun: Any = {"started": time.perf_counter(), "compiled": compile_seconds()}
+    options: Any = {"started": time.perf_counter(), "compiled": compile_seconds(), "callback": callback, "watch": watch}
     problem = taken_problem(problem)
     chosen = registry.make_parameters(solver, parameters)
-    solve = registry.solver(solver)
-    limit = checked_time_limit(time_limit)
-    for name, function in (("callback", callback), ("watch", watch)):
-        if function is not None and not callable(function):
-            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
+    make_run = partial(Run, _seed(seed), time_limit=checked_time_limit(time_limit), **options)
+    for name in ("callback", "watch"):
+        if options[name] is not None and not callable(options[name]):
+            raise InvalidInputError(f"{name}: expected a function, got {type(options[name]).__name__}")
     if proof is not None:
         check_writable(proof)
-    make_run = partial(Run, _seed(seed), time_limit=limit, callback=callback, watch=watch, **begun)
     with interruptible():
-        solution = _solution(problem, (solver, solve), chosen, make_run, start)
+        solution = _solution(problem, (solver, registry.solver(solver)), chosen, make_run, start)
         if proof is not None:
             _prove(proof, problem, solution)
     _warn_of_rounding(problem, solution)
