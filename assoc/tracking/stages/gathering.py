@@ -34,25 +34,17 @@ def gather(progress: Progress) -> Progress:
         return progress
     order = np.argsort(tracks.track_id, kind="stable")
     tracks = tracks[order[np.searchsorted(tracks.track_id, extents.ids[known], sorter=order)]]
-    scan, groups = progress.scan, [np.full(len(z), -1) for z in progress.scan.measurements]
-    values = [np.array(z) for z in scan.measurements]
-    updates: list[list[tuple[Array, Array, Array]]] = [[] for _ in known]
-    for s in np.flatnonzero(settings.ranging).tolist():
-        if not len(values[s]):
-            continue
-        states = seen_at(progress, tracks.states, s, progress.elapsed)
-        found = _grouped(progress, states, extents.covariance[known], s)
-        for n in np.unique(found[found >= 0]).tolist():
-            groups[s][found == n] = n
     at = predict_each(settings.filter, tracks.states, np.full(len(tracks), progress.elapsed))
-    kept, index = list[Array](), list[Array]()
-    for s, (z, group) in enumerate(zip(scan.measurements, groups, strict=True)):
-        sensor = settings.sensors[s]
-        first, number = np.arange(len(z)), np.arange(len(z))
-        states = seen_at(progress, tracks.states, s, progress.elapsed) if (group >= 0).any() else at
-        expected = settings.filter.expected(states, sensor) if (group >= 0).any() else None
+    scan, values = progress.scan, [np.array(z) for z in progress.scan.measurements]
+    updates: list[list[tuple[Array, Array, Array]]] = [[] for _ in known]
+    groups, kept, index = list[Array](), list[Array](), list[Array]()
+    for s, (z, sensor) in enumerate(zip(scan.measurements, settings.sensors, strict=True)):
+        first, number, group = np.arange(len(z)), np.arange(len(z)), np.full(len(z), -1)
+        if len(z) and settings.ranging[s]:
+            states = seen_at(progress, tracks.states, s, progress.elapsed)
+            expected = settings.filter.expected(states, sensor)
+            group = _grouped(progress, states, extents.covariance[known], s)
         for n in np.unique(group[group >= 0]).tolist():
-            assert expected is not None
             rows = np.flatnonzero(group == n)
             first[rows] = rows[0]
             H, S = slopes(settings.filter, sensor, states.mean[n]), expected.covariance[n]
@@ -63,6 +55,7 @@ def gather(progress: Progress) -> Progress:
             values[s][rows[0]] = sensor.residual((expected.mean[n] + pull)[None], np.zeros((1, sensor.dim)))[0]
             updates[n].append((H, sensor.covariance, noise))
         rows = np.flatnonzero(first == number)
+        groups.append(group)
         kept.append(rows)
         index.append(np.searchsorted(rows, first))
     wider = np.stack([_widths(at.covariance[n], ups) for n, ups in enumerate(updates)])
