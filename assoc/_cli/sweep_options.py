@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.options import COMMON, Given, Option, Parser, check_scheduler, read_config, verbosity
 from assoc._cli.program import command
-from assoc._cli.values import OneOf, Output, html_page, scan_range, seconds, whole
+from assoc._cli.values import OneOf, Output, scan_range, seconds, whole
 from assoc._system.imports import check_extra
 from assoc.errors import InvalidInputError
 
@@ -24,7 +24,8 @@ DEFAULT_SOLVER = "aco"
 SHOWN = 20
 """Number of settings that a terminal shows."""
 
-_FIGURE = Output(".png", ".svg", ".pdf", strict=True, streams=False, extras={"": ("matplotlib", "plot")})
+_DRAWN = {"": ("matplotlib", "plot")}
+_FIGURE = Output(".png", ".svg", ".pdf", strict=True, streams=False, extras=_DRAWN)
 _OF_FILE = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "*"}),
     Option("solver", "NAME", f"one or more solvers (default {DEFAULT_SOLVER})", rest={"nargs": "+"}),
@@ -49,10 +50,11 @@ _OF_TABLE = (
 _OF_SUMMARY = (
     Option("summary", "FOLDER", "print the table of a study; run nothing"),
     *_OF_TABLE,
-    Option("report", "FILE", "write an HTML page: table, heat maps, convergence (needs assoc[report])", html_page),
+    Option("report", "FILE", "write an HTML page: table, heat maps, convergence (needs assoc[plot])",
+           Output(".html", ".htm", extras=_DRAWN)),
     Option("heatmap", "FILE", "draw the means over two parameters: FILE.png, .pdf or .svg", _FIGURE),
     Option("convergence", "FILE", "draw the excess over the best known cost over time: .png, .pdf or .svg", _FIGURE),
-)
+)  # fmt: skip
 OUTPUTS = tuple(option.name for option in _OF_SUMMARY[2:])
 
 

@@ -104,7 +104,7 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     figure.set_size_inches(1.6 + 2.6 * len(groups), 0.6 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), len(groups), squeeze=False)
     for row, measure in zip(axes, panels, strict=True):
-        tables = [cells(part, measure, across, up, intervals=False)[:3] for _, part in groups]
+        tables = [_cells(part, measure, across, up) for _, part in groups]
         known = np.concatenate([values[~np.isnan(values)] for _, _, values in tables])
         limits = colour_limits(known)
         for ax, (label, _), (xs, ys, values) in zip(row, groups, tables, strict=True):
@@ -186,24 +186,15 @@ def setting_title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -
     return ", ".join(words)
 
 
-def cells(
-    study: pd.DataFrame, measure: str, across: str, up: str, *, intervals: bool = True
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Means and 95 % intervals of a measure over two parameters of one solver's runs, in displayed units.
-
-    Returns the parameters' values, and middle, low and high (ys, xs), NaN where there is no run. Intervals take most of
-    the time; without them they are NaN.
-    """
-    factor = FACTORS.get(measure, 1.0)
+def _cells(study: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Array, Array, Array]:
+    """The values of two parameters of one solver's runs, and means of a measure (ys, xs), NaN where there is no run."""
     xs, ys = (np.array(sorted(study[name].dropna().unique().tolist()), dtype=object) for name in (across, up))
-    middle, low, high = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
+    means = np.full((len(ys), len(xs)), np.nan)
     for (x, y), runs in study.groupby([across, up]):
-        cell = [*ys].index(y), [*xs].index(x)
         # settings that differ only in other parameters count as repeats
         runs = runs.assign(repeat=runs.groupby(["setting", "repeat"]).ngroup())
-        found = estimated(runs, measure, interval=intervals)
-        middle[cell], low[cell], high[cell] = (factor * value for value in found)
-    return xs, ys, middle, low, high
+        means[[*ys].index(y), [*xs].index(x)] = FACTORS.get(measure, 1.0) * estimated(runs, measure)
+    return xs, ys, means
 
 
 def is_constant(known: Floats) -> bool:

@@ -59,7 +59,8 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
         row["runs"] = len(runs)
         row["infeasible"] = int(runs["cost"].isna().sum())
         for measure in MEASURES:
-            row[measure], row[f"{measure}_low"], row[f"{measure}_high"] = estimated(runs, measure)
+            row[measure] = estimated(runs, measure)
+            row[f"{measure}_low"], row[f"{measure}_high"] = mean_interval(*_weighed(runs, measure))
         rows.append(row)
     columns = ["solver", *names, "setting", "runs", "infeasible"]
     columns += [f"{measure}{end}" for measure in MEASURES for end in ("", "_low", "_high")]
@@ -88,11 +89,15 @@ def parameter_text(value: Any) -> str:
     return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
 
 
-def estimated(runs: pd.DataFrame, measure: str, *, interval: bool = True) -> tuple[float, float, float]:
-    """Mean of a measure over runs, and the ends of its 95 % interval, which takes most of the time; NaN without."""
-    table = by_problem(runs, measured(runs, measure))
+def estimated(runs: pd.DataFrame, measure: str) -> float:
+    """Mean of a measure over runs."""
+    return weighted_mean(*_weighed(runs, measure))
+
+
+def _weighed(runs: pd.DataFrame, measure: str) -> tuple[Floats, Floats | None]:
+    """Values of a measure, (problems, repeats), and their weights."""
     weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
-    return weighted_mean(table, weights), *(mean_interval(table, weights) if interval else (np.nan, np.nan))
+    return by_problem(runs, measured(runs, measure)), weights
 
 
 def by_problem(runs: pd.DataFrame, values: Floats) -> Floats:

@@ -56,9 +56,9 @@ def pages(tmp_path_factory):
 @pytest.mark.parametrize("name", KINDS)
 def test_the_page_names_no_server(pages, name):
     page = (pages / f"{name}.html").read_text()
-    assert "Plotly.newPlot" in page
+    assert ("Plotly.newPlot" in page) == (name != "study")
     servers = {*re.findall(r"\b(?:https?|wss?)://([\w.{}-]+)", re.sub(r"/\*!.*?\*/", "", page, flags=re.DOTALL))}
-    assert servers == {"www.w3.org"}  # names of vocabularies, which nothing asks for
+    assert servers == ({"www.w3.org"} if name != "study" else set())  # names of vocabularies, which nothing asks for
 
 
 @pytest.mark.slow
@@ -74,13 +74,15 @@ def test_it_draws_and_nothing_leaves(browser, pages, pictures, tmp_path, name, s
     # nothing but the boxes of tables scrolls sideways
     assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
     drawn = browser.execute_script("return document.querySelectorAll('.js-plotly-plot .main-svg').length")
-    assert drawn >= 2 * browser.execute_script("return document.querySelectorAll('.plot').length") > 0
+    plots = browser.execute_script("return document.querySelectorAll('.plot').length")
+    assert drawn >= 2 * plots and (plots > 0) == (name != "study")
+    assert browser.execute_script("return [...document.images].every((one) => one.naturalWidth > 0)")
     picture = Image.open(io.BytesIO(screenshot(browser, pictures / f"{name}-{size[0]}.png"))).convert("RGB")
     # a page that was not drawn has few colours
     assert len(np.unique(np.asarray(picture).reshape(-1, 3)[::7], axis=0)) > 50
     windows = browser.window_handles
-    assert {*browser.execute_script(CLICK_ALL)} == BUTTONS
-    assert in_time(lambda: [*tmp_path.glob("*.png")])
+    assert {*browser.execute_script(CLICK_ALL)} == (BUTTONS if plots else set())
+    assert not plots or in_time(lambda: [*tmp_path.glob("*.png")])
     assert browser.window_handles == windows
     assert [one for one in requests(browser) if not one.startswith(LOCAL)] == []
     # "Pause" ends an animation, whose promise plotly then breaks
@@ -116,7 +118,7 @@ def test_a_script_that_slips_through_does_not_run(browser, pages, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["scene", "tracks", "study"])
+@pytest.mark.parametrize("name", ["scene", "tracks"])
 def test_on_paper_nothing_is_cut(browser, pictures, pages, name):
     """A4 without its margins is 703 units wide."""
     show(browser, pages / f"{name}.html")

@@ -1,10 +1,10 @@
-"""Figures as plotly takes them: layout, curves, a slider over steps, a menu."""
+"""Figures as plotly takes them: layout, curves, a slider over steps."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ _AXIS = {"zeroline": False, "gridcolor": "#e5e8eb", "linecolor": GREY, "ticks": 
 _FONT = {"family": 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', "size": 13}
 
 Dicts = dict[str, Any]
-Choices = Sequence[tuple[str, Sequence[Mapping[str, Any]]]]
 
 
 def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
@@ -148,16 +147,8 @@ def sliding(
     }  # fmt: skip
     given = figure["layout"] if len(steps) > 1 else {**figure["layout"], "title": {"text": escape(steps[0][0])}}
     if len(steps) > 1:
-        given = {**given, "sliders": [slider], "updatemenus": [player, *given.get("updatemenus", [])]}
+        given = {**given, "sliders": [slider], "updatemenus": [player]}
     return {"data": data, "layout": given, "frames": frames}
-
-
-def menu(choices: Choices) -> Dicts:
-    """Menu whose choices (text, changes of traces and layout) are plotly's `update`."""
-    return {
-        "x": 0.0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"b": 2},
-        "buttons": [{"method": "update", "label": escape(text), "args": list(args)} for text, args in choices],
-    }  # fmt: skip
 
 
 def evenly(count: int, most: int = MOST_STEPS) -> list[int]:

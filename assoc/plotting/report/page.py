@@ -46,14 +46,14 @@ class Part:
 
 def write_page(path: str | os.PathLike[str], title: str, lead: str, parts: Sequence[Part]) -> None:
     """Write a page with a heading and one sentence under it, plain texts; it appears whole or not at all."""
-    to_html = load_extra("plotly.io", "report").to_html
-    body, links, scripts = [], [], [plotly_script()]
+    body: list[str] = []
+    links, scripts = [], [plotly_script()] if any(part.figures for part in parts) else []
     for part in parts:
         name = re.sub(r"\W+", "-", part.title.lower())
         links.append(f'<a href="#{name}">{escape(part.title)}</a>')
         body.append(f'<section id="{name}"><h2>{escape(part.title)}</h2>\n{part.text}')
         for number, figure in enumerate(part.figures):
-            made = to_html(
+            made = load_extra("plotly.io", "report").to_html(
                 figure, _CONFIG, auto_play=False, include_plotlyjs=False, full_html=False, validate=False,
                 div_id=f"{name}-{number}",
             )  # fmt: skip

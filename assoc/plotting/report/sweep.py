@@ -1,38 +1,30 @@
-"""The report of a parameter study: table, heat maps, convergence."""
+"""The report of a parameter study: table, and the figures of `assoc.plotting.study_figures`."""
 
 from __future__ import annotations
 
-import itertools
+import base64
+import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.imports import check_extra
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._text.html import escape
-from assoc.plotting.colours import SERIES
-from assoc.plotting.report.figures import FAINT, Choices, Dicts, layout, line, menu, plain_numbers, scatter
-from assoc.plotting.report.page import Part, cards, check_report, definitions, note, settings_part, table, write_page
-from assoc.plotting.study_figures import LABELS, cells, setting_title
-from assoc.sweeps.frame import load, load_traces, mean_excess, with_excess
+from assoc.plotting.report.page import Part, cards, definitions, note, settings_part, table, write_page
+from assoc.plotting.study_figures import LABELS, convergence, heat_maps, new_figure, setting_title
+from assoc.sweeps.frame import load, load_traces
 from assoc.sweeps.store import Store
-from assoc.sweeps.summary import FACTORS, measured, parameter_columns, parameter_text, summarize, varied
+from assoc.sweeps.summary import FACTORS, parameter_columns, parameter_text, summarize, varied
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_MOST_VALUES = 15
-_MOST_PARAMETERS = 5
-_MOST_CURVES = 60
-_MOST_MAPS = 10
-
-_NOTE_MAPS = "Means over all runs with these values; point at a cell for the 95 % interval, by the bootstrap."
-_NOTE_CURVES = (
-    "Mean cost above the best known. A run counts with the best it has found by then. The settings of least mean "
-    "excess come first."
-)
+_NOTE_MAPS = "Means over all runs with these values; the table has the 95 % intervals, by the bootstrap."
+_NOTE_CURVES = "A run counts with the best it has found by then."
 
 
 @explains_wrong_types
@@ -59,11 +51,11 @@ def write_sweep_report(
     Raises
     ------
     MissingExtraError
-        plotly is not installed; an ImportError that names the command.
+        matplotlib is not installed; an ImportError that names the command.
     InvalidInputError
         There is no such study, or the file cannot be written.
     """
-    check_report()
+    check_extra("matplotlib", "plot")
     frame = load(folder) if frame is None else frame
     with Store(folder) as store:
         manifest = store.manifest
@@ -85,16 +77,21 @@ def write_sweep_report(
     summary = summarize(frame).sort_values(["excess", "time"], kind="stable").reset_index(drop=True)
     names = varied(frame)
     titles = [setting_title(row, names, frame["solver"].nunique() > 1) for row in summary.to_dict("records")]
-    measures = [measure for measure in LABELS if summary[measure].notna().any()]
-    # begin with what differs
-    measures.sort(key=lambda measure: summary[measure].nunique() < 2)
     parts = [Part("Summary", _summary(frame, summary, titles)), Part("Settings compared", _table(summary, names))]
-    figures = [_map(*one, measures) for one in _pairs(frame)]
-    if figures:
-        parts.append(Part("Over two parameters", note(_NOTE_MAPS), figures))
-    curves = _curves(frame, load_traces(folder), summary, titles)
-    parts += [Part("Convergence", note(_NOTE_CURVES), curves), about]
-    write_page(path, name, lead, parts)
+    maps = [(solver, part) for solver, part in frame.groupby("solver") if varied(part)]
+    if maps:
+        drawn = [_picture(f"Heat maps of {solver}", heat_maps(part, new_figure())) for solver, part in maps]
+        parts.append(Part("Over the parameters", note(_NOTE_MAPS) + "".join(drawn)))
+    curves = _picture("Convergence", convergence(frame, load_traces(folder), new_figure()))
+    write_page(path, name, lead, [*parts, Part("Convergence", note(_NOTE_CURVES) + curves), about])
+
+
+def _picture(title: str, figure: Any) -> str:
+    """A figure of matplotlib as an element, which scrolls where it is wider than the page."""
+    file = io.BytesIO()
+    figure.savefig(file, format="svg")
+    data = base64.b64encode(file.getvalue()).decode()
+    return f'<h3>{escape(title)}</h3><div class="drawn"><img alt="" src="data:image/svg+xml;base64,{data}"></div>'
 
 
 def _fixed(frame: pd.DataFrame) -> list[tuple[str, dict[str, str]]]:
@@ -134,60 +131,3 @@ def _table(summary: pd.DataFrame, names: Sequence[str]) -> str:
             line += [f"{middle:.4g}", "" if np.isnan(low) else f"{low:.4g} .. {high:.4g}"]
         rows.append(line)
     return table(headers, rows, rest="; --csv writes all")
-
-
-def _pairs(frame: pd.DataFrame) -> list[tuple[str, pd.DataFrame, str, str]]:
-    """Title, runs of a solver, and two of its parameters with few values."""
-    pairs = []
-    for solver, part in frame.groupby("solver"):
-        few = [name for name in varied(part) if part[name].nunique() <= _MOST_VALUES][:_MOST_PARAMETERS]
-        pairs += [(str(solver), part, *two) for two in itertools.combinations(few, 2)]
-    return pairs[:_MOST_MAPS]
-
-
-def _map(solver: str, part: pd.DataFrame, across: str, up: str, measures: Sequence[str]) -> Dicts:
-    """Means of a measure over two parameters, with a menu of the measures."""
-    data: list[Dicts] = []
-    for measure in measures:
-        if np.isnan(measured(part, measure)).all():
-            continue
-        xs, ys, middle, low, high = cells(part, measure, across, up)
-        texts = [
-            [
-                "" if np.isnan(value) else f"{value:.3g} ({low[i, j]:.3g} .. {high[i, j]:.3g})"
-                for j, value in enumerate(row)
-            ]
-            for i, row in enumerate(middle)
-        ]
-        data.append(
-            {
-                "type": "heatmap", "name": LABELS[measure], "x": [escape(parameter_text(x)) for x in xs],
-                "y": [escape(parameter_text(y)) for y in ys], "z": plain_numbers(middle, 6), "hovertext": texts,
-                "texttemplate": "%{z:.3g}", "colorscale": "Cividis", "colorbar": {"thickness": 12},
-                "hovertemplate": "%{hovertext}<extra></extra>", "visible": not data,
-            }
-        )  # fmt: skip
-    choices: Choices = [(one["name"], [{"visible": [other is one for other in data]}]) for one in data]
-    shown = layout(
-        f"{across} ({escape(solver)})", up, showlegend=False, updatemenus=[menu(choices)], margin={"t": 50},
-        xaxis={"type": "category"}, yaxis={"type": "category"},
-    )  # fmt: skip
-    return {"data": data, "layout": shown}
-
-
-def _curves(frame: pd.DataFrame, traces: pd.DataFrame, summary: pd.DataFrame, titles: Sequence[str]) -> list[Dicts]:
-    """Mean excess of the best settings over iterations and over time, in the order of the table."""
-    traces = with_excess(frame, traces)
-    figures = []
-    for column, label in (("iteration", "iteration"), ("seconds", "time (ms)")):
-        data = []
-        for i, (key, title) in enumerate(zip(summary["setting"][:_MOST_CURVES], titles, strict=False)):
-            part = traces[traces["setting"] == key]
-            if len(part):
-                at, excess = mean_excess(part, column)
-                x, y = (plain_numbers(values, 6) for values in (at, excess))
-                style = {**line(i), "shape": "hv"} if i < len(SERIES) else {"color": FAINT, "width": 1, "shape": "hv"}
-                data.append(scatter(title, "lines", x=x, y=y, line=style, showlegend=i < len(SERIES)))
-        axes: Dicts = {"xaxis": {"type": "log"}, "yaxis": {"rangemode": "tozero"}}
-        figures.append({"data": data, "layout": layout(label, "excess cost (nats)", **axes)})
-    return figures
