@@ -6,7 +6,7 @@ import math
 import secrets
 import sys
 import types
-from dataclasses import Field, fields
+from dataclasses import Field, field, fields
 from functools import cache
 from numbers import Integral, Real
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
@@ -73,6 +73,11 @@ class Parameter:
         if self.choices and value not in self.choices:
             raise InvalidInputError(f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}")
         return value
+
+
+def described(default: Any, text: str) -> Any:
+    """A field of a parameter dataclass: its default, and what the programs and the documentation say of it."""
+    return field(default=default, metadata={"help": text})
 
 
 def parameters_of(owner: type) -> list[Parameter]:

@@ -44,3 +44,17 @@ numpydoc_class_members_toctree = False
 # an extra that is not installed takes only its own details from the page
 OPTIONAL = ("stonesoup", "ordered_set", "matplotlib", "plotly", "optuna", "distributed")
 autodoc_mock_imports = [name for name in OPTIONAL if not find_spec(name)]
+
+
+def list_parameters(app, what, name, obj, options, lines):
+    """Parameters of solvers are described once, by the help texts of their fields."""
+    own = vars(obj).get("__annotations__", {}) if what == "class" else ()
+    described = [(one, obj.__dataclass_fields__[one]) for one in own if one in getattr(obj, "__dataclass_fields__", {})]
+    for one, field in described:
+        if text := field.metadata.get("help"):
+            lines += [f"- ``{one}`` ({field.default!r}): {text}"]
+
+
+def setup(app):
+    """Let docstrings be completed."""
+    app.connect("autodoc-process-docstring", list_parameters)

@@ -1,9 +1,6 @@
-"""What scenarios share: options with a help text, and the memory of a scene, checked before it is made."""
+"""The memory of a scene, checked before it is made."""
 
 from __future__ import annotations
-
-from dataclasses import field
-from typing import Any
 
 from assoc._system import memory
 
@@ -12,11 +9,6 @@ from assoc._system import memory
 _REPORT, _MEASUREMENT, _PLACE, _SENSOR = 1_000, 90, 150, 2_000
 # scans, sensors or targets that a scenario takes at the most
 MOST = 10_000_000
-
-
-def option(default: Any, help: str) -> Any:
-    """Field of a parameter dataclass, with the text that command lines show."""
-    return field(default=default, metadata={"help": help})
 
 
 def require_scene_memory(scans: float, sensors: float, targets: float, false_alarms: float, names: str) -> None:

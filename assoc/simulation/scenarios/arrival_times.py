@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.sensors.arrival_time import ArrivalTimeSensor
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, range_interval
 
@@ -19,16 +19,16 @@ from assoc.simulation.radars import MARGIN, range_interval
 class ArrivalTimesParameters(Parameters):
     """Parameters of the scene of arrival times; the defaults are P waves of small earthquakes."""
 
-    stations: int = option(20, "number of stations, 3 or more")
-    events: int = option(3, "number of emissions in each scan")
-    scans: int = option(5, "number of scans")
-    listening: float = option(60.0, "seconds of a scan in which waves are emitted")
-    width: float = option(100_000.0, "side of the square field, metres")
-    depth: float = option(20_000.0, "how deep below the field waves are emitted, metres; 0: in its plane")
-    wave_speed: float = option(6_000.0, "speed of the wave, m/s")
-    noise: float = option(0.1, "standard deviation of an arrival time, seconds")
-    detection_probability: float = option(0.9, "P_d of each station")
-    false_alarms: float = option(1.0, "mean false alarms per station and scan")
+    stations: int = described(20, "number of stations, 3 or more")
+    events: int = described(3, "number of emissions in each scan")
+    scans: int = described(5, "number of scans")
+    listening: float = described(60.0, "seconds of a scan in which waves are emitted")
+    width: float = described(100_000.0, "side of the square field, metres")
+    depth: float = described(20_000.0, "how deep below the field waves are emitted, metres; 0: in its plane")
+    wave_speed: float = described(6_000.0, "speed of the wave, m/s")
+    noise: float = described(0.1, "standard deviation of an arrival time, seconds")
+    detection_probability: float = described(0.9, "P_d of each station")
+    false_alarms: float = described(1.0, "mean false alarms per station and scan")
 
     def __post_init__(self) -> None:
         self._whole("events", "scans", most=MOST)

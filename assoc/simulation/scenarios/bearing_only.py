@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.sensors.bearing import BearingSensor
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
 from assoc.simulation.scenarios.crowd import horizontal_velocities
@@ -23,16 +23,16 @@ HEIGHT = 10_000.0
 class BearingOnlyParameters(Parameters):
     """Parameters of the bearing-only scene."""
 
-    targets: int = option(20, "number of targets")
-    sensors: int = option(3, "number of sensors, 2 or more")
-    scans: int = option(10, "number of scans")
-    interval: float = option(10.0, "seconds from scan to scan")
-    width: float = option(100_000.0, "side of the square field, metres")
-    depth: float = option(10_000.0, "how far every second sensor stands behind the edge, metres")
-    speed: float = option(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
-    noise: float = option(0.005, "standard deviation of a bearing, radians")
-    detection_probability: float = option(0.95, "P_d of each sensor")
-    false_alarms: float = option(1.0, "mean false alarms per sensor and scan")
+    targets: int = described(20, "number of targets")
+    sensors: int = described(3, "number of sensors, 2 or more")
+    scans: int = described(10, "number of scans")
+    interval: float = described(10.0, "seconds from scan to scan")
+    width: float = described(100_000.0, "side of the square field, metres")
+    depth: float = described(10_000.0, "how far every second sensor stands behind the edge, metres")
+    speed: float = described(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
+    noise: float = described(0.005, "standard deviation of a bearing, radians")
+    detection_probability: float = described(0.95, "P_d of each sensor")
+    false_alarms: float = described(1.0, "mean false alarms per sensor and scan")
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", most=MOST)

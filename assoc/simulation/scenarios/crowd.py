@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radars_over
 
@@ -25,21 +25,23 @@ REFERENCE_TARGETS = 100
 class CrowdParameters(Parameters):
     """Parameters of the crowd."""
 
-    targets: int = option(100, "number of targets")
-    scans: int = option(1, "number of scans")
-    interval: float = option(1.0, "seconds from scan to scan")
-    sensors: int = option(3, "number of sensors")
-    sensor: Literal["position", "radar"] = option(
+    targets: int = described(100, "number of targets")
+    scans: int = described(1, "number of scans")
+    interval: float = described(1.0, "seconds from scan to scan")
+    sensors: int = described(3, "number of sensors")
+    sensor: Literal["position", "radar"] = described(
         "position", "x, y, z at once, or radars (range, azimuth, elevation) around the box"
     )
-    width: float = option(5_000.0, "side of the square box, metres")
-    height: float = option(2_000.0, "height of the box, metres")
-    constant_density: bool = option(False, f"grow the ground area with the targets; as given for {REFERENCE_TARGETS}")
-    speed: float = option(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
-    noise: float = option(100.0, "standard deviation of a position (radar: of range, and across at the box), metres")
-    detection_probability: float = option(0.9, "P_d of each sensor")
-    false_alarms_per_target: float = option(0.1, "mean false alarms per sensor and scan, for each target")
-    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: radars measure none")
+    width: float = described(5_000.0, "side of the square box, metres")
+    height: float = described(2_000.0, "height of the box, metres")
+    constant_density: bool = described(
+        False, f"grow the ground area with the targets; as given for {REFERENCE_TARGETS}"
+    )
+    speed: float = described(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
+    noise: float = described(100.0, "standard deviation of a position (radar: of range, and across at the box), metres")
+    detection_probability: float = described(0.9, "P_d of each sensor")
+    false_alarms_per_target: float = described(0.1, "mean false alarms per sensor and scan, for each target")
+    range_rate_noise: float = described(0.0, "standard deviation of range rates, m/s; 0: radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", "sensors", most=MOST)

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
-from assoc.simulation.memory import option, require_scene_memory
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radars_over
 
@@ -28,20 +28,20 @@ _TRIES = 200
 class DubinsUavParameters(Parameters):
     """Parameters of the Dubins scene."""
 
-    targets: int = option(4, "number of aircraft")
-    interval: float = option(1.0, "seconds from scan to scan")
-    speed: float = option(20.0, "speed of the aircraft, m/s")
-    turning_radius: float = option(100.0, "turning radius, metres")
-    obstacles: int = option(5, "number of circular no-fly zones")
-    obstacle_radius: float = option(120.0, "largest radius of a zone, metres; radii are uniform from a third of it")
-    margin: float = option(20.0, "distance to keep from the zones, metres")
-    width: float = option(2_000.0, "side of the square region, metres")
-    height: float = option(300.0, "largest height; heights are uniform from a third of it")
-    radars: int = option(3, "number of radars (range, azimuth, elevation)")
-    noise: float = option(5.0, "standard deviation of range, and across at the region's middle, metres")
-    detection_probability: float = option(0.9, "P_d of each radar")
-    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
-    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
+    targets: int = described(4, "number of aircraft")
+    interval: float = described(1.0, "seconds from scan to scan")
+    speed: float = described(20.0, "speed of the aircraft, m/s")
+    turning_radius: float = described(100.0, "turning radius, metres")
+    obstacles: int = described(5, "number of circular no-fly zones")
+    obstacle_radius: float = described(120.0, "largest radius of a zone, metres; radii are uniform from a third of it")
+    margin: float = described(20.0, "distance to keep from the zones, metres")
+    width: float = described(2_000.0, "side of the square region, metres")
+    height: float = described(300.0, "largest height; heights are uniform from a third of it")
+    radars: int = described(3, "number of radars (range, azimuth, elevation)")
+    noise: float = described(5.0, "standard deviation of range, and across at the region's middle, metres")
+    detection_probability: float = described(0.9, "P_d of each radar")
+    false_alarms: float = described(1.0, "mean false alarms per radar and scan")
+    range_rate_noise: float = described(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("targets", "radars", most=10_000)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.recordings.flights.cleaning import clean
@@ -21,7 +21,7 @@ from assoc.recordings.flights.reports import ALTITUDE_UNITS, COLUMNS, SPEED_UNIT
 from assoc.scene.geodesy import east_north_up
 from assoc.scene.scene import Scene
 from assoc.simulation.flights import STEP
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe, velocities_from
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
@@ -35,7 +35,7 @@ _STRANGE = 60.0
 
 def _column(meaning: str, unit: str) -> Any:
     names = ", ".join(COLUMNS[meaning])
-    return option(None, f"column of the {meaning}{unit} (else the first of: {names})")
+    return described(None, f"column of the {meaning}{unit} (else the first of: {names})")
 
 
 @dataclass(frozen=True)
@@ -51,24 +51,24 @@ class FromTracksParameters(Parameters):
     longitude_column: str | None = _column("longitude", ", degrees")
     altitude_column: str | None = _column("altitude", "")
     name_column: str | None = _column("name", ", as call signs, if there is one")
-    altitude_unit: Literal["m", "ft"] = option("m", "unit of the altitudes")
-    speed_unit: Literal["m/s", "kt"] = option(
+    altitude_unit: Literal["m", "ft"] = described("m", "unit of the altitudes")
+    speed_unit: Literal["m/s", "kt"] = described(
         "m/s", "unit of velocity and vertrate; with kt the latter is in feet per minute"
     )
-    interval: float = option(10.0, "seconds from scan to scan (positions are interpolated)")
-    max_gap: float = option(60.0, "no target where its reports are further apart than this, seconds")
-    clean: bool = option(True, "leave out repeated positions, mend altitudes that cannot be right")
-    scans: int | None = option(None, "number of scans (without: the whole recording)")
-    radars: int = option(3, "number of radars (range, azimuth, elevation)")
-    turns: str | None = option(
+    interval: float = described(10.0, "seconds from scan to scan (positions are interpolated)")
+    max_gap: float = described(60.0, "no target where its reports are further apart than this, seconds")
+    clean: bool = described(True, "leave out repeated positions, mend altitudes that cannot be right")
+    scans: int | None = described(None, "number of scans (without: the whole recording)")
+    radars: int = described(3, "number of radars (range, azimuth, elevation)")
+    turns: str | None = described(
         None,
         "seconds for a turn of each radar, with commas: each plot then has its own time (without: all measure at once)",
     )
-    spread: float = option(0.25, "distance of the radars from the middle, as a share of the traffic's diagonal")
-    noise: float = option(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
-    detection_probability: float = option(0.9, "P_d of each radar")
-    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
-    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
+    spread: float = described(0.25, "distance of the radars from the middle, as a share of the traffic's diagonal")
+    noise: float = described(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = described(0.9, "P_d of each radar")
+    false_alarms: float = described(1.0, "mean false alarms per radar and scan")
+    range_rate_noise: float = described(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("radars", most=MOST)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -24,7 +24,6 @@ from assoc.recordings.recording import UNDECODED, Recording
 from assoc.scene.geodesy import east_north_up, geodetic
 from assoc.simulation.antenna import bearings_in_steps, dwells, in_steps, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
-from assoc.simulation.memory import option
 
 if TYPE_CHECKING:
     from assoc.metrics.trajectories import Trajectories
@@ -44,23 +43,25 @@ PARALLEL_SEPARATION = 5.0
 class RotatingRadarParameters(Parameters):
     """Parameters of the rotating radar."""
 
-    traffic: Traffic = option("random", "many aircraft at random, or a pair: crossing, parallel, head-on")
-    aircraft: int | None = option(None, "number of aircraft of random traffic (default: 14)")
-    duration: float = option(1130.0, "seconds")
-    rotation: float = option(9.5, "seconds for a turn of the antenna")
-    detection_probability: float = option(0.78, "P_d of a dwell")
-    false_plots: float = option(2.5, "mean false plots in a rotation")
-    identity_loss: float = option(0.05, "share of plots whose Mode 3 is lost (0)")
-    garbled: float = option(0.1, "share of altitudes that are garbled")
-    reach: float = option(255.0, "farthest range, nautical miles")
-    range_step: float = option(1.0, "step of ranges, nautical miles (0: exact)")
-    bearing_step: float = option(BEARING_STEP, "step of bearings, degrees (0: exact)")
-    time_step: float = option(0.0, "stamps are cut to multiples of this, seconds (0: exact; the paper's are 1)")
-    separation: float | None = option(
+    traffic: Traffic = described("random", "many aircraft at random, or a pair: crossing, parallel, head-on")
+    aircraft: int | None = described(None, "number of aircraft of random traffic (default: 14)")
+    duration: float = described(1130.0, "seconds")
+    rotation: float = described(9.5, "seconds for a turn of the antenna")
+    detection_probability: float = described(0.78, "P_d of a dwell")
+    false_plots: float = described(2.5, "mean false plots in a rotation")
+    identity_loss: float = described(0.05, "share of plots whose Mode 3 is lost (0)")
+    garbled: float = described(0.1, "share of altitudes that are garbled")
+    reach: float = described(255.0, "farthest range, nautical miles")
+    range_step: float = described(1.0, "step of ranges, nautical miles (0: exact)")
+    bearing_step: float = described(BEARING_STEP, "step of bearings, degrees (0: exact)")
+    time_step: float = described(0.0, "stamps are cut to multiples of this, seconds (0: exact; the paper's are 1)")
+    separation: float | None = described(
         None, "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"
     )
-    latitude: float | None = option(None, "of the radar, degrees; aircraft fly around 47 N, 8 E (default: flat earth)")
-    longitude: float | None = option(None, "of the radar, degrees")
+    latitude: float | None = described(
+        None, "of the radar, degrees; aircraft fly around 47 N, 8 E (default: flat earth)"
+    )
+    longitude: float | None = described(None, "of the radar, degrees")
 
     def __post_init__(self) -> None:
         if self.traffic not in get_args(Traffic):

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc.scene.scene import Scene
 from assoc.simulation.flights import random_flight
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 from assoc.simulation.turning import Path, observe_in_turns, parse_turns
@@ -19,15 +19,15 @@ from assoc.simulation.turning import Path, observe_in_turns, parse_turns
 class RotatingRadarsParameters(Parameters):
     """Parameters of the rotating radars."""
 
-    turns: str = option("4,5,5.5", "seconds for a turn of each radar, with commas")
-    aircraft: int = option(30, "number of aircraft")
-    duration: float = option(240.0, "seconds")
-    interval: float = option(2.0, "seconds from scan to scan, at most the shortest turn")
-    reach: float = option(60_000.0, "aircraft begin within this distance, metres")
-    radar_distance: float = option(40_000.0, "metres from the middle to each radar")
-    noise: float = option(80.0, "standard deviation of range, and across the line of sight at 50 km, metres")
-    detection_probability: float = option(0.9, "P_d of a dwell")
-    false_alarms: float = option(10.0, "mean false alarms per radar and turn")
+    turns: str = described("4,5,5.5", "seconds for a turn of each radar, with commas")
+    aircraft: int = described(30, "number of aircraft")
+    duration: float = described(240.0, "seconds")
+    interval: float = described(2.0, "seconds from scan to scan, at most the shortest turn")
+    reach: float = described(60_000.0, "aircraft begin within this distance, metres")
+    radar_distance: float = described(40_000.0, "metres from the middle to each radar")
+    noise: float = described(80.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = described(0.9, "P_d of a dwell")
+    false_alarms: float = described(10.0, "mean false alarms per radar and turn")
 
     def __post_init__(self) -> None:
         parse_turns(self.turns)

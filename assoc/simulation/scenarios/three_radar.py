@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.simulation.memory import MOST, option, require_scene_memory
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
@@ -41,15 +41,15 @@ TRAJECTORIES = (
 class ThreeRadarParameters(Parameters):
     """Parameters of the three-radar scene."""
 
-    scans: int = option(100, "number of scans")
-    interval: float = option(1.0, "seconds from scan to scan")
-    radars: int = option(3, "number of radars (range, azimuth, elevation)")
-    radar_distance: float = option(60_000.0, "metres from the middle of the region to each radar")
-    noise: float = option(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
-    detection_probability: float = option(0.9, "P_d of each radar")
-    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
-    margin: float = option(0.1, "how far the region reaches past the trajectories, as a share of them")
-    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
+    scans: int = described(100, "number of scans")
+    interval: float = described(1.0, "seconds from scan to scan")
+    radars: int = described(3, "number of radars (range, azimuth, elevation)")
+    radar_distance: float = described(60_000.0, "metres from the middle of the region to each radar")
+    noise: float = described(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = described(0.9, "P_d of each radar")
+    false_alarms: float = described(1.0, "mean false alarms per radar and scan")
+    margin: float = described(0.1, "how far the region reaches past the trajectories, as a share of them")
+    range_rate_noise: float = described(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("scans", "radars", most=MOST)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from assoc._parameters import is_number
+from assoc._parameters import described, is_number
 from assoc.solvers.search_parameters import SearchParameters
 
 MODES = ("mmas", "paper")
@@ -17,45 +17,29 @@ class AcoParameters(SearchParameters):
 
     Those of `SearchParameters` apply to mode mmas, except ``iterations``, which applies to both. Mode paper is the
     published rule alone, on the whole problem.
-
-    Attributes
-    ----------
-    mode : str
-        "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11).
-    ants : int
-        Ants in a cycle; 15 in the paper.
-    divers : int
-        Mode mmas with refinement "full": additional ants of each cycle, which build covers in the linear program.
-    alpha, beta : float
-        Exponents of pheromone and visibility in eq. 8; 2 and 1 in the paper.
-    rho : float
-        Share of the pheromone that stays, eq. 9; 0.3 in the paper.
-    visibility : str
-        Mode paper: transform of the costs, which eq. 7 needs positive. "exponential": exp((c - c_min) / scale);
-        "shifted": c - c_min + scale; "reciprocal": c itself, only for positive costs.
-    scale : float
-        The transform's scale, in units of cost.
-    start_on : str
-        Mode paper: on a point of whose last tour an ant starts: its "own", or that of "any" ant, drawn at random.
-    tuples : str
-        Mode paper: the tuples that ants may visit beside false alarms: "useful", which cost less than their
-        measurements as false alarms, or "all" of the problem.
     """
 
-    mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
-    ants: int = field(default=15, metadata={"help": "ants in a cycle"})
-    divers: int = field(default=2, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
-    alpha: float = field(default=2.0, metadata={"help": "exponent of the pheromone, eq. 8"})
-    beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
-    rho: float = field(default=0.3, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
-    visibility: str = field(
-        default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
+    mode: str = described("mmas", "mmas (strong) or paper (equations 7-11)")
+    ants: int = described(15, "ants in a cycle; 15 in the paper")
+    divers: int = described(
+        2, "mode mmas, refinement full: more ants in a cycle, which build covers in the linear program"
     )
-    scale: float = field(default=10.0, metadata={"help": "mode paper: scale of the visibility transform"})
-    start_on: str = field(default="own", metadata={"help": "mode paper: whose last tour an ant starts on: own or any"})
-    tuples: str = field(
-        default="useful",
-        metadata={"help": "mode paper: tuples that ants visit: useful (cheaper than false alarms) or all"},
+    alpha: float = described(2.0, "exponent of the pheromone, eq. 8; 2 in the paper")
+    beta: float = described(1.0, "exponent of the visibility, eq. 8; 1 in the paper")
+    rho: float = described(0.3, "share of pheromone that stays after a cycle, eq. 9; 0.3 in the paper")
+    visibility: str = described(
+        "exponential",
+        "mode paper: costs in eq. 7 are exp((c - c_min) / scale): exponential; c - c_min + scale: shifted; or, if all "
+        "are positive, as they are: reciprocal",
+    )
+    scale: float = described(10.0, "mode paper: scale of the visibility transform, in units of cost")
+    start_on: str = described(
+        "own", "mode paper: whose last tour an ant starts on: its own, or that of any, drawn at random"
+    )
+    tuples: str = described(
+        "useful",
+        "mode paper: tuples that ants may visit beside false alarms: useful (cheaper than their measurements as false "
+        "alarms) or all",
     )
 
     def __post_init__(self) -> None:

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from assoc._parameters import is_whole
+from assoc._parameters import described, is_whole
 from assoc.solvers.search_parameters import SearchParameters
 
 
 @dataclass(frozen=True)
 class GeneticParameters(SearchParameters):
-    """Parameters of the genetic algorithm, beside those of `SearchParameters`.
+    """Parameters of the genetic algorithm, beside those of `SearchParameters`."""
 
-    Attributes
-    ----------
-    population : int
-        Size of the population.
-    offspring : int
-        Children in a generation.
-    tournament : int
-        A parent is the best of so many members drawn at random.
-    """
-
-    population: int = field(default=20, metadata={"help": "solutions that live at a time"})
-    offspring: int = field(default=5, metadata={"help": "children in a generation"})
-    tournament: int = field(default=2, metadata={"help": "size of the tournaments whose winners are parents"})
+    population: int = described(20, "solutions that live at a time")
+    offspring: int = described(5, "children in a generation")
+    tournament: int = described(2, "a parent is the best of so many members drawn at random")
 
     def __post_init__(self) -> None:
         super().__post_init__()

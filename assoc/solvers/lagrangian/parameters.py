@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 
 
 @dataclass(frozen=True)
 class LagrangianParameters(Parameters):
-    """Parameters of ``lagrangian``.
+    """Parameters of ``lagrangian``."""
 
-    Attributes
-    ----------
-    iterations : int
-        Subgradient steps, each with one 2-D relaxation and one recovery.
-    gap : float
-        Stop when cost - bound <= gap * max(1, abs(cost)).
-    step : float
-        Factor of Polyak's step; halved after ``patience`` iterations in which the bound did not rise.
-    patience : int
-        See ``step``; after ten halvings the method has converged.
-    warm_start : bool
-        Start from the smoothed dual ascent; else from u = 0, as in the paper.
-    polish : bool
-        Improve every recovered solution by dimensionwise search and insertion with ejection, and the
-        best one at the end by cluster search.
-    """
-
-    iterations: int = field(default=100, metadata={"help": "subgradient steps"})
-    gap: float = field(default=1e-9, metadata={"help": "stop at this relative gap"})
-    step: float = field(default=1.0, metadata={"help": "factor of Polyak's step"})
-    patience: int = field(default=5, metadata={"help": "steps without a better bound until the factor is halved"})
-    warm_start: bool = field(default=True, metadata={"help": "start from the smoothed dual ascent, not from 0"})
-    polish: bool = field(default=True, metadata={"help": "improve recovered solutions by local search"})
+    iterations: int = described(100, "subgradient steps, each with one 2-D relaxation and one recovery")
+    gap: float = described(1e-9, "stop when cost - bound <= gap * max(1, abs(cost))")
+    step: float = described(1.0, "factor of Polyak's step")
+    patience: int = described(
+        5, "steps without a better bound until the factor is halved; after ten halvings the method has converged"
+    )
+    warm_start: bool = described(True, "start from the smoothed dual ascent, not from 0 as in the paper")
+    polish: bool = described(
+        True, "improve recovered solutions by local search, and the best one at the end by exact sub-steps"
+    )
 
     def __post_init__(self) -> None:
         self._whole("iterations", "patience")

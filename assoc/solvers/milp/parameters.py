@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 
 BACKENDS = ("scip", "highs")
 
@@ -15,19 +15,14 @@ _MODEL = {"scip": 7_000.0, "highs": 2_300.0}
 
 @dataclass(frozen=True)
 class MilpParameters(Parameters):
-    """Parameters of ``milp``.
+    """Parameters of ``milp``."""
 
-    Attributes
-    ----------
-    backend : {"scip", "highs"}
-        Backend of OR-Tools.
-    workers : int
-        Threads of scip; with more than one the answer may be another of the same cost. HiGHS ignores it and chooses
-        its own number.
-    """
-
-    backend: str = field(default="scip", metadata={"help": "scip or highs"})
-    workers: int = field(default=1, metadata={"help": "threads of scip; with 1 runs repeat exactly"})
+    backend: str = described("scip", "solver of OR-Tools: scip or highs")
+    workers: int = described(
+        1,
+        "threads of scip, with more than one of which answers of the same cost may differ; highs chooses its own "
+        "number",
+    )
 
     def __post_init__(self) -> None:
         self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))

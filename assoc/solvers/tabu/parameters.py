@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from assoc._parameters import described
 from assoc.solvers.search_parameters import SearchParameters
 
 
 @dataclass(frozen=True)
 class TabuParameters(SearchParameters):
-    """Parameters of the tabu search, beside those of `SearchParameters`.
+    """Parameters of the tabu search, beside those of `SearchParameters`."""
 
-    Attributes
-    ----------
-    tenure : int
-        Moves for which an ejected tuple may not return; a random number of up to as many is added.
-    moves : int
-        Moves of one iteration.
-    restart : int
-        Iterations without improvement after which the search goes back to the best solution and perturbs it.
-    """
-
-    tenure: int = field(default=7, metadata={"help": "moves for which an ejected tuple may not return"})
-    moves: int = field(default=100, metadata={"help": "moves in one iteration"})
-    restart: int = field(default=5, metadata={"help": "iterations without improvement before a restart"})
+    tenure: int = described(7, "moves for which an ejected tuple may not return, and a random number of up to as many")
+    moves: int = described(100, "moves in one iteration")
+    restart: int = described(
+        5, "iterations without improvement before it goes back to the best solution and perturbs it"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -17,12 +17,12 @@ address, it counts alone, since the code adds no information.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, described
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.tracking.records.track import rows_of_ids
@@ -64,10 +64,10 @@ class IdentityParameters(Parameters):
         The same for addresses.
     """
 
-    code_garbled: float = field(default=0.02, metadata={"help": "share of Mode 3/A codes that are garbled"})
-    code_shared: float = field(default=0.01, metadata={"help": "share of other aircraft with the same Mode 3/A code"})
-    address_garbled: float = field(default=1e-4, metadata={"help": "share of ICAO addresses that are garbled"})
-    address_shared: float = field(default=1e-4, metadata={"help": "share of other aircraft with the same address"})
+    code_garbled: float = described(0.02, "share of Mode 3/A codes that are garbled")
+    code_shared: float = described(0.01, "share of other aircraft with the same Mode 3/A code")
+    address_garbled: float = described(1e-4, "share of ICAO addresses that are garbled")
+    address_shared: float = described(1e-4, "share of other aircraft with the same address")
 
     def __post_init__(self) -> None:
         self._probability("code_garbled", "code_shared", "address_garbled", "address_shared")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from assoc._parameters import positive
+from assoc._parameters import described, positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
@@ -39,10 +39,10 @@ class Initiation:
         that began elsewhere go on there.
     """
 
-    speed: float | tuple[float, ...] = field(default=300.0, metadata={"help": "usual speed along an axis, m/s"})
-    rest: float = field(default=0.1, metadata={"help": "usual size of further components of the state"})
-    birth_rate: float = field(default=0.1, metadata={"help": "mean number of new targets in a scan"})
-    widest: float = field(default=0.1, metadata={"help": "widest start of a track, as a share of the region"})
+    speed: float | tuple[float, ...] = described(300.0, "usual speed along an axis, m/s")
+    rest: float = described(0.1, "usual size of further components of the state")
+    birth_rate: float = described(0.1, "mean number of new targets in a scan")
+    widest: float = described(0.1, "widest start of a track, as a share of the region")
     closed: tuple[tuple[tuple[float, float], ...], ...] = ()
 
     def __post_init__(self) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
 
-from assoc._parameters import is_whole, positive
+from assoc._parameters import described, is_whole, positive
 from assoc._types import Array
 from assoc.costs.tracks.scores import sequential_threshold
 from assoc.errors import InvalidInputError
@@ -62,23 +62,21 @@ class LifeCycle:
         detections. A track that is lost is deleted later, and is reported again if it is detected before.
     """
 
-    confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})
-    false_tracks_per_hour: float = field(
-        default=1.0, metadata={"help": "false tracks that may be confirmed in an hour"}
+    confirmation: Confirmation = described("score", "what confirms a track")
+    false_tracks_per_hour: float = described(1.0, "false tracks that may be confirmed in an hour")
+    false_probability: float | None = described(
+        None, "share of false tracks confirmed by score (default: from those per hour)"
     )
-    false_probability: float | None = field(
-        default=None, metadata={"help": "share of false tracks confirmed by score (default: from those per hour)"}
+    missed_probability: float = described(2e-3, "share of true tracks given up too early")
+    m: int = described(3, "m-of-n: scans with a detection")
+    n: int = described(4, "m-of-n: of the last n scans")
+    deletion: Deletion = described("time", "what ends a track")
+    deletion_time: float | None = described(
+        None, "seconds without a detection (default: from the pace of the scans and P_d)"
     )
-    missed_probability: float = field(default=2e-3, metadata={"help": "share of true tracks given up too early"})
-    m: int = field(default=3, metadata={"help": "m-of-n: scans with a detection"})
-    n: int = field(default=4, metadata={"help": "m-of-n: of the last n scans"})
-    deletion: Deletion = field(default="time", metadata={"help": "what ends a track"})
-    deletion_time: float | None = field(
-        default=None, metadata={"help": "seconds without a detection (default: from the pace of the scans and P_d)"}
-    )
-    deletion_count: int = field(default=5, metadata={"help": "scans in a row without a detection"})
-    deletion_drop: float = field(default=25.0, metadata={"help": "fall of the score from its best"})
-    lifetime: float = field(default=600.0, metadata={"help": "mean time for which a target stays, seconds"})
+    deletion_count: int = described(5, "scans in a row without a detection")
+    deletion_drop: float = described(25.0, "fall of the score from its best")
+    lifetime: float = described(600.0, "mean time for which a target stays, seconds")
 
     def __post_init__(self) -> None:
         if self.confirmation not in get_args(Confirmation):
