@@ -35,16 +35,18 @@ def test_no_track_stays_where_clutter_is_dense(name):
     assert {sensor.verdict for sensor in tracker.health.sensors} == {"as declared"}
 
 
-def test_density_of_clutter_by_place():
+@pytest.mark.parametrize("alarms", [1, 1000])
+def test_density_of_clutter_by_place(alarms):
     """Several plots a turn from a patch are as dense as they are; one a turn may be a target."""
-    rng, sensor = np.random.default_rng(5), PositionSensor(
-        position=np.zeros(3), noise=[1.0, 1.0], false_alarm_rate=1.0, field_of_view=[[0.0, 1e3], [0.0, 1e3]]
-    )  # fmt: skip
+    rng, side = np.random.default_rng(5), 1e3 * alarms**0.5
+    sensor = PositionSensor(
+        position=np.zeros(3), noise=[1.0, 1.0], false_alarm_rate=alarms, field_of_view=[[0.0, side], [0.0, side]]
+    )
     empty, turns = ClutterMap.empty([sensor]), np.ones(1)
     patch, alone = empty, empty
     for k in range(30):
-        plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, 1e3, (1, 2))])
-        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full(6, 0.5)])
+        plots = np.concatenate([rng.uniform(0.0, 50.0, (5, 2)), rng.uniform(0.0, side, (alarms, 2))])
+        patch = patch.after([sensor], Scan(k, float(k), (plots,)), turns, [np.full(len(plots), 0.5)])
         alone = alone.after([sensor], Scan(k, float(k), (rng.normal(25.0, 1.0, (1, 2)),)), turns)
     there = Scan(30, 30.0, (np.array([[25.0, 25.0], [700.0, 700.0]]),))
     inside, outside = patch.used_and_found([sensor], there)[0][0]
