@@ -56,7 +56,7 @@ class Cleaning:
     ) -> None:  # fmt: skip
         self._name, self._notes, self._disorder, self._codes = name, notes, disorder, codes
         self._sources, self._at_once, self._strict = sources, at_once, strict
-        self._times = RunningTimes(max(disorder, MAX_DISORDER), clock)
+        self._times, self._clock = RunningTimes(max(disorder, MAX_DISORDER), clock), clock
         self._rows = np.zeros((0, WIDTH))
         """Sorted; the first `_done` of them are given, and kept for those after them."""
         self._done = 0
@@ -112,7 +112,7 @@ class Cleaning:
         zeros &= np.nan_to_num(rows[:, ALTITUDE]) == 0
         possible = (rows[:, RANGE] >= 0) & (rows[:, RANGE] <= _FARTHEST) & (np.abs(rows[:, AZIMUTH]) <= _TURNS)
         possible &= np.abs(rows[:, TIME]) <= _LATEST
-        if self._times.clock:
+        if self._clock:
             possible &= rows[:, TIME] <= DAY
         high = np.abs(rows[:, ALTITUDE]) > _HIGHEST
         if high.any():

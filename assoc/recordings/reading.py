@@ -144,7 +144,7 @@ class PlotReader:
         notes = Counter[str]()
         if left := not_read(found.header, columns_of):
             notes[f"columns not read ({left})"] = len(found.header) - len(columns_of)
-        clean, doubts, step = None, _Doubts(units), scale["time"]
+        clean, doubts, step = None, _Doubts(units, self.file, table), scale["time"]
         for rows in table.of_frames(found.content) if parquet else table.of_lines(found.content, found.done):
             doubts.see(rows)
             with np.errstate(over="ignore"):
@@ -167,7 +167,7 @@ class PlotReader:
         if clean is None or not clean.count:
             why = "; ".join(f"{count} {what}" for what, count in notes.items() if what in (BLANK, IMPOSSIBLE))
             raise InvalidInputError(f"{self.file}: holds no plots{': ' + why if why else ''}")
-        doubts.tell(self.file, table)
+        doubts.tell()
         if table.unread:
             notes["invalid codes"] = table.unread
         if step != scale["time"]:
@@ -242,10 +242,10 @@ def _frames(file: Path, at_once: int) -> _Found:
 
 
 class _Doubts:
-    """Warns of ranges, bearings and codes that are hardly in their units."""
+    """Warns of ranges, bearings and codes that are hardly in their units; refuses a file with few possible ranges."""
 
-    def __init__(self, units: Mapping[str, str]) -> None:
-        self._units = units
+    def __init__(self, units: Mapping[str, str], file: Path, table: TableRows) -> None:
+        self._units, self._file, self._table = units, file, table
         self._count, self._farthest, self._least, self._most = 0, 0.0, math.inf, -math.inf
 
     def see(self, rows: Array) -> None:
@@ -255,24 +255,29 @@ class _Doubts:
         self._farthest = max(self._farthest, float(np.nanmax(rows[:, RANGE], initial=0.0)))
         self._least = min(self._least, float(np.nanmin(bearings, initial=math.inf)))
         self._most = max(self._most, float(np.nanmax(bearings, initial=-math.inf)))
+        known = rows[np.isfinite(rows[:, RANGE]), RANGE]
+        if len(known) >= _ENOUGH and np.median(known) * UNITS["range"][self._units["range"]] > _REACH:
+            raise InvalidInputError(self._too_far())
 
-    def tell(self, file: Path, table: TableRows) -> None:
+    def _too_far(self) -> str:
+        unit, metres = self._units["range"], self._farthest * UNITS["range"][self._units["range"]]
+        other = "another unit?" if unit == "m" else "metres? (name the column range_m, or set the unit of range to m)"
+        column = f"{self._file}: column {self._table.names['range']!r}"
+        return f"{column}: {self._farthest:.6g} {unit} are {metres / 1000:,.0f} km: {other}"
+
+    def tell(self) -> None:
         """Warn, once all rows are seen."""
-        unit, names = self._units["range"], table.names
-        metres = self._farthest * UNITS["range"][unit]
-        if unit != "m" and metres > _REACH:
-            warn(
-                f"{file}: column {names['range']!r}: {self._farthest:.6g} {unit} are {metres / 1000:,.0f} km: "
-                "metres? (name the column range_m, or set the unit of range to m)"
-            )
+        names, not_octal = self._table.names, self._table.not_octal
+        if self._units["range"] != "m" and self._farthest * UNITS["range"][self._units["range"]] > _REACH:
+            warn(self._too_far())
         wide = self._most - self._least > 3.0 and self._most <= 6.2832
         if self._units["bearing"] == "deg" and self._count >= _ENOUGH and wide:
             warn(
-                f"{file}: column {names['bearing']!r}: all within {self._most:.3g} deg: radians? "
+                f"{self._file}: column {names['bearing']!r}: all within {self._most:.3g} deg: radians? "
                 "(name the column bearing_rad, or set the unit of bearing to rad)"
             )
-        if table.not_octal:
+        if not_octal:
             warn(
-                f"{file}: column {names['mode3']!r}: {table.not_octal} codes have an 8 or 9, which octal digits "
+                f"{self._file}: column {names['mode3']!r}: {not_octal} codes have an 8 or 9, which octal digits "
                 "cannot have: the 12 bits as a number? (name the column mode3_dec, or set the unit of mode3 to dec)"
             )

@@ -74,10 +74,13 @@ def estimate_rotation(
     best = int(peaks[0])
     # by chance one of so many frequencies agrees like this (Rayleigh)
     chance = math.sqrt(math.log(1000.0 * len(frequencies)) / count)
-    if agreement[best] < max(_LEAST_COHERENCE, chance):
+    least = max(_LEAST_COHERENCE, chance)
+    if agreement[best] < least:
+        backwards = _agreement([(time, -bearings) for time, bearings in stretches], frequencies).max() >= least
         raise InvalidInputError(
             f"no rotation time from {shortest:g} to {longest:g} s fits the plots "
             f"(agreement {agreement[best]:.2f} of 1): give it"
+            + ("; one fits if bearings count counter-clockwise, or the antenna turns so" if backwards else "")
         )
     center = frequencies[best]
     for _ in range(3):

@@ -20,7 +20,8 @@ class RunningTimes:
     out where the next rows go on as before it, and taken where they follow it, as after a gap or at midnight. So one
     wrong time of day neither moves the plots after it by a day, nor lets them look late.
 
-    Plots may be out of order by `disorder` seconds; with `clock` times begin anew each day.
+    Plots may be out of order by `disorder` seconds; with `clock` times begin anew each day. Numbers turn out to be
+    seconds of the day where they go on, at midnight, as such.
     """
 
     def __init__(self, disorder: float, clock: bool = False) -> None:
@@ -35,14 +36,16 @@ class RunningTimes:
         """Take rows (n, c) in, seconds in the first column; return those that are decided, in their order."""
         if not len(rows):
             return rows
-        if not self._waiting and self._latest is not None and not self.clock:
-            times = np.append(self._latest, rows[:, 0])
+        if not self._waiting and self._latest is not None:
+            days = np.round((self._latest - rows[:, 0]) / DAY) if self.clock else np.zeros(len(rows))
+            times = np.append(self._latest, rows[:, 0] + DAY * days)
             ahead = np.maximum.accumulate(times)
             # the usual case: nothing is far from what came before
             if (np.abs(times[1:] - ahead[:-1]) <= self._disorder).all():
                 self._longest = max(self._longest, float(np.diff(ahead).max()))
+                self.midnights += int(self.clock) * int(ahead[-1] // DAY - ahead[0] // DAY)
                 self._latest = float(ahead[-1])
-                return rows
+                return np.column_stack([times[1:], rows[:, 1:]])
         done: list[Array] = []
         for row in rows:
             self._waiting.append(row)
@@ -57,12 +60,17 @@ class RunningTimes:
         if waiting and self._latest is None:
             self._accept(waiting, done)
         elif waiting:
+            self.clock = self.clock or self._is_midnight(times, self._longest_gap)
             gap = self._unwrapped(times[0]) - self._at_latest
-            if 0.0 <= gap <= _LONGER * max(self._longest, self._disorder):
+            if 0.0 <= gap <= self._longest_gap:
                 self._accept(waiting, done)
             else:
                 self.left_out += len(waiting)
         return np.array(done).reshape(len(done), columns)
+
+    @property
+    def _longest_gap(self) -> float:
+        return _LONGER * max(self._longest, self._disorder)
 
     @property
     def _at_latest(self) -> float:
@@ -75,6 +83,7 @@ class RunningTimes:
             self._begin(done)
             return
         new = self._waiting[-1]
+        self.clock = self.clock or self._is_midnight([float(new[0])], self._disorder)
         time = self._unwrapped(float(new[0]))
         if abs(time - self._at_latest) <= self._disorder:
             # those that wait had a time of their own
@@ -82,8 +91,14 @@ class RunningTimes:
             self._waiting = []
             self._accept([new], done)
         elif len(self._waiting) >= _AGREE:
+            self.clock = self.clock or self._is_midnight([float(row[0]) for row in self._waiting], self._longest_gap)
             waiting, self._waiting = self._waiting, []
             self._accept(waiting, done)
+
+    def _is_midnight(self, times: list[float], longest: float) -> bool:
+        """Whether numbers far back go on as seconds of the next day, after a gap of at most `longest` seconds."""
+        of_day = self._at_latest <= DAY and all(0.0 <= time < DAY for time in times)
+        return of_day and 0.0 <= times[0] + DAY - self._at_latest <= longest
 
     def _begin(self, done: list[Array]) -> None:
         """Take the first rows, but one that is far from the two others, which are together, and not after it."""

@@ -83,6 +83,24 @@ def test_disorder_repeats_fillers_and_midnight(tmp_path):
     assert "midnights passed: 1" in recording.summary()
 
 
+@pytest.mark.parametrize("unit", [1, 1000])
+def test_seconds_of_the_day_as_numbers_go_on_over_midnight(tmp_path, unit):
+    """Days that pass, plots out of order at midnight, and the last plot alone."""
+    times = 86_400.0 * 2 - 36_000.0 + 9.5 * np.arange(4000)
+    times[[3789, 3790]] = times[[3790, 3789]]
+    bearings = np.linspace(0, 40.0 * 360.0, len(times)) % 360
+    told = np.round(times % 86_400.0 * unit, 3) if unit == 1 else np.round(times % 86_400.0 * unit).astype(int)
+    if unit == 1000:
+        # milliseconds are told by the antenna's turns
+        bearings = times / 9.7 % 1 * 360
+    rows = "".join(f"{t},{10 + k % 7},{b:.3f},1,100\n" for k, (t, b) in enumerate(zip(told, bearings, strict=True)))
+    recording = read_plots(written(tmp_path, HEAD + rows))
+    np.testing.assert_allclose(recording.times - recording.times[0], np.sort(times) - times.min(), atol=1e-2)
+    assert recording.notes["midnights passed"] == 1
+    short = written(tmp_path, HEAD + "86390,10,5,1,100\n86395,10,6,1,100\n86399,10,7,1,100\n3,10,8,1,100\n")
+    assert read_plots(short).times.tolist() == [86390, 86395, 86399, 86403]
+
+
 def test_a_jump_back_is_an_error_with_its_line(tmp_path):
     later = "".join(f"{time},10,5,1,100\n" for time in (7200, 7201, 7202, 3600, 3601, 3602))
     path = written(tmp_path, HEAD + "100,10,5,1,100\n" + later)
@@ -132,6 +150,7 @@ def test_a_wrong_time_neither_moves_nor_delays_the_plots_after_it(tmp_path, cloc
         (HEAD + "1,2\n\n,2,3,4,5\n", "holds no plots: 2 rows without time, range or bearing left out"),
         (HEAD + "1,٢,3,4,5\n", "line 2, column 'range': expected a number"),
         (HEAD + "1,2,3,4," + "5" * 20_000, "line 2 is longer than 10000 bytes"),
+        (HEAD + "1,185200,3,4,5\n" * 10, "column 'range': 185200 nmi are 342,990 km: metres. .name the column range_m"),
         (HEAD.encode() + b"1,2,3,4,5\n1,\x00,3,4,5\n", "line 3 holds a NUL byte, expected text .UTF-8.$"),
         (bytes([48, 0, 9, 0x80, 25, 201, 0, 0, 1]), "line 1 holds a NUL byte.*asterix.read_asterix"),
         (HEAD.encode() + b"1,2,\xff\xfe,4,5\n", "line 2, column 'bearing': expected a number"),

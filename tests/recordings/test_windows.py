@@ -1,5 +1,7 @@
 """Windows hold each aircraft once, as the antenna does; rotation times are found; other groupings are as described."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -70,6 +72,16 @@ def test_stamps_in_whole_seconds_and_an_estimated_rotation():
 @pytest.mark.parametrize("turn", [2.5, 4.8, 9.5, 12.0, 28.0])
 def test_the_rotation_is_found(turn):
     assert estimate_rotation(circling(turn=turn, turns=60)) == pytest.approx(turn, rel=1e-3)
+
+
+def test_bearings_that_count_the_other_way_are_named():
+    recording = circling(turns=60)
+    mirrored = replace(recording, azimuths=np.pi - recording.azimuths)
+    with pytest.raises(InvalidInputError, match="no rotation time .* fits the plots .* if bearings count counter-cl"):
+        estimate_rotation(mirrored)
+    noise = replace(recording, azimuths=np.random.default_rng(1).uniform(-3, 3, len(recording)))
+    with pytest.raises(InvalidInputError, match=r"of 1\): give it$"):
+        estimate_rotation(noise)
 
 
 def test_groups_without_a_window():
