@@ -90,10 +90,10 @@ def test_opensky_and_plain_plots(tmp_path):
     found = read_positions(str(tmp_path / "sky.csv"))
     assert found.times.tolist() == [-0.5, 9.5, 19.5, 29.5, 39.5, 59.0] and found.heard.tolist() == [True] * 5 + [False]
     assert found.identities[0].tolist() == [0o1174, 0x3C4591] and found.places[0, 2] == 10843.26
-    (tmp_path / "xy.csv").write_text("t;x;y\n1;100;200\n2;110;n/a\n3;120;220\n")
-    found = read_positions(str(tmp_path / "xy.csv"), {"time": "t"})
+    (tmp_path / "xy.csv").write_text("when;x;y\n1;100;200\n2;110;n/a\n3;120;220\n")
+    found = read_positions(str(tmp_path / "xy.csv"), {"time": "when"})
     assert not found.on_earth and found.in_scene(ORIGIN)[:, :2].tolist() == [[100, 200], [120, 220]]
-    with pytest.raises(Exception, match=r"xy.csv: no column lastposupdate or time .* it has: t, x, y"):
+    with pytest.raises(Exception, match=r"xy.csv: no column lastposupdate or time .* it has: when, x, y"):
         read_positions(str(tmp_path / "xy.csv"))
 
 

@@ -1,11 +1,14 @@
 """Reports cleaned and resampled: spoiled flights against the flights that they were."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from assoc.errors import AssocWarning, InvalidInputError
 from assoc.recordings.flights.cleaning import ALTITUDES, JUMPS, REPEATED, clean
+from assoc.recordings.flights.positions import read_positions
 from assoc.recordings.flights.reports import Reports
 from assoc.scene.geodesy import east_north_up
 from assoc.simulation import simulate
@@ -118,6 +121,33 @@ def test_velocities_in_the_frame():
     assert abs(found[1, 2] + 7.0) > 1.0
     hidden = replace(reports, velocity=np.concatenate([NONE, reports.velocity[1:]]))
     assert np.isnan(frame_velocities(hidden, places, ORIGIN)[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("dates", "order"),
+    [
+        (["31/07/2026 23:59:50", "01/08/2026 00:00:10"], None),
+        (["07/31/2026 23:59:50", "08/01/2026 00:00:10"], None),
+        (["31.07.2026 23:59:50", "01.08.2026 00:00:10"], None),
+        (["11/12/2026 23:59:50", "12/12/2026 00:00:10"], "day/month"),
+        (["12/11/2026 23:59:50", "12/12/2026 00:00:10"], "month/day"),
+    ],
+)
+def test_dates_of_ais_by_day_and_month(tmp_path, dates, order):
+    """Those of the Danish authority's files, and where both readings can be, the one that takes less time, told."""
+    path = tmp_path / "ais.csv"
+    rows = "".join(f"{date},235000100,50.{k},1.0\n" for k, date in enumerate(dates))
+    path.write_text("# Timestamp,MMSI,Latitude,Longitude\n" + rows)
+    with pytest.warns(AssocWarning, match=f"taken as {order}") if order else nullcontext():
+        times = read_positions(str(path)).times
+    assert np.diff(times).tolist() == [20.0]
+
+
+def test_times_that_are_none_are_named(tmp_path):
+    path = tmp_path / "ais.csv"
+    path.write_text("Time [s],MMSI,Latitude,Longitude\nnoon,235000100,50.0,1.0\n")
+    with pytest.raises(InvalidInputError, match=r"column 'Time \[s\]': expected seconds or ISO dates, got 'noon'"):
+        read_positions(str(path))
 
 
 def test_a_file_of_opensky(tmp_path):

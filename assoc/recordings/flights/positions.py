@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assoc._text.plain import printable
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.recordings.columns import COLUMNS
 from assoc.recordings.flights.table import columns_of, numbers_of, read_table, require, seconds_of
 from assoc.recordings.recording import Recording
 from assoc.recordings.several import NO_HEIGHT, heights_above
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NAMES = {
-    "time": ("lastposupdate", "time", "timestamp", "datetime", "base_date_time", "basedatetime", "utc", "date_time"),
+    "time": ("lastposupdate", *COLUMNS["time"], "time_s", "base_date_time"),
     "id": ("mmsi", "icao24", "icao", "icao_address", "address", "address_hex", "hex", "id", "track_id"),
     "latitude": ("lat", "latitude"),
     "longitude": ("lon", "long", "lng", "longitude"),
@@ -132,6 +134,9 @@ def read_positions(
     first, second = (numbers[name] for name in (("latitude", "longitude") if on_earth else ("x", "y")))
     altitude = ALTITUDES[unit] * numbers.get("altitude", np.full(count, np.nan))
     times = seconds_of(table[chosen["time"]])
+    if not np.isfinite(times).any() and count:
+        text = printable(str(table[chosen["time"]].iloc[0])[:40])
+        raise InvalidInputError(f"{path}: column {chosen['time']!r}: expected seconds or ISO dates, got {text!r}")
     # AIS says 91 and 181 where it does not know
     good = np.isfinite(first) & np.isfinite(second) & np.isfinite(times)
     if on_earth:

@@ -13,7 +13,7 @@ from assoc._files.reading import check_unpacked, kind_of, open_input, refuse_pip
 from assoc._system.imports import check_extra
 from assoc._text.plain import printable
 from assoc._types import Array
-from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.errors import InvalidInputError, LimitExceededError, warn
 from assoc.recordings.columns import BLANKS, plain_name
 from assoc.recordings.reading import MOST_PLOTS
 
@@ -151,16 +151,41 @@ def numbers_of(column: pd.Series) -> Array:
 
 
 def seconds_of(column: pd.Series) -> Array:
-    """Seconds as they are, dates (ISO 8601, by default UTC) as seconds since 1970-01-01 UTC; NaN where it is none."""
+    """Seconds as they are, dates (by default UTC) as seconds since 1970-01-01 UTC; NaN where it is none.
+
+    Dates are ISO 8601, or day/month/year; month/day/year where only that can be, or takes less time altogether.
+    """
     import pandas as pd
 
-    dates = column.dtype.kind == "M" or isinstance(column.dtype, pd.DatetimeTZDtype)
-    if not dates:
-        numbers = numbers_of(column)
-        if np.isfinite(numbers).any():
-            return numbers
+    if column.dtype.kind == "M" or isinstance(column.dtype, pd.DatetimeTZDtype):
+        return _since_1970(column, None)
+    numbers = numbers_of(column)
+    if np.isfinite(numbers).any():
+        return numbers
+    seconds = _since_1970(column, "ISO8601")
+    if np.isfinite(seconds).any() or column.dtype.kind != "O":
+        return seconds
+    texts = column.astype(str).str.strip()
+    days, months = (
+        _since_1970(texts.str.replace(r"^(\d\d)[/.](\d\d)[/.](\d{4})\b", order, regex=True), "ISO8601")
+        for order in (r"\3-\2-\1", r"\3-\1-\2")
+    )
+    (known, span), (known_months, span_months) = (
+        (int(np.isfinite(each).sum()), float(np.ptp(each[np.isfinite(each)])) if np.isfinite(each).any() else 0.0)
+        for each in (days, months)
+    )
+    if known and known == known_months:
+        first = str(texts.iloc[int(np.flatnonzero(np.isfinite(days))[0])])[:40]
+        order = "day/month/year" if span <= span_months else "month/day/year"
+        warn(f"{column.name}: dates as {first} are taken as {order}; ISO dates (2026-07-31) say which it is")
+    return days if (known, -span) >= (known_months, -span_months) else months
+
+
+def _since_1970(column: pd.Series, form: str | None) -> Array:
+    import pandas as pd
+
     try:
-        moments = pd.to_datetime(column, format=None if dates else "ISO8601", utc=True, errors="coerce")
+        moments = pd.to_datetime(column, format=form, utc=True, errors="coerce")
     except (ValueError, TypeError, OverflowError):  # what errors="coerce" does not catch
         return np.full(len(column), np.nan)
     # in microseconds: nanoseconds end in the year 2262
