@@ -94,6 +94,16 @@ def test_json_by_the_names_of_recordings():
         parse_line("2021-07-12T14:00:00Z,10,180,4521", scene, form)
 
 
+def test_a_header_between_semicolons_or_tabs():
+    radar = Radar2D(position=[0, 0, 0], noise=[50, 1e-3], field_of_view=[[0, 1e5], [-np.pi, np.pi]], name="a")
+    scene = Scene([radar], [0.0], [[np.zeros((0, 2))]])
+    for mark in ";\t":
+        form = LineForm(scene)
+        assert parse_line(mark.join(["time", "range_km", "bearing", "squawk"]), scene, form) is None
+        plot = parse_line(mark.join(["3,5", "20", "90,0", "7700"]), scene, form)
+        assert plot.time == 3.5 and plot.values == pytest.approx([20e3, 0.0], abs=1e-9) and plot.identity == (7700, 0)
+
+
 def test_flight_levels_in_letters_and_words_for_nothing(tmp_path):
     found = read_radars(described(tmp_path))
     form = form_of(found)

@@ -142,6 +142,19 @@ def test_a_clock_that_jumps_for_all_is_believed(scene):
         assert before and after and max(before) < min(after)
 
 
+def test_seconds_of_the_day_go_on_over_midnight(scene):
+    """Tracks and their ids stay, late plots and own repeats too; an hour that is wrong is no midnight."""
+    plots = [plot._replace(time=plot.time + 86_380.0) for plot in replayed(scene, 0.0)]
+    of_day = [plot._replace(time=plot.time % 86_400.0) for plot in plots]
+    (whole, told), (days, told_of_day) = live(scene), live(scene)
+    expected, found = fed(whole, plots), fed(days, [*of_day, of_day[-1], of_day[-1]._replace(time=43_200.0)])
+    assert [one.time for one in found] == [one.time for one in expected] and found[-1].time > 86_400.0
+    ids = [[track.track_id for track in one.tracks] for one in (found[-1], expected[-1])]
+    assert ids[0] == ids[1] and len(ids[0]) == 4
+    assert days.counts["repeated"] == 1 and days.counts["too old"] + days.counts["ahead"] == 1
+    assert not told and len(told_of_day) == 2
+
+
 def test_the_silence_of_a_radar_is_no_miss(scene):
     plots = [plot for plot in replayed(scene, 0.0) if plot.sensor != "2" or plot.time < 10.0 or plot.time > 30.0]
     tracker, told = live(scene)

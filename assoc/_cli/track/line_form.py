@@ -40,8 +40,15 @@ class LineForm:
         self.scene, self._places = scene, places
         self._biases = biases or [Bias()] * len(scene.sensors)
         self._header: list[str] | None = None
+        self._separator = ","
         self._wrong = ""
         self._known: dict[tuple[str, ...], tuple[dict[str, int], dict[str, str]] | None] = {}
+
+    def cells(self, text: str) -> list[str]:
+        """The cells of a line of CSV: between commas, or semicolons or tabs, where a comma is a decimal sign."""
+        separator = max(",;\t", key=text.count) if self._header is None else self._separator
+        self._separator = separator
+        return [part.strip() if separator == "," else part.strip().replace(",", ".") for part in text.split(separator)]
 
     def takes_header(self, cells: list[str]) -> bool:
         """Whether a line of CSV is a header, which holds for the lines that follow.

@@ -93,7 +93,7 @@ def parse_line(line: str, scene: Scene, form: LineForm | None = None) -> Plot | 
     if len(text) > LONGEST:
         raise InvalidInputError(f"a line of {len(text)} characters, expected at most {LONGEST}")
     form = form or LineForm(scene)
-    cells = [part.strip() for part in text.split(",")]
+    cells = form.cells(text)
     if not text.startswith("{") and form.takes_header(cells):
         return None
     try:

@@ -18,6 +18,7 @@ from assoc._types import Array
 from assoc.costs.positions import positions_of_scan
 from assoc.errors import AssocError, InvalidInputError
 from assoc.recordings.cleaning import TWIN
+from assoc.recordings.columns import DAY
 from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -188,7 +189,7 @@ class LiveTracker:
         sensor : str or int
             Name, or number from 1.
         time : float
-            Seconds.
+            Seconds; seconds of the day go on over midnight.
         values : sequence of float
             The components of the measurement, metres and radians.
         identity : (int, int)
@@ -216,6 +217,7 @@ class LiveTracker:
         if not abs(time) <= LARGEST:
             self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds", s)
             return []
+        time = self._running(time)
         plot, state = CheckedPlot(s, time, z, known), self.state
         # a repetition of a doubted plot does not confirm its time
         if plot.key in state.recent or plot.key in state.behind or plot.key in [plot.key for plot in state.ahead]:
@@ -254,11 +256,20 @@ class LiveTracker:
             what = "unknown" if s is None else "on no platform"
             self.leave_out("own positions", f"own position for {str(sensor)[:40]!r} left out: the sensor is {what}", s)
             return
+        time = self._running(time)
         try:
             self.state.own_positions.take(carrier, time, position, heading)
         except AssocError as error:
             where = self.settings.name_of(s)
             self.leave_out("own positions", f"own position of {where} at {moment(time)} left out: it {error}", s)
+
+    def _running(self, time: float) -> float:
+        """A time, or seconds of the day on the day on which they are near the plots before."""
+        newest = self.state.newest
+        if not -JUMP <= time < DAY + JUMP or not abs(newest) <= LARGEST:
+            return time
+        day = time + DAY * round((newest - time) / DAY)
+        return day if -self.settings.horizon <= day - newest <= JUMP else time
 
     def _timed(self, plot: CheckedPlot) -> list[Picture]:
         """Process a sound plot, unless its time is doubted or too old."""
