@@ -4,12 +4,14 @@ import math
 from itertools import combinations, permutations
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
 
 import assoc
 from assoc import AssignmentProblem
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import AssocWarning, InfeasibleError, InvalidInputError
 
 
 def choices(shape):
@@ -91,6 +93,24 @@ def test_nobody_to_assign(shape):
 def test_what_is_wrong_is_named(costs, unassigned, message):
     with pytest.raises(InvalidInputError, match=message):
         AssignmentProblem.from_matrix(costs, unassigned)
+
+
+def test_tables_and_sparse_arrays():
+    costs = np.array([[1.0, 9.0, 2.0], [4.0, 1.0, 8.0]])
+    table = pd.DataFrame(costs, index=["a", "b"])
+    with pytest.warns(AssocWarning, match="is taken as by scipy"):
+        assert [each.tolist() for each in assoc.assign(table).pairs] == [[0, 1], [0, 1]]
+        assert [solution.cost for solution in assoc.kbest(table, 2)] == [2.0, 3.0]
+    with pytest.raises(InvalidInputError, match="is sparse; AssignmentProblem.from_sparse"):
+        AssignmentProblem.from_matrix(csr_array(costs))
+
+
+def test_nobody_within_a_threshold_is_no_mistake():
+    """Warnings are errors here; without a price of leaving they are meant."""
+    far = np.full((2, 3), 50.0)
+    assert not len(assoc.assign(AssignmentProblem.from_matrix(far, unassigned=5.0)).pairs[0])
+    with pytest.warns(AssocWarning, match="none of the 6 tuples"):
+        assoc.assign(AssignmentProblem.from_matrix(far, unassigned=0.0))
 
 
 def test_pairs_are_of_two_lists():

@@ -245,14 +245,17 @@ class Outcome:
 SolveFunction = Callable[["Packing", "Parameters", Run], Outcome]
 
 
+_LEAVING = "; of a matrix, from_matrix(costs, unassigned=inf) leaves what it must"
+
+
 def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
     """Return the error for a problem without dummies in which no solution was found (in the time of a run)."""
     uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
     if uncovered:
-        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple{_LEAVING}")
     if run is not None and run.stopped_by == "iterations":
         nodes = f"{FIRST_NODES:,} nodes"
         return InfeasibleError(f"no complete solution was found in {nodes}; solver exact searches to the end")
     if run is not None and run.should_stop():
         return InfeasibleError("no complete solution was found in the time limit")
-    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")
+    return InfeasibleError(f"no choice of tuples uses every index of the smallest dimension exactly once{_LEAVING}")

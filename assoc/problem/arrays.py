@@ -75,6 +75,8 @@ def real_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
         array = np.asarray(values)
     except ValueError:
         raise InvalidInputError(f"{name}: expected rows of the same length; inf forbids an entry") from None
+    if hasattr(values, "tocoo"):
+        raise InvalidInputError(f"{name}: is sparse; AssignmentProblem.from_sparse(costs, dummy=False) reads it")
     if array.dtype.kind not in "fiu" and array.size:
         raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
     numbers = array.astype(np.float64, copy=False)

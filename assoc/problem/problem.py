@@ -37,7 +37,6 @@ FORMAT = "assoc.problem"
 VERSION = 1
 
 _MAX_DENSE_ELEMENTS = 200_000_000
-_DENSE = (np.ndarray, list, tuple)
 _FROM_DENSE = (
     "AssignmentProblem.from_matrix(costs) takes a matrix as scipy's linear_sum_assignment does, from_matrix(costs, "
     "unassigned=...) with costs of leaving rows and columns unassigned, from_dense(costs) one that has these as row 0 "
@@ -416,20 +415,25 @@ class AssignmentProblem:
             raise InvalidInputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
+def _is_dense(problem: object) -> bool:
+    """Whether costs are a list, an array, or a table that numpy reads as one."""
+    return isinstance(problem, list | tuple) or hasattr(problem, "__array__")
+
+
 def check_problem(problem: object) -> None:
     """Refuse what is no problem; of an array, say how a problem is made of it."""
     if isinstance(problem, AssignmentProblem):
         return
     line = f"problem: expected an AssignmentProblem, got {type(problem).__name__}"
-    if isinstance(problem, _DENSE):
+    if _is_dense(problem):
         line += f"; {_FROM_DENSE}"
     raise InvalidInputError(line)
 
 
 def taken_problem(problem: object) -> AssignmentProblem:
     """A problem as it is, and an array of costs as scipy takes it, with a warning that says so."""
-    if isinstance(problem, _DENSE):
-        costs = real_numbers(problem, "problem")
+    if _is_dense(problem):
+        costs = real_numbers(cast(ArrayLike, problem), "problem")
         if costs.ndim < 2:
             found = f"an array of shape {costs.shape}"
             raise InvalidInputError(
