@@ -92,6 +92,7 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm, Seq
     from assoc._cli.biases import print_biases
     from assoc._cli.track.line_form import LineForm
     from assoc._cli.track.radars_file import read_radars
+    from assoc.association.source import refuse_text
     from assoc.recordings.on_earth import Bias
     from assoc.registration import register
     from assoc.scene.scene import Scene
@@ -99,6 +100,7 @@ def _scene(given: Given, settings: dict[str, Any]) -> tuple[Scene, LineForm, Seq
     if not given["file"].lower().endswith(".toml"):
         if given["registration"] is not None:
             raise InvalidInputError("--registration: first takes the plots of radars.toml; register a scene before")
+        refuse_text(given["file"])
         scene = Scene.load(given["file"])
         return scene, LineForm(scene), ()
     if given["turns"] is not None:

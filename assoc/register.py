@@ -53,6 +53,10 @@ _OPTIONS = (
 def _register(words: list[str]) -> None:
     given = parser().read(words)
     output, described = given["output"], given["file"].lower().endswith(".toml")
+    if not described:
+        from assoc.association.source import refuse_text
+
+        refuse_text(given["file"])
     if output is None and not described:
         raise InvalidInputError("-o: expected a file for the scene without the biases")
     if given["write"] and not described:

@@ -42,22 +42,28 @@ def load_source(path: str) -> Source:
     if is_text(path):
         return AssignmentProblem.load(path)
     refuse_pipe(path)
-    if path.lower().endswith(".toml"):
-        raise InvalidInputError(
-            f"{path}: is a description, expected a scene or problem (.npz); that of radars is looked at by "
-            "'assoc inspect' and tracked by 'assoc track', settings come with --config"
-        )
+    refuse_text(path)
     found = format_of(path)
-    if found is None and _is_table(path):
-        raise InvalidInputError(
-            f"{path}: is a table, expected a scene or problem (.npz); radar plots become tracks with 'assoc track', "
-            "recorded trajectories become a scene with 'assoc simulate from-tracks'"
-        )
     if found == "assoc.problem":
         return AssignmentProblem.load(path)
     if found is not None and found != "assoc.scene":
         raise InvalidInputError(f"{path}: has the format {found[:60]!r}, expected 'assoc.scene' or 'assoc.problem'")
     return Scene.load(path)
+
+
+def refuse_text(path: str) -> None:
+    """Refuse a description of radars, or a table, where a scene is expected; say which program takes it."""
+    if path.lower().endswith(".toml"):
+        raise InvalidInputError(
+            f"{path}: is a description, expected a scene or problem (.npz); that of radars is looked at by "
+            "'assoc inspect' and tracked by 'assoc track', settings come with --config"
+        )
+    if format_of(path) is None and _is_table(path):
+        raise InvalidInputError(
+            f"{path}: is a table, expected a scene or problem (.npz); radar plots become tracks with 'assoc track', or "
+            "come to 'assoc live radars.toml' on stdin; recorded trajectories become a scene with 'assoc simulate "
+            "from-tracks'"
+        )
 
 
 def _is_table(path: str) -> bool:

@@ -51,7 +51,10 @@ def chosen_radar(path: str | os.PathLike[str], plots: Iterable[Source], radar: s
     """The radar of a file whose plots are wanted: the only one, or that named SAC/SIC."""
     known = {_name(source): source for source in sorted(plots)}
     if not known:
-        raise InvalidInputError(f"{os.fspath(path)}: holds no plots (categories 001, 010, 020, 048)")
+        raise InvalidInputError(
+            f"{os.fspath(path)}: holds no plots (categories 001, 010, 020, 048); reports of 021, and positions of 010 "
+            "and 020, go into [[reports]] of radars.toml"
+        )
     if radar not in known and (radar is not None or len(known) > 1):
         raise InvalidInputError(f"{label}: the file holds plots of {', '.join(known)}; name one")
     return known[radar or next(iter(known))]
