@@ -263,10 +263,10 @@ def _problem_beside(proof: str) -> str:
 
 
 def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: bool) -> None:
-    from assoc.association.table import KEYS, LEFT_ALIGNED, rows
+    from assoc.association.table import LEFT_ALIGNED, rows
 
     headers, cells = rows(scans, names, brief=brief)
-    print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
+    print_table(headers, cells, left=LEFT_ALIGNED)
 
 
 def _print(association: Association, totals: Totals, names: list[str], elapsed: float, everything: bool) -> None:

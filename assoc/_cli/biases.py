@@ -19,6 +19,6 @@ def print_biases(found: Registration) -> None:
         for row in found.rows()
     ]
     headers = ["sensor", "component", "bias", "sigma", "unit", "observed"]
-    print_table(headers, rows, keys=2, left=("sensor", "component", "unit"))
+    print_table(headers, rows, left=("sensor", "component", "unit"))
     print()
     print_lines("\n".join([found.summary(), *found.advice()]))

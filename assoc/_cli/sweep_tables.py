@@ -44,7 +44,7 @@ def print_study(table: pd.DataFrame, most: int) -> None:
     brief = sys.stdout.isatty() and len(table) > 1
     headers, rows = summary_rows(table, [name for name in MEASURES if not brief or table[name].nunique() > 1])
     shown = rows[:most] if sys.stdout.isatty() else rows
-    print_table(headers, shown, keys=headers.index("runs"), joined=[INTERVAL])
+    print_table(headers, shown)
     if len(rows) > len(shown):
         print(f"... and {len(rows) - most} more settings (--all shows them)")
     print()
@@ -124,7 +124,7 @@ def print_tuning(report: Report) -> None:
 def print_comparison(table: pd.DataFrame, first: str, second: str) -> None:
     """Print the paired differences of two settings."""
     headers, rows = comparison_rows(table)
-    print_table(headers, rows, left=[""], joined=[INTERVAL])
+    print_table(headers, rows, left=[""])
     print_lines(
         f"first: {printable(first)}; second: {printable(second)}; difference: first less second, in pairs of runs"
     )

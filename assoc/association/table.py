@@ -10,9 +10,6 @@ from collections.abc import Iterator, Sequence
 from assoc._text.plain import printable, spreadsheet_text
 from assoc.association.scan import ScanAssociation
 
-KEYS = ("file", "scan", "rank")
-"""Columns that identify a row."""
-
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")
 
