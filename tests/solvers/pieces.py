@@ -128,3 +128,38 @@ def reference_walk(one, tau, slack_tau, alpha, beta, scale, ants, rng):
                 taken |= set(rows_of(packing, allowed[place]))
         covers.append(sorted(chosen))
     return covers
+
+
+class Incumbent:
+    """What plain references keep: the best complete cover, as sorted columns, and iterations without a better one."""
+
+    def __init__(self, one, parameters, rng):
+        self.one, self.p, self.rng = one, parameters, rng
+        self.best, self.least, self.stalled = None, np.inf, 0
+
+    def offer(self, columns):
+        """Weight of a new cover; the best complete one is kept."""
+        cost = self.one.packing.weights[columns].sum()
+        if cost < self.least - self.one.tolerance and is_complete(self.one.packing, columns):
+            self.best, self.least = sorted(columns), cost
+        return cost
+
+    def random_cover(self, strictness):
+        """Columns and weight of one ant's cover without pheromone."""
+        ones = np.ones(self.one.packing.num_columns), np.ones(self.one.packing.num_rows)
+        scale = temperature(self.one, self.least)
+        (columns,) = reference_walk(self.one, *ones, 1.0, strictness, scale, 1, self.rng)
+        return columns, self.offer(columns)
+
+    def ends_iteration(self, before):
+        """Count an iteration that began with this least weight."""
+        self.stalled = 0 if self.least < before - self.one.tolerance else self.stalled + 1
+
+
+def iterate(one, search, local):
+    """One iteration of a metaheuristic, counted as the loop around it does; the best columns, None for none."""
+    before = one.weight
+    search.iterate(local)
+    one.iterations += 1
+    one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
+    return None if one.best is None else columns_of(one.best)

@@ -6,14 +6,15 @@ import pytest
 from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from tests.solvers.pieces import (
+    Incumbent,
     columns_of,
     component,
     cover_of,
     is_complete,
+    iterate,
     open_problem,
     problems,
     random_covers,
-    reference_walk,
     rows_of,
     search_of,
     temperature,
@@ -61,34 +62,19 @@ def reference_filling(one, child, scale, rng):
     return sorted(child)
 
 
-class Reference:
+class Reference(Incumbent):
     """A population of column lists, bred without any local search."""
 
     def __init__(self, one, parameters, rng):
-        self.one, self.p, self.rng = one, parameters, rng
-        self.best, self.least = None, np.inf
+        super().__init__(one, parameters, rng)
         self.members, self.fitness = [], []
-        self.stalled = 0
-
-    def offer(self, columns):
-        """Weight of a new cover; the best complete one is kept."""
-        cost = self.one.packing.weights[columns].sum()
-        if cost < self.least - self.one.tolerance and is_complete(self.one.packing, columns):
-            self.best, self.least = columns, cost
-        return cost
 
     def populate(self):
         """Fill up with random greedy covers, strict and loose ones by turns."""
-        packing = self.one.packing
-        ones = np.ones(packing.num_columns), np.ones(packing.num_rows)
         while len(self.members) < self.p.population:
-            strictness = 2.0 ** (len(self.members) % 10)
-            (columns,) = reference_walk(
-                self.one, *ones, 1.0, strictness, temperature(self.one, self.least), 1, self.rng
-            )
-            cost = self.offer(columns)
+            columns, cost = self.random_cover(2.0 ** (len(self.members) % 10))
             self.members.append(columns)
-            self.fitness.append(cost if is_complete(packing, columns) else np.inf)
+            self.fitness.append(cost if is_complete(self.one.packing, columns) else np.inf)
 
     def parent(self):
         """Best of some members drawn with replacement."""
@@ -117,7 +103,7 @@ class Reference:
                 self.members = [self.members[i] for i in keep]
                 self.fitness = [self.fitness[i] for i in keep]
                 self.populate()
-        self.stalled = 0 if self.least < before - self.one.tolerance else self.stalled + 1
+        self.ends_iteration(before)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
@@ -130,14 +116,10 @@ def test_generation_by_generation(name):
     for _ in range(35):
         renewals += expected.stalled > 0 and expected.stalled % RENEWAL == 0
         expected.generation()
-        before = one.weight
-        breeding.iterate(search)
-        one.iterations += 1
-        one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
+        best = iterate(one, breeding, search)
         assert [columns_of(member) for member in breeding.members] == expected.members
         np.testing.assert_allclose(breeding.fitness, expected.fitness, rtol=1e-12)
-        assert (None if one.best is None else columns_of(one.best)) == expected.best
-        assert one.stalled == expected.stalled
+        assert (best, one.stalled) == (expected.best, expected.stalled)
     assert renewals >= 2, "renewals with the best and without it were not seen"
 
 

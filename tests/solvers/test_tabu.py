@@ -8,12 +8,13 @@ from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.solvers.tabu.moves import TabuSearch, _moves
 from assoc.solvers.tabu.parameters import TabuParameters
 from tests.solvers.pieces import (
+    Incumbent,
     columns_of,
     component,
     cover_of,
     is_complete,
+    iterate,
     problems,
-    reference_walk,
     rows_of,
     search_of,
     temperature,
@@ -115,32 +116,20 @@ def test_move_by_move(name, tenure):
         assert clock == expected.clock
 
 
-class ReferenceSearch:
+class ReferenceSearch(Incumbent):
     """Moves, and what happens between them: restarts from the best, forced columns, new covers."""
 
     def __init__(self, one, parameters, rng):
-        self.one, self.p, self.rng = one, parameters, rng
-        self.best, self.least = None, np.inf
+        super().__init__(one, parameters, rng)
         self.until = np.zeros(one.packing.num_columns, dtype=np.int64)
-        self.columns, self.clock, self.stalled, self.restarts = None, 1, 0, 0
-
-    def offer(self, columns):
-        """Weight of a new cover; the best complete one is kept."""
-        cost = self.one.packing.weights[columns].sum()
-        if cost < self.least - self.one.tolerance and is_complete(self.one.packing, columns):
-            self.best, self.least = sorted(columns), cost
-        return cost
+        self.columns, self.clock, self.restarts = None, 1, 0
 
     def afresh(self):
         """Best of twelve random greedy covers."""
-        packing = self.one.packing
-        ones = np.ones(packing.num_columns), np.ones(packing.num_rows)
         start, least = self.best, np.inf
         for number in range(12):
-            scale = temperature(self.one, self.least)
-            (columns,) = reference_walk(self.one, *ones, 1.0, 2.0 ** (number % 6), scale, 1, self.rng)
-            cost = self.offer(columns)
-            if cost < least and is_complete(packing, columns):
+            columns, cost = self.random_cover(2.0 ** (number % 6))
+            if cost < least and is_complete(self.one.packing, columns):
                 start, least = columns, cost
         return [] if start is None else start
 
@@ -176,7 +165,7 @@ class ReferenceSearch:
         found = moves.run(self.p.moves, self.p.tenure, forced, self.rng)
         self.columns, self.clock = moves.columns, moves.clock
         self.offer(found)
-        self.stalled = 0 if self.least < before - self.one.tolerance else self.stalled + 1
+        self.ends_iteration(before)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
@@ -187,12 +176,8 @@ def test_iteration_by_iteration(name):
     expected = ReferenceSearch(one, parameters, np.random.default_rng(5))
     for _ in range(16):
         expected.iterate()
-        before = one.weight
-        search.iterate(local)
-        one.iterations += 1
-        one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
+        assert iterate(one, search, local) == expected.best
         assert columns_of(search.owner) == sorted(expected.columns)
-        assert (None if one.best is None else columns_of(one.best)) == expected.best
         np.testing.assert_array_equal(search.until, expected.until)
         assert (search.clock, search.restarts) == (expected.clock, expected.restarts)
     assert search.restarts >= 3, "a restart from a new cover was not seen"
