@@ -50,6 +50,9 @@ class NormalEquations(NamedTuple):
     """Sum of w B' W nu, (n,)."""
     scatter: Array
     """Sum of the outer products of the tuples' gradients, (n, n), for a covariance that holds for any noise."""
+    slope: Array
+    """What the gradient falls by for each unit of a bias, (n, n): the information, less what a lighter weight takes
+    where a tuple comes to fit worse."""
     chi: Array
     """Chi-square value of each tuple at the position that fits it best, (T,)."""
     freedom: Array
@@ -127,14 +130,14 @@ def _weigh_bias(W: Array, H: Array, d: int, column: Array, left: Array, WB: Arra
 @njit
 def normal_equations(
     sensors: SensorArrays, tuples: Tuples, terms: TermArrays, limits: Array
-) -> tuple[Array, Array, Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
     """Sum up the information of tuples on the n biases in ``terms``: the fields of `NormalEquations`.
 
     ``limits`` (3 S + 1,) are, by degrees of freedom, chi-square values up to which a tuple counts fully; above, its
     weight is limit / chi-square, so that outliers count no more than a tuple at the limit.
     """
     total, count, n = len(tuples.z), len(sensors.dim), len(terms.sensor)
-    information, scatter, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    information, scatter, slope, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     chi, freedom = np.zeros(total), np.zeros(total, np.int64)
     left = np.full((total, count, 3), np.nan)
     columns, H, nu = np.zeros((n, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
@@ -157,6 +160,8 @@ def normal_equations(
         chi[t] = max(squares - u[0] * step[0] - u[1] * step[1] - u[2] * step[2], 0.0)
         limit = limits[freedom[t]]
         share = 1.0 if chi[t] <= limit else limit / chi[t]
+        # the derivative of limit / chi by a bias
+        lighter = 0.0 if chi[t] <= limit else 2.0 * share / chi[t]
         for s in range(count):
             if seen[s]:
                 for i in range(sensors.dim[s]):
@@ -184,5 +189,6 @@ def normal_equations(
                     for i in range(sensors.dim[s]):
                         value += WB[j, i] * columns[k, i]
                 information[j, k] += share * value
+                slope[j, k] += share * value - lighter * pull[j] * pull[k]
                 scatter[j, k] += share * share * pull[j] * pull[k]
-    return information, gradient, scatter, chi, freedom, left
+    return information, gradient, scatter, slope, chi, freedom, left

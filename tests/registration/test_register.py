@@ -9,12 +9,19 @@ import pytest
 from scipy.optimize import least_squares
 
 from assoc import Scene
+from assoc.costs.arrays import sensor_arrays
+from assoc.costs.gating import chi_square_quantiles
 from assoc.errors import InvalidInputError
 from assoc.recordings.several import NO_HEIGHT
 from assoc.registration import RegistrationParameters, Term, register, with_biases
 from assoc.registration.correction import corrected_measurements
 from assoc.registration.epochs import scene_epochs
+from assoc.registration.estimation import estimate
+from assoc.registration.normal_equations import NormalEquations, normal_equations
+from assoc.registration.pairing import tuple_arrays
+from assoc.registration.register import make_problem
 from assoc.registration.result import describe
+from assoc.registration.terms import term_arrays
 from assoc.sensors import BearingSensor, Platform, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
 from assoc.simulation.radars import on_circle
@@ -52,6 +59,42 @@ def test_errors_agree_with_the_covariance():
     from scipy.stats import chi2
 
     assert chi2.ppf(0.005, 8 * n) < sum(squares) < chi2.ppf(0.995, 8 * n)
+
+
+def test_deviations_count_what_is_weighted_down():
+    """The slope of the sums is that of differences between biases nearby, and flatter than the information."""
+    sensors = [
+        Radar2D(
+            position=sensor.position, noise=[50.0, 1e-3], detection_probability=0.9, false_alarm_rate=5.0,
+            field_of_view=[[0, 2e5], [-np.pi, np.pi]], name=sensor.name,
+        )
+        for sensor in radars(2)
+    ]  # fmt: skip
+    scene = with_biases(scene_of(sensors, 5), [{"range": 300.0, "azimuth": -5e-3}, {"range": -250.0}])
+    problem = make_problem(scene, RegistrationParameters())
+    epochs = scene_epochs(scene, moving=False)
+    found = estimate(problem, epochs)
+    corrected = problem.scene(epochs, found.biases)
+    tuples = tuple_arrays(corrected, epochs, found.chosen, np.zeros(2))
+    terms, limits = term_arrays(problem.terms, problem.sensors), chi_square_quantiles(0.95, 6)
+
+    def sums_at(shift):
+        """Those of measurements with other biases, around the same positions."""
+        z = tuples.z - np.pad(shift.reshape(2, 2), ((0, 0), (0, 1)))
+        parts = normal_equations(sensor_arrays(corrected), tuples._replace(z=z), terms, limits)
+        return NormalEquations(*parts)
+
+    sums, steps = sums_at(np.zeros(4)), np.diag([0.01, 1e-7, 0.01, 1e-7])
+    falls = [(sums_at(-step).gradient - sums_at(step).gradient) / (2.0 * step.max()) for step in steps]
+    scale = 1.0 / np.sqrt(np.diagonal(sums.information))
+    np.testing.assert_allclose(
+        scale * np.transpose(falls) * scale[:, None], scale * sums.slope * scale[:, None], atol=1e-4
+    )
+    assert (np.diagonal(sums.slope) < 0.97 * np.diagonal(sums.information)).all()
+    prior = np.diag(problem.spreads**-2.0)
+    inverse = np.linalg.inv(sums.slope + prior)
+    expected = np.sqrt(np.diagonal(inverse @ (sums.scatter + prior) @ inverse))
+    np.testing.assert_allclose(np.sqrt(np.diagonal(found.covariance)), expected, rtol=0.03)
 
 
 @pytest.mark.slow
