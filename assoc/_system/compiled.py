@@ -102,6 +102,11 @@ def draws(generator: np.random.Generator) -> np.random.Generator:
     return generator if private is None or isinstance(generator, private.Draws) else private.Draws(generator)
 
 
+def for_kernels(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """The array in C order and writeable: kernels are not compiled once more for read-only ones or parts of others."""
+    return array if array.flags.carray else np.require(array, requirements=("C", "W"))
+
+
 def is_kept(kernel: Any) -> bool:
     """Whether compiled code of a kernel, for any types, is in this process, on disk, or shipped with the package."""
     return bool(_CONFIG.DISABLE_JIT or private is None or private.is_kept(kernel))

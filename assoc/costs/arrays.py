@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -125,22 +126,17 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
     count = len(sensors.dim)
     if len(scan.measurements) != count:
         raise InvalidInputError(f"scan has measurements of {len(scan.measurements)} sensors, the scene has {count}")
-    start = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum([len(z) for z in scan.measurements], out=start[1:])
-    z = np.zeros((int(start[-1]), 3))
-    index = np.empty(len(z), dtype=np.int32)
-    owner = np.repeat(np.arange(count), np.diff(start))
-    for s, measured in enumerate(scan.measurements):
-        rows = slice(start[s], start[s + 1])
-        order = np.arange(len(measured))
-        if sensors.code[s] == BEARING:
+    sizes = list(map(len, scan.measurements))
+    start = np.array([0, *accumulate(sizes)])
+    z, owner = np.zeros((sum(sizes), 3)), np.repeat(np.arange(count), sizes)
+    index = (np.arange(len(z)) - start[owner] + 1).astype(np.int32)
+    ends = zip(start.tolist(), start[1:].tolist(), sensors.dim.tolist(), sensors.code.tolist(), strict=False)
+    for (low, high, dim, code), measured in zip(ends, scan.measurements, strict=True):
+        z[low:high, :dim] = measured[:, :dim]
+        if code == BEARING:
             azimuth = math.pi - np.mod(math.pi - measured[:, 0], 2 * math.pi)
             order = np.argsort(azimuth, kind="stable")
-            z[rows, : sensors.dim[s]] = measured[order]
-            z[rows, 0] = azimuth[order]
-        else:
-            z[rows, : sensors.dim[s]] = measured[:, : sensors.dim[s]]
-        index[rows] = order + 1
+            z[low:high, 0], index[low:high] = azimuth[order], order + 1
     centre, spread, information = convert(sensors, z, owner, reach, least)
     return ScanArrays(z, owner, start, centre, spread, information), index
 

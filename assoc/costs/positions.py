@@ -30,18 +30,30 @@ def tuple_costs(
     target_density: float | str | None = None,
 ) -> Array:
     """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
+    return costs_and_positions(scene, scan, tuples, speed=speed, target_density=target_density)[0]
+
+
+def costs_and_positions(
+    scene: Scene,
+    scan: int | Scan,
+    tuples: Array,
+    *,
+    speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
+) -> tuple[Array, Array, Array]:
+    """`tuple_costs` and `positions_and_covariances` of the same tuples, fitted once."""
     prior = position_prior(scene, sensor_arrays(scene), target_density)
     sensors = with_prior(sensor_arrays(scene), prior)
     if any_arrivals(scene):
         times, fitted = fitted_arrivals(scene, scan, tuples)
-        return arrival_costs(scene, sensors, times, prior, fitted)
+        return arrival_costs(scene, sensors, times, prior, fitted), fitted[2], fitted[3]
     flat, rows, chi, positions, covariances = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
     if rates is not None or prior is not None:
         chi = chi + prices(sensors, flat, rows, rates, prior, positions, covariances)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
-    return np.where(detected.sum(axis=1) == 1, 0.0, costs)
+    return np.where(detected.sum(axis=1) == 1, 0.0, costs), positions, covariances
 
 
 def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:

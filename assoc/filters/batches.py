@@ -87,8 +87,8 @@ def concatenate(states: Sequence[Any]) -> Any:
     return state_from(type(present[0]), joined)
 
 
-def placed(count: int, parts: Iterable[tuple[Array, Any]]) -> Any:
-    """One batch of `count` targets, at least one part, of parts with the rows (K,) that they take.
+def placed(count: int, parts: Iterable[tuple[Array | slice, Any]]) -> Any:
+    """One batch of `count` targets, at least one part, of parts with the rows (K,) that they take, later ones last.
 
     Parts may be made one after the other: none is needed any longer once it stands where it belongs. Histories that
     some do not have yet are filled with zeros.

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.compiled import for_kernels
 from assoc._system.wrong_types import explains_wrong_types
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -303,7 +304,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         if flat is None or not as_in(self, InteractingMultipleModel, "update", "expected", "fit"):
             return None
         means, covariances = flat.means.reshape(state.means.shape), flat.covariances.reshape(state.covariances.shape)
-        return Parts(means, covariances, np.require(state.weights, requirements=("C", "W")), flat.observations)
+        return Parts(means, covariances, for_kernels(state.weights), flat.observations)
 
     def positions_alone(self, state: Mixture) -> tuple[Filter[Any], Any]:
         """A filter of positions alone, and the positions of these states; see `Filter.positions_alone`."""

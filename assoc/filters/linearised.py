@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.compiled import for_kernels
 from assoc._types import Array
 from assoc.filters.base import (
     Expected,
@@ -203,7 +204,7 @@ class GaussianFilter(Filter[Gaussian]):
         seen = [self.observe(sensor) for sensor in sensors]
         if not all(self._linearises(o) for o in seen):
             return None
-        mean, P = (np.require(array, requirements=("C", "W")) for array in (state.mean, state.covariance))
+        mean, P = for_kernels(state.mean), for_kernels(state.covariance)
         return Parts(mean[:, None], P[:, None], np.ones((len(state), 1)), seen)
 
     def fit(self, state: Gaussian, expected: Expected, rows: Array, measured: Array, sensor: Measurement) -> Fit | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.build import build_problem
-from assoc.costs.positions import positions_and_covariances, positions_of_scan, single_positions
+from assoc.costs.positions import costs_and_positions, positions_and_covariances, positions_of_scan, single_positions
 from assoc.costs.tracks.own_times import Places
 from assoc.costs.tracks.scores import ScoreTerms, log_birth
 from assoc.costs.views import Views, blind_somewhere, log_missed
@@ -69,6 +69,11 @@ class NewTracks:
         """Positions, covariances, and which are precise enough to start a track."""
         positions, covariances = positions_and_covariances(self._scene, scan, tuples)
         return positions, covariances, self._fit(positions, covariances)
+
+    def weighed(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
+        """Costs by `assoc.tuple_costs`, and what `fused` returns."""
+        costs, positions, covariances = costs_and_positions(self._scene, scan, tuples, speed=self._initiation.speed)
+        return costs, positions, covariances, self._fit(positions, covariances)
 
     def _fit(self, positions: Array, covariances: Array) -> Array:
         """Which positions may start a track, bool (K,)."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, lean_inner_njit, njit
+from assoc._system.compiled import for_kernels, inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.sorting import order_of, sort_part
 from assoc._types import Array
 from assoc.errors import LimitExceededError
@@ -28,9 +28,8 @@ def near_pairs(expected: Expected, measurements: Array, periods: tuple[float, ..
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    # not compiled once more for arrays that are read only, as those of scenes are, or a part of larger ones
-    covariance, z = (np.require(array, requirements=("C", "W")) for array in (expected.covariance, z))
-    tracks, found, _ = _sweep(h, covariance, z, _turning(periods), gate, MOST_PAIRS)
+    arrays = h, for_kernels(expected.covariance), for_kernels(z), _turning(periods)
+    tracks, found, _ = _sweep(*arrays, gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
         # ordered by track: extrapolated to those left
         expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
@@ -202,7 +201,7 @@ def near_both(
     ``expected`` is as for `near_pairs`, of each of B partial tuples, whose tracks are ``track`` (B,); only measurements
     that are ``near`` the track are tried. Returns tuples and measurements, int (K,), ordered by both.
     """
-    arrays = track, near.first, near.found, np.require(measurements, requirements=("C", "W")), _turning(periods)
+    arrays = track, near.first, near.found, for_kernels(measurements), _turning(periods)
     return _near_both((expected.mean, _reach(expected.covariance, gate)), *arrays, most)
 
 

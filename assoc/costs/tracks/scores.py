@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import for_kernels, njit
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 
@@ -40,6 +40,8 @@ class ScoreTerms(NamedTuple):
     birth: Array
     """ln(P_D / beta_FA) - 1/2 ln det(2 pi R) of the components that depend on the position, (S,): with `log_birth` of
     the position's covariance the score of a single measurement as a new target."""
+    peak: Array
+    """-1/2 ln det(2 pi R): the most that a log likelihood of a measurement can be, (S,)."""
     by_range: Array | None = None
     """P_D in each band of range over the sensor's, (S, B), at most 1; None: the same everywhere. See
     `assoc.costs.views`."""
@@ -53,7 +55,8 @@ def score_terms(sensors: Sequence[Sensor], by_range: Array | None = None) -> Sco
     located = [sensor.position_part for sensor in sensors]
     there = np.array([part.false_alarm_rate / part.volume for part in located])
     spread = np.array([np.linalg.slogdet(2.0 * math.pi * part.covariance)[1] for part in located])
-    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread, by_range)
+    peak = np.array([-0.5 * np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1] for sensor in sensors])
+    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread, peak, by_range)
 
 
 def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
@@ -65,8 +68,7 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     axis, given the axes before it, the integral is at most the region's width: heights that nothing measures may vary
     more than the region is high. Directions in which the region has no width are left out.
     """
-    covariances, region = (np.require(array, requirements=("C", "W")) for array in (covariances, region))
-    return np.asarray(_log_birth(covariances, region, math.log(birth_rate)))
+    return np.asarray(_log_birth(for_kernels(covariances), for_kernels(region), math.log(birth_rate)))
 
 
 @njit

@@ -7,7 +7,6 @@ of (track, z_1, ..., z_S) is the negative logarithm of p(z_1, ..., z_S | track) 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -135,7 +134,7 @@ def grow_track_tuples(
     if not any(getattr(sensor, "measures_velocity", True) for sensor in sensors):
         filter, states = filter.positions_alone(states)
     growth = _Growth(
-        filter, measurements, sensors, terms, _ahead(sensors, terms, misses),
+        filter, measurements, sensors, terms, _ahead(terms, misses),
         [gate_of(sensor, gate_probability) for sensor in sensors], [periods_of(sensor) for sensor in sensors],
         margin,
     )  # fmt: skip
@@ -147,19 +146,28 @@ def grow_track_tuples(
 
 def corrected(
     filter: Filter[Any], states: Any, measurements: Sequence[Array], sensors: Sequence[Measurement], rows: Array
-) -> tuple[Any, Array, Array]:
+) -> tuple[Any, Array, Callable[[], Array]]:
     """The states of T tracks corrected by a tuple each, rows (T, S) of 1-based measurements, 0 where one missed.
 
-    Also the log likelihood of each measurement given those before, and its NIS, (T, S), 0 where there is none.
+    Also the log likelihood of each measurement given those before, and, computed when called, the sum of the NIS of
+    each tuple; (T, S) and (T,), 0 where there is none.
     """
-    log_likelihood, nis = np.zeros(rows.shape), np.zeros(rows.shape)
+    log_likelihood, updates = np.zeros(rows.shape), []
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
-        seen, missed = np.flatnonzero(rows[:, s]), np.flatnonzero(rows[:, s] == 0)
+        seen = np.flatnonzero(rows[:, s])
         if len(seen):
             done = filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
-            log_likelihood[seen, s], nis[seen, s] = done.log_likelihood, done.nis
-            states = placed(len(states), [(missed, states[missed]), (seen, done.state)])
-    return states, log_likelihood, nis
+            log_likelihood[seen, s] = done.log_likelihood
+            updates.append((seen, s, done))
+            states = placed(len(states), [(slice(None), states), (seen, done.state)])
+
+    def squares() -> Array:
+        nis = np.zeros(rows.shape)
+        for seen, s, done in updates:
+            nis[seen, s] = done.nis
+        return np.asarray(nis.sum(axis=1))
+
+    return states, log_likelihood, squares
 
 
 class _Growth(NamedTuple):
@@ -272,8 +280,7 @@ def _grown(growth: _Growth, states: Any, misses: Array, near: Sequence[Near], mo
     return TrackTuples(track[order], rows[order], costs[order])
 
 
-def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms, misses: Array) -> Array:
+def _ahead(terms: ScoreTerms, misses: Array) -> Array:
     """The most that sensors s, s + 1, ... can take off a cost, (S + 1,): no density is above the noise's own."""
-    peak = [-0.5 * float(np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1]) for sensor in sensors]
-    gain = np.maximum(terms.detection + np.array(peak), misses.max(axis=0, initial=-np.inf))
+    gain = np.maximum(terms.detection + terms.peak, misses.max(axis=0, initial=-np.inf))
     return np.append(np.cumsum(gain[::-1])[::-1], 0.0)

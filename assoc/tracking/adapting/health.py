@@ -186,15 +186,16 @@ def health(
     `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`), `unresolved` says what was learnt of
     resolutions, `biases` what measurements are corrected for; `lengths` (m) are those of targets with several plots.
     """
-    values, spreads = estimates.found(sensors)
-    declared, by_range = declared_values(sensors), zip(*estimates.by_range(values[:, DETECTION]), strict=True)
+    values, spreads = estimates.found_and_spreads(sensors)
+    declared, (by_range, weights) = declared_values(sensors), estimates.by_range(values[:, DETECTION])
+    unsure = np.sqrt(np.diagonal(np.linalg.inv(weights), axis1=1, axis2=2))
     rows = []
-    for s, (sensor, (seen, unsure)) in enumerate(zip(sensors, by_range, strict=True)):
+    for s, sensor in enumerate(sensors):
         noise, P, alarms = (
             _quantity(declared[s, c], values[s, c], spreads[s, c], c) for c in (NOISE, DETECTION, ALARMS)
         )
         bands = [
-            ((b + 1) * reach(sensor) / BANDS, _quantity(values[s, DETECTION], seen[b], unsure[b], DETECTION))
+            ((b + 1) * reach(sensor) / BANDS, _quantity(values[s, DETECTION], by_range[s, b], unsure[s, b], DETECTION))
             for b in (np.flatnonzero(estimates.dwells[s] >= 1.0).tolist() if reach(sensor) else ())
         ]
         folding, hidden = assumed_folding(sensor, speed), (int(ghosts[s, RANGE]), int(ghosts[s, AZIMUTH]))

@@ -25,7 +25,7 @@ from assoc.tracking.records.biases import CLOCK
 from assoc.tracking.records.clutter import ONE_SAYS, YOUNG
 from assoc.tracking.records.estimates import ALARMS, NOISE, declared_values
 from assoc.tracking.records.initiation import velocity_components
-from assoc.tracking.records.track import taken_by
+from assoc.tracking.records.track import among, taken_by
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import densities_at, dwells
 
@@ -220,8 +220,8 @@ def _seek(progress: Progress, late: TrackBatch, rows: Array, dwelled: Array) -> 
     assert step is not None
     for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
         missed = np.flatnonzero((rows[:, s] == 0) & dwelled[:, s] & (late.missed == 0))
-        free = np.flatnonzero(~np.isin(step.assigned[s], late.track_id))
-        if not len(missed) or not len(free):
+        free = np.flatnonzero(~among(step.assigned[s], late.track_id)) if len(missed) else missed
+        if not len(free):
             continue
         gate, periods = gate_of(sensor, settings.gate_probability), periods_of(sensor)
         expected = settings.filter.expected(late.states[missed], sensor)
@@ -269,7 +269,7 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
     )
     velocities, moving = np.zeros((len(states), len(axes))), velocity_components(settings.filter.motion)
     velocities[:, : len(moving)] = states.mean[:, moving]
-    factors = estimates.found(declared)[0][:, NOISE]
+    factors = estimates.found(declared)[:, NOISE]
     return shown_by(
         declared,
         seen,

@@ -129,8 +129,7 @@ def shown_by(
             gain = h @ np.linalg.inv(_BESIDE * prior[t] + others.sum(axis=0))
             shares = np.zeros((*y[beside].shape, S))
             for r in range(S):
-                shares[..., r] = _diagonal(gain, others[r])
-            shares[..., s] = noise[s]
+                shares[..., r] = _diagonal(gain, others[r]) if r != s else noise[s]
             known = _diagonal(gain, _BESIDE**2 * prior[t])
             rest = y[beside] - _times(gain, vectors[:, t].sum(axis=0) - vectors[s, t])
             sums.add(shares, known, rest**2, np.ones(len(t)))

@@ -7,13 +7,13 @@ not know which it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
-from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples, score_costs
 from assoc.costs.tracks.tuples import corrected, gate_of, grow_track_tuples, require_states
@@ -33,12 +33,12 @@ class Corrected(NamedTuple):
     """Gain of the score, (M,)."""
     when: Array
     """Time of the last measurement, seconds; NaN where there is none; (M,)."""
-    inside: Array
+    inside: Callable[[], Array]
     """Whether the tuple passed its gate, bool (M,)."""
 
     def of(self, rows: Array) -> Corrected:
         """Select tracks."""
-        return Corrected(self.states[rows], *(part[rows] for part in self[1:]))
+        return Corrected(self.states[rows], self.gain[rows], self.when[rows], lambda: self.inside()[rows])
 
 
 class WholeScan(ABC):
@@ -146,26 +146,28 @@ class _AtOnce(WholeScan):
         states = self._tracks.states if whole else self._tracks.states[track]
         missed = self.missed if whole else self.missed[track]
         alone = missed.sum(axis=1)
-        states, log_likelihood, nis = corrected(settings.filter, states, scan.measurements, settings.sensors, rows)
+        states, log_likelihood, squares = corrected(settings.filter, states, scan.measurements, settings.sensors, rows)
         gain = alone - scan.crowding(rows)
         for s, detection in enumerate(settings.terms.detection):
             gain += np.where(rows[:, s] > 0, log_likelihood[:, s] + detection - missed[:, s], 0.0)
-        dims = np.array([sensor.dim for sensor in settings.sensors])
-        freedom = (rows > 0) @ dims
-        inside = nis.sum(axis=1) <= chi_square_quantiles(settings.gate_probability, int(dims.sum()))[freedom]
-        inside &= (gain > alone) | (freedom == 0)
-        return Corrected(states, gain, np.where(freedom > 0, scan.time, np.nan), inside)
+        any_seen = rows.any(axis=1)
+
+        def inside() -> Array:
+            dims = np.array([sensor.dim for sensor in settings.sensors])
+            gates = chi_square_quantiles(settings.gate_probability, int(dims.sum()))[(rows > 0) @ dims]
+            return np.asarray((squares() <= gates) & ((gain > alone) | ~any_seen))
+
+        return Corrected(states, gain, np.where(any_seen, scan.time, np.nan), inside)
 
     def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
         """At the fused positions."""
         settings, scan = self._progress.settings, self._progress.scan
-        positions, covariances, fit = settings.births.fused(scan, tuples)
+        costs, positions, covariances, fit = settings.births.weighed(scan, tuples)
         order = np.flatnonzero(fit)
         order = order[np.lexsort(positions[order].T)]
         rows, positions, covariances = tuples[order], positions[order], covariances[order]
         states = settings.initiation.start(settings.filter, positions, covariances)
-        costs = tuple_costs(settings.scene, scan, rows, speed=settings.initiation.speed)
-        costs -= settings.births.overlooked(rows, positions, covariances)
+        costs = costs[order] - settings.births.overlooked(rows, positions, covariances)
         score = settings.births.scores(rows, costs, positions, covariances) - scan.crowding(rows)
         return TrackBatch.new(states, np.zeros(len(order), dtype=np.int64), score, scan.time), order
 
@@ -199,7 +201,7 @@ class _InOrder(WholeScan):
         followed = timed.follow(track, rows)
         gain = -score_costs(timed, followed, rows, terms, self.missed[track])
         when = np.where(rows.any(axis=1), followed.when, np.nan)
-        return Corrected(timed.at_end(followed, track), gain, when, followed.inside)
+        return Corrected(timed.at_end(followed, track), gain, when, lambda: followed.inside)
 
     def begun(self, tuples: Array) -> tuple[TrackBatch, Array]:
         """From the first measurement that determines a position."""

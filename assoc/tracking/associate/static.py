@@ -30,7 +30,7 @@ class StaticFusion(Method):
         track, which = track[order], which[order]
         rows = np.concatenate([fused, np.zeros((1, fused.shape[1]), dtype=np.int32)])[which]
         after = scan.follow(track, rows)
-        good = np.flatnonzero(after.inside)
+        good = np.flatnonzero(after.inside())
         value = doubted_gain(scores[track[good]], after.gain[good])
         columns = np.stack([track[good] + 1, which[good] + 1], axis=1)
         solution = progress.work.assign(AssignmentProblem(columns, -value, [count, len(fused)]))

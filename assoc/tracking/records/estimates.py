@@ -92,20 +92,29 @@ class Estimates(NamedTuple):
             np.zeros((S, 4)), np.zeros(len(FACTORS)),
         )  # fmt: skip
 
-    def found(self, sensors: Sequence[Sensor]) -> tuple[Array, Array]:
+    def found(self, sensors: Sequence[Sensor]) -> Array:
+        """Estimates as in `used`, (S, 3)."""
+        return self._found_of(sensors)[0]
+
+    def found_and_spreads(self, sensors: Sequence[Sensor]) -> tuple[Array, Array]:
         """Estimates as in `used`, and standard deviations of their logarithms (P_d: of ln(P / (1 - P))), (S, 3)."""
+        found, dwells, alarms = self._found_of(sensors)
+        seen, of_factors = found[:, DETECTION], np.sqrt(np.diagonal(np.linalg.inv(self.weights)))
+        spreads = [of_factors, 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
+        return found, np.stack(spreads, axis=1)
+
+    def _found_of(self, sensors: Sequence[Sensor]) -> tuple[Array, Array, Array]:
+        """`found`, and the numbers of dwells and of false alarms that it rests on, (S,)."""
         P, rate = declared_values(sensors).T[1:]
         left = np.maximum(1.0 - (1.0 - KEEP) * self.turns, _LEFT)
         dwells, alarms = self.dwells.sum(axis=1) + _DWELLS * left, self.alarms + _SCANS * left * rate
         seen = (self.hits.sum(axis=1) + _DWELLS * left * P) / dwells
         # beside a filter's cautious predictions alone, noise looks smaller than it is
         factors = self.factors if len(sensors) > 1 else np.maximum(self.factors, 1.0)
-        values = [factors, seen, alarms / (self.turns + _SCANS * left)]
-        spreads = [self.spreads, 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
-        return np.stack(values, axis=1), np.stack(spreads, axis=1)
+        return np.stack([factors, seen, alarms / (self.turns + _SCANS * left)], axis=1), dwells, alarms
 
     def by_range(self, seen: Array) -> tuple[Array, Array]:
-        """Detection probabilities by bands of range, and standard deviations of their log odds, (S, B) each.
+        """Detection probabilities by bands of range, (S, B), and the information about their log odds, (S, B, B).
 
         The log odds of a band are about those of its neighbours, and, more loosely, about those of the sensor, `seen`
         (S,) at all ranges; they are the likeliest ones by Newton's method, from those in use.
@@ -116,13 +125,7 @@ class Estimates(NamedTuple):
             weights = _BY_RANGE + (self.dwells * P * (1.0 - P))[:, :, None] * np.eye(BANDS)
             slope = self.hits - self.dwells * P - (odds - middle) @ _BY_RANGE
             odds = np.clip(odds + np.linalg.solve(weights, slope[..., None])[..., 0], -_ODDS, _ODDS)
-        spreads = np.sqrt(np.diagonal(np.linalg.inv(weights), axis1=1, axis2=2))
-        return 1.0 / (1.0 + np.exp(-odds)), spreads
-
-    @property
-    def spreads(self) -> Array:
-        """Standard deviations of the factors' logarithms, (S,)."""
-        return np.sqrt(np.diagonal(np.linalg.inv(self.weights)))
+        return 1.0 / (1.0 + np.exp(-odds)), weights
 
     @property
     def agile(self) -> tuple[float, float]:
@@ -147,7 +150,7 @@ class Estimates(NamedTuple):
 
     def heard(self, sensors: Sequence[Sensor], alarms: Array, turns: Array) -> Estimates:
         """Count measurements of no target in so many turns, (S,) each."""
-        rates, evidence = self.found(sensors)[0][:, ALARMS], self.evidence.copy()
+        rates, evidence = self.found(sensors)[:, ALARMS], self.evidence.copy()
         evidence[:, ALARMS] += gain_of_rates(alarms, turns, rates, declared_values(sensors)[:, ALARMS])
         return self._replace(alarms=self.alarms + alarms, turns=self.turns + turns, evidence=evidence)
 
@@ -167,7 +170,7 @@ class Estimates(NamedTuple):
             for counts in (open_hits, open_dwells)
         )
         open_hits[again] = open_dwells[again] = 0.0
-        seen, evidence = self.found(sensors)[0][:, DETECTION], self.evidence.copy()
+        seen, evidence = self.found(sensors)[:, DETECTION], self.evidence.copy()
         P = declared_values(sensors)[:, DETECTION]
         evidence[:, DETECTION] += gain_of_shares(done_hits.sum(axis=1), done_dwells.sum(axis=1), seen, P)
         of_range = gain_of_shares(done_hits, done_dwells, self.by_range(seen)[0], seen[:, None])
@@ -190,7 +193,7 @@ class Estimates(NamedTuple):
 
     def settled(self, sensors: Sequence[Sensor]) -> Estimates:
         """The estimates with what is to be used from now on."""
-        found, declared, before = self.found(sensors)[0], declared_values(sensors), self.used
+        found, declared, before = self.found(sensors), declared_values(sensors), self.used
         # less noise than declared does no harm
         found[:, NOISE] = np.maximum(found[:, NOISE], 1.0)
         chosen = np.where(trusted(self.evidence[:, :RANGES], before != declared), found, declared)
@@ -199,9 +202,11 @@ class Estimates(NamedTuple):
         of_sensor = np.broadcast_to(used[:, DETECTION, None], self.bands.shape)
         differ = (self.bands != before[:, DETECTION, None]).any(axis=1)
         by_range = trusted(self.evidence[:, RANGES], differ) & [bool(reach(sensor)) for sensor in sensors]
-        seen = self.by_range(found[:, DETECTION])[0]
-        still = differ & ~_moved(_odds(seen), _odds(self.bands)).any(axis=1)
-        bands = np.where(by_range[:, None], np.where(still[:, None], self.bands, seen), of_sensor)
+        bands = of_sensor.copy()
+        if by_range.any():
+            seen = self.by_range(found[:, DETECTION])[0]
+            still = differ & ~_moved(_odds(seen), _odds(self.bands)).any(axis=1)
+            bands = np.where(by_range[:, None], np.where(still[:, None], self.bands, seen), of_sensor)
         if (used[:, NOISE] > before[:, NOISE]).any():
             # what looked like manoeuvres may have been noise
             return self._replace(used=used, bands=bands, manoeuvres=1.0, agility=np.zeros(len(FACTORS)))

@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.sensors import Radar2D, Radar3D
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.echoes import AZIMUTH, CHANCE, FRESH, HITS, MISSES, RANGE, SQUARE, STRAYS, Echoes
-from assoc.tracking.records.track import Step, rows_of_ids, taken_by
+from assoc.tracking.records.track import Step, among, rows_of_ids, taken_by
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.coverage import dwells
 
@@ -46,11 +46,13 @@ def hide_echoes(progress: Progress) -> Progress:
     plots, seen = taken_by(tracks.track_id, step.assigned), dwells(progress, tracks.states)
     if len(echoes.ids):
         echoes = _counted(progress, echoes, tracks, plots, seen)
+    assert progress.before is not None
+    fresh = ~among(tracks.track_id, progress.before.track_id)
     for s in radars:
-        echoes = _begun(progress, echoes, tracks, plots, s)
+        echoes = _begun(progress, echoes, tracks, plots, fresh, s)
     echoes = _weighed(progress, echoes, tracks)
-    hidden = np.isin(state.tracks.track_id, echoes.hidden)
-    kept = state.tracks.with_confirmed(state.tracks.confirmed & ~hidden)
+    shown = state.tracks.confirmed & ~among(state.tracks.track_id, echoes.hidden)
+    kept = state.tracks.with_confirmed(shown)
     return progress.with_state(echoes=echoes, tracks=kept)._replace(step=_without(step, echoes.hidden))
 
 
@@ -92,16 +94,17 @@ def _counted(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Arra
     return echoes._replace(counts=counts)
 
 
-def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, s: int) -> Echoes:
-    """Add pairs of young tracks and those at whose range or azimuth a plot of sensor s lies."""
+def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array, fresh: Array, s: int) -> Echoes:
+    """Add pairs of young tracks and those at whose range or azimuth a plot of sensor s lies.
+
+    Those are `fresh`, bool (T,), that began in this scan.
+    """
     here = np.flatnonzero(plots[:-1, s])
     # what may be an echo of one target may turn to the echo of another
-    open = np.isin(tracks.track_id[here], echoes.ids[:, 0])
+    open = among(tracks.track_id[here], echoes.ids[:, 0])
     young, here = here[(tracks.hits[here] <= _YOUNG) | open], here[tracks.hits[here] > 1]
     if not len(young) or not len(here):
         return echoes
-    assert progress.before is not None
-    fresh = ~np.isin(tracks.track_id, progress.before.track_id)
     z, sensor = progress.scan.measurements[s], progress.settings.sensors[s]
     low, width = sensor.field_of_view[:2, 0], np.diff(sensor.field_of_view[:2], axis=1)[:, 0]
     expected, tied = echoes.expected.copy(), np.zeros(len(tracks) + 1)
@@ -200,7 +203,7 @@ def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
     """Decide which tracks are hidden, and forget pairs that are decided."""
     echo, target = (rows_of_ids(tracks.track_id, ids) for ids in echoes.ids.T)
     odds, confirmed = _log_odds(progress, echoes, tracks), np.append(tracks.confirmed, False)
-    above = (odds > _HIDDEN) & confirmed[target] & (confirmed[echo] | np.isin(echoes.ids[:, 0], echoes.hidden))
+    above = (odds > _HIDDEN) & confirmed[target] & (confirmed[echo] | among(echoes.ids[:, 0], echoes.hidden))
     # echoes have no echoes of their own; the surest first
     rows, theirs, sure = {}, set[int](), np.flatnonzero(above)
     for row in sure[np.argsort(-odds[sure], kind="stable")].tolist():
@@ -209,17 +212,19 @@ def _weighed(progress: Progress, echoes: Echoes, tracks: TrackBatch) -> Echoes:
             rows[one] = row
             theirs.add(other)
     hidden, found = np.array(sorted(rows), dtype=np.int64), echoes.found.copy()
-    new = [rows[one] for one in hidden[~np.isin(hidden, echoes.hidden)].tolist()]
+    new = [rows[one] for one in hidden[~among(hidden, echoes.hidden)].tolist()]
     np.add.at(found, tuple(echoes.kinds[new].T), 1.0)
     # tracks are taken for targets when they are young no more
     grown = tracks.confirmed & (tracks.hits == _YOUNG + 1) & (tracks.missed == 0)
-    targets = echoes.targets + np.count_nonzero(~np.isin(tracks.track_id[grown], hidden))
+    targets = echoes.targets + np.count_nonzero(~among(tracks.track_id[grown], hidden))
     echoes = echoes._replace(hidden=hidden, found=found, targets=float(targets))
     return echoes.of((odds > _TARGET) | (np.append(tracks.hits, 0)[echo] <= _YOUNG))
 
 
 def _without(step: Step, hidden: Array) -> Step:
     """The step with these tracks not confirmed."""
+    if not len(hidden):
+        return step
 
     def flags(confirmed: tuple[Array, ...], assigned: tuple[Array, ...]) -> tuple[Array, ...]:
         return tuple(sure & ~np.isin(ids, hidden) for sure, ids in zip(confirmed, assigned, strict=True))

@@ -67,9 +67,11 @@ def _came_down(settings: TrackerSettings, tracks: TrackBatch, time: float) -> Ar
     if len(velocities) < 3 or not len(missed):
         return down
     states, floor = tracks.states[missed], settings.scene.region[2, 0]
-    where, spread = places_of(settings.filter, states)
-    height, climb = where[:, 2], states.mean[:, velocities[2]]
+    height, climb = states.mean[:, [settings.filter.motion.position[2], velocities[2]]].T
     # where the floor is wrong, targets are detected below it
     above = height - climb * (time - tracks.last_detection[missed]) >= floor
-    down[missed] = above & (height + _SURELY * np.sqrt(spread[:, 2, 2]) < floor)
+    below = np.flatnonzero(above & (height < floor))
+    if len(below):
+        spread = places_of(settings.filter, states[below])[1]
+        down[missed[below]] = height[below] + _SURELY * np.sqrt(spread[:, 2, 2]) < floor
     return down

@@ -11,6 +11,7 @@ from assoc.costs.tracks.gating import near_pairs
 from assoc.filters.base import Expected
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.initiation import velocity_components
+from assoc.tracking.records.track import among
 from assoc.tracking.records.track_batch import TrackBatch
 
 # how much likelier a position is where an old track was than anywhere in the region
@@ -24,7 +25,7 @@ def name_parents(progress: Progress) -> Progress:
     assert progress.association is not None
     every, known = progress.state.tracks, progress.association.tracks
     sure = known.track_id[known.confirmed]
-    if np.isin(every.track_id[every.confirmed], sure).all():
+    if among(every.track_id[every.confirmed], sure).all():
         return progress
     tracks = progress.settings.method.current(progress.state)
     old = np.isin(tracks.track_id, sure)

@@ -21,7 +21,7 @@ from assoc.problem import AssignmentProblem
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.life_cycle import OVERLOOKED
-from assoc.tracking.records.track import renamed
+from assoc.tracking.records.track import among, renamed
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.stages.echoes import rather_echoes
 
@@ -40,17 +40,19 @@ def take_up(progress: Progress) -> Progress:
     method, step, known = progress.settings.method, progress.step, progress.association.tracks
     lost, every = _predicted(progress), progress.state.tracks
     sure, gone = known.track_id[known.confirmed], every.confirmed & (every.missed > 0) & (every.existence < 0.0)
-    if len(lost) or gone.any() or not np.isin(every.track_id[every.confirmed], sure).all():
+    if len(lost) or gone.any() or not among(every.track_id[every.confirmed], sure).all():
         tracks = method.current(progress.state)
         # single false alarms score less
         likely = (tracks.missed == 0) & (tracks.score > 0.0)
         likely &= ~rather_echoes(progress, tracks)
-        new = tracks[(tracks.confirmed | likely) & ~np.isin(tracks.track_id, sure)]
-        coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
-        # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
-        left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
-        old = TrackBatch.concatenate([lost, coasting, left])
-        start, end = _matched(progress, new, old, len(left)) if len(new) and len(old) else (np.zeros(0, np.int64),) * 2
+        new = tracks[(tracks.confirmed | likely) & ~among(tracks.track_id, sure)]
+        start = end = np.zeros(0, np.int64)
+        if len(new):
+            coasting = tracks[tracks.confirmed & (tracks.missed > 0)]
+            # trees of one target take turns in the best hypothesis of a multiple hypothesis tracker
+            left = _best(known[known.confirmed & ~np.isin(known.track_id, tracks.track_id)])
+            old = TrackBatch.concatenate([lost, coasting, left])
+            start, end = _matched(progress, new, old, len(left)) if len(old) else (start, end)
         if len(start):
             ids, names = new.track_id[start], old.track_id[end]
             state = method.renamed(progress.state, ids, names)

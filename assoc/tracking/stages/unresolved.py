@@ -37,7 +37,7 @@ from assoc.filters.measurement import periods_of
 from assoc.sensors import Sensor
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.records.initiation import velocity_components
-from assoc.tracking.records.track import renamed
+from assoc.tracking.records.track import among, renamed
 from assoc.tracking.records.track_batch import TrackBatch
 from assoc.tracking.records.unresolved import SURE, Shared
 from assoc.tracking.stages.coverage import dwells
@@ -57,7 +57,7 @@ def share(progress: Progress) -> Progress:
     known = progress.state.unresolved
     tracks = progress.settings.method.current(progress.state)
     sure = known.ids[known.apart >= SURE]
-    sure = sure[np.isin(sure, tracks.track_id).all(axis=1)]
+    sure = sure[among(sure, tracks.track_id).all(axis=1)]
     if not len(sure):
         return progress
     # the tracks of pairs alone, and their rows
