@@ -190,7 +190,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
     from assoc.recordings.recording import joined
     from assoc.tracking import TrackTable
     from assoc.tracking.offline.plots import PlotTracks, follow, track_plots
-    from assoc.tracking.target_kinds import SCANS, score_of
+    from assoc.tracking.target_kinds import SCANS, evidence_in
 
     given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
     kind, identity = "ASTERIX files" if kind_of(file) == "asterix" else "tables", given["identity"] or "score-only"
@@ -213,9 +213,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any], outputs: ExitSt
 
     def evidence(other: Given) -> float:
         tracker = made(other)
-        for _ in follow(tracker, itertools.islice(windows, SCANS), forget=True):
-            pass
-        return score_of(tracker)
+        return evidence_in(tracker, follow(tracker, itertools.islice(windows, SCANS), forget=True))
 
     tracker = made(given)
     # these show all tracks at once

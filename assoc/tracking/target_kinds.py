@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from assoc.errors import InvalidInputError
@@ -66,14 +66,19 @@ def slower_kind(speed: float, evidence: Callable[[str], float]) -> str:
     return best if best and found[best] > 0 else ""
 
 
-def score_of(tracker: Any) -> float:
-    """Sum of the scores of the confirmed tracks: how much likelier the measurements are with these targets."""
-    return float(sum(track.score for track in tracker.tracks if track.confirmed))
+def evidence_in(tracker: Any, steps: Iterable[object]) -> float:
+    """What the confirmed tracks score over the steps of a tracker: how much likelier these targets make the plots.
+
+    Tracks that ended count, and what a track scored before it began anew under its number: else one sharp turn near
+    the end would count against a kind all that it had explained.
+    """
+    scores = dict[tuple[int, float], float]()
+    for _ in steps:
+        scores |= {(track.track_id, track.started): float(track.score) for track in tracker.tracks if track.confirmed}
+    return sum(scores.values())
 
 
 def evidence_of(tracker: Any, scene: Scene) -> float:
     """What the confirmed tracks of a scene's first scans score."""
-    for k in range(min(scene.num_scans, SCANS)):
-        scan = scene.scan(k)
-        tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
-    return score_of(tracker)
+    scans = map(scene.scan, range(min(scene.num_scans, SCANS)))
+    return evidence_in(tracker, (tracker.step(one.time, one.measurements, one.times, one.sectors) for one in scans))

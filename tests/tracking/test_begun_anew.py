@@ -6,6 +6,7 @@ import pytest
 from assoc.sensors import PositionSensor
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.filter_choice import two_speeds
+from assoc.tracking.target_kinds import evidence_in
 
 RADAR = PositionSensor(
     position=[0.0, 0.0, 0.0], noise=[6.0, 6.0], detection_probability=0.9, false_alarm_rate=3.0,
@@ -50,3 +51,21 @@ def test_a_track_that_is_likelier_than_a_new_one_goes_on():
     step(tracker, 6.8, [12.0, 0.0], False)
     (later,) = tracker.tracks
     assert later.track_id == track.track_id and later.started == 0.0 and later.score > 0.0
+
+
+@pytest.mark.parametrize(("aside", "number"), [(44.0, 1), (60.0, 2)])
+def test_what_a_track_scored_before_it_began_anew_is_evidence(aside, number):
+    """It keeps its number, or another takes its place, where a target jumps: a kind of targets had explained both."""
+    tracker, rng, before = make("nearest-neighbour"), np.random.default_rng(1), []
+
+    def steps():
+        for k in range(40):
+            step(tracker, 1.7 * k, [3.4 * k - 150.0, aside * (k > 30)] + rng.normal(0.0, 6.0, 2), False)
+            before.append(tracker.tracks[0].score)
+            yield
+
+    evidence = evidence_in(tracker, steps())
+    (track,) = tracker.tracks
+    assert track.track_id == number and track.started > 50.0 and track.score < 50.0
+    # a miss or two before
+    assert before[30] + track.score - 12.0 < evidence < before[30] + track.score
