@@ -8,7 +8,6 @@ together are put into different lists: the colours of a greedy colouring.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,29 +17,24 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
 
-class Relations(NamedTuple):
-    """What the tuples of a problem stand for."""
+def links_of(solution: Solution, lists: list[Array], sources: int) -> Array:
+    """The links of a solution, a source and a target each, int (K, 2); two of a division and of a merger.
 
-    lists: list[Array]
-    """Points of each list, sources before targets."""
-    sources: int
-    """Number of lists of sources."""
-
-    def of(self, solution: Solution) -> Array:
-        """The links of a solution, a source and a target each, int (K, 2); two of a division and of a merger."""
-        links: list[tuple[int, int]] = []
-        if len(self.lists) == 2:
-            taken = solution.tuples[solution.tuples.all(axis=1)] - 1
-            return np.column_stack([self.lists[0][taken[:, 0]], self.lists[1][taken[:, 1]]])
-        for row in solution.tuples[np.count_nonzero(solution.tuples, axis=1) > 1].tolist():
-            ends = [self.lists[s][index - 1] for s, index in enumerate(row) if index]
-            cut = sum(index > 0 for index in row[: self.sources])
-            links += [(one, other) for one in ends[:cut] for other in ends[cut:]]
-        return np.array(links, dtype=np.int64).reshape(-1, 2)
+    ``lists`` are the points of each list of the problem, of which the first ``sources`` are of sources.
+    """
+    links: list[tuple[int, int]] = []
+    if len(lists) == 2:
+        taken = solution.tuples[solution.tuples.all(axis=1)] - 1
+        return np.column_stack([lists[0][taken[:, 0]], lists[1][taken[:, 1]]])
+    for row in solution.tuples[np.count_nonzero(solution.tuples, axis=1) > 1].tolist():
+        ends = [lists[s][index - 1] for s, index in enumerate(row) if index]
+        cut = sum(index > 0 for index in row[:sources])
+        links += [(one, other) for one in ends[:cut] for other in ends[cut:]]
+    return np.array(links, dtype=np.int64).reshape(-1, 2)
 
 
-def lineage_problem(points: Points, pairs: Pairs, costs: LinkCosts) -> tuple[AssignmentProblem, Relations]:
-    """The problem of all candidates that cost less than their points alone."""
+def lineage_problem(points: Points, pairs: Pairs, costs: LinkCosts) -> tuple[AssignmentProblem, list[Array], int]:
+    """The problem of all candidates that cost less than their points alone; what `links_of` takes of it."""
     count, (start, end) = len(points.places), costs.of_end()
     price = costs.of_links(pairs)
     near = pairs.within(1)
@@ -71,7 +65,7 @@ def lineage_problem(points: Points, pairs: Pairs, costs: LinkCosts) -> tuple[Ass
             tuples[rows, cut + targets[one]] = place[1, one]
         blocks.append(tuples)
     problem = AssignmentProblem(np.concatenate(blocks), np.concatenate(prices), [len(one) for one in lists])
-    return problem, Relations(lists, cut)
+    return problem, lists, cut
 
 
 def _forks(near: Pairs, ends: Array, price: float | None, saved: float) -> tuple[Array, Array]:

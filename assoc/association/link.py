@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from assoc._parameters import is_number, is_whole, positive
 from assoc._types import Array
-from assoc.association.lineages import lineage_problem, numbered
+from assoc.association.lineages import lineage_problem, links_of, numbered
 from assoc.association.link_costs import LinkCosts, Points, candidates, learnt, velocities
 from assoc.errors import InvalidInputError
 from assoc.sensors.arrays import finite_array
@@ -139,9 +139,9 @@ def _linked(points: Points, moved: Array, costs: LinkCosts, predict: bool) -> tu
     # first how far particles move in a frame, from links of consecutive ones
     used = pairs.within(1) if estimated else pairs
     for _ in range(_ROUNDS):
-        problem, relations = lineage_problem(points, used, costs)
+        problem, lists, sources = lineage_problem(points, used, costs)
         solution = assign(problem)
-        chosen, before, settled = relations.of(solution), costs, True
+        chosen, before, settled = links_of(solution, lists, sources), costs, True
         if not (predict or estimated):
             break
         costs, used = learnt(costs, used.of(chosen), points), pairs
