@@ -31,6 +31,11 @@ def test_programs_and_registry_load_no_compiler(module):
     assert not loaded & {"numba", "scipy", "pandas", "ortools", "rich"}
 
 
+def test_trackers_load_no_statistics():
+    """They take as long to import as all else: a program that starts again is to go on within seconds."""
+    assert "scipy.stats" not in printed("-W", "error", "-c", "import assoc.tracking, sys; print(*sys.modules)").split()
+
+
 def test_public_names_resolve():
     for package in (assoc, assoc.plotting, importlib.import_module("assoc.plotting.report"), assoc.sweeps):
         assert {*package.__all__} <= {*dir(package)}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom, nbinom
 
 from assoc import track
 from assoc._files.npz import save_npz
@@ -14,7 +15,7 @@ from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.progress import Progress, Work
-from assoc.tracking.records.extents import SPREADS, Extents
+from assoc.tracking.records.extents import SPREADS, Extents, binomial, gamma_poisson
 from assoc.tracking.stages.extents import _scatter
 from assoc.tracking.stages.gathering import gather
 from assoc.tracking.step import check
@@ -177,3 +178,11 @@ def test_programs_track_ships_with_several_plots(tmp_path, capsys):
     assert "3 with several plots each" in capsys.readouterr().out
     assert track.main([*words, "--extended", "--no-adapt"]) == 2
     assert "--extended: nothing is estimated with --no-adapt" in capsys.readouterr().err
+
+
+def test_numbers_of_plots_are_those_of_scipy():
+    number, points, P = np.arange(30.0)[:, None, None], np.arange(1.0, 25.0)[:, None], np.array([0.3, 0.9, 1.0])
+    np.testing.assert_allclose(binomial(number, points, P), binom.pmf(number, points, P), rtol=1e-10, atol=1e-300)
+    for shape, rate in ((1.0, 1.0), (3.7, 9.0), (200.0, 61.0)):
+        expected = nbinom.pmf(np.arange(30.0), shape, rate / (1.0 + rate))
+        np.testing.assert_allclose(gamma_poisson(np.arange(30.0), shape, rate), expected, rtol=1e-9)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import binom, nbinom
+from scipy.special import comb, gammaln
 
 from assoc._types import Array
 from assoc.tracking.records.track import rows_of_ids
@@ -32,6 +32,18 @@ _ONE, _DWELLS, _KEPT = 1.15, 10.0, 0.95
 _MANY, _SHARES, _OTHER = np.arange(1.0, 25.0), np.array([0.85, 1.0]), 0.02
 # and how many there must be, or it is targets that are missed
 _SEVERAL = 1.5
+
+
+def binomial(number: Array, points: Array, P: Array) -> Array:
+    """Probability of a number of plots of so many points, each detected with P. (scipy.stats takes long to import.)"""
+    missed = np.maximum(points - number, 0.0)
+    return np.asarray(comb(points, number) * P**number * (1.0 - P) ** missed)
+
+
+def gamma_poisson(number: Array, shape: float, rate: float) -> Array:
+    """Probability of a Poisson number of plots whose mean has a gamma distribution of this shape and rate."""
+    ways = gammaln(number + shape) - gammaln(number + 1.0) - gammaln(shape)
+    return np.asarray(np.exp(ways + shape * np.log(rate / (rate + 1.0)) - number * np.log(rate + 1.0)))
 
 
 class Extents(NamedTuple):
@@ -115,9 +127,9 @@ class Extents(NamedTuple):
         evidence, places = self.evidence.copy(), self.places.copy()
         counts, dwells, points = self.plots.copy(), self.dwells.copy(), self.points.copy()
         number = np.round(plots)
-        several = (1.0 - _OTHER) * binom.pmf(number[:, None, None], _MANY[:, None], P * _SHARES) + _OTHER / len(_MANY)
+        several = (1.0 - _OTHER) * binomial(number[:, None, None], _MANY[:, None], P * _SHARES) + _OTHER / len(_MANY)
         likelihood = (points[row, s] * several).sum(axis=(1, 2))
-        target = nbinom.pmf(number, 1.0 + counts[row, s], (1.0 + dwells[row, s]) / (2.0 + dwells[row, s]))
+        target = gamma_poisson(number, 1.0 + counts[row, s], 1.0 + dwells[row, s])
         # tracks that are where no target is are no sign of an extent
         places[row] = np.minimum(places[row] + np.clip(ratio, -_MOST, _MOST), 0.0)
         evidence[row] += np.log((1.0 - _OTHER) * target + _OTHER / len(_MANY)) - np.log(likelihood)
