@@ -186,6 +186,8 @@ def read_lines(
 def _line(line: bytes, where: str, longest: int, fallback: str, *, first: bool) -> str:
     if len(line) > longest:
         raise InvalidInputError(f"{where} is longer than {longest} bytes")
+    if first and line.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InvalidInputError(f"{where} is UTF-16, expected UTF-8: save it so")
     if b"\0" in line:
         raise InvalidInputError(f"{where} holds a NUL byte, expected text (UTF-8)")
     try:

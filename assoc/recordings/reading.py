@@ -133,6 +133,8 @@ class PlotReader:
         try:
             columns_of, said = choose(found.header, self._columns, self._units)
         except InvalidInputError as error:
+            if len(found.header) == 1 and not hint:
+                hint = "; expected columns between commas, semicolons or tabs"
             raise InvalidInputError(f"{self.file}: {error}{hint}") from None
         of_row = {
             meaning: unit_of(meaning, found.units[k]) for meaning, k in columns_of.items() if k < len(found.units)

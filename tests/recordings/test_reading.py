@@ -150,6 +150,11 @@ def test_a_wrong_time_neither_moves_nor_delays_the_plots_after_it(tmp_path, cloc
         (HEAD + "1,2\n\n,2,3,4,5\n", "holds no plots: 2 rows without time, range or bearing left out"),
         (HEAD + "1,٢,3,4,5\n", "line 2, column 'range': expected a number"),
         (HEAD + "1,2,3,4," + "5" * 20_000, "line 2 is longer than 10000 bytes"),
+        (
+            HEAD.replace(",", " ") + "1 2 3 4 5\n",
+            "no column time .* expected columns between commas, semicolons or tabs",
+        ),
+        (HEAD.encode("utf-16"), "line 1 is UTF-16, expected UTF-8: save it so"),
         (HEAD + "1,185200,3,4,5\n" * 10, "column 'range': 185200 nmi are 342,990 km: metres. .name the column range_m"),
         (HEAD.encode() + b"1,2,3,4,5\n1,\x00,3,4,5\n", "line 3 holds a NUL byte, expected text .UTF-8.$"),
         (bytes([48, 0, 9, 0x80, 25, 201, 0, 0, 1]), "line 1 holds a NUL byte.*asterix.read_asterix"),
