@@ -158,10 +158,10 @@ def _of_scans(scene: Scene, given: Given, settings: dict[str, Any], pace: float,
     return Tracked(tracker, tracks, tracked, None, count, scene.num_scans, again=again)
 
 
-def _again(given: Given, evidence: Callable[[Given], float]) -> Callable[[str], float] | None:
+def _again(given: Given, evidence: Callable[[Given], float]) -> Callable[[str | None], float] | None:
     """What the tracks of another kind of targets score, by its name; None where the kind or the speed was given."""
 
-    def of(kind: str) -> float:
+    def of(kind: str | None) -> float:
         other = copy.copy(given)
         other["targets"] = kind
         return evidence(other)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
@@ -56,14 +57,15 @@ def target_kind(name: str, scene: Scene | None, make: Callable[..., Any]) -> Tar
     return TARGETS[max(evidence, key=lambda kind: evidence[kind])]
 
 
-def slower_kind(speed: float, evidence: Callable[[str], float]) -> str:
-    """The kind slower than a prior of this speed, m/s, with the most evidence for its tracks; "" if none has any.
+def slower_kind(speed: float, evidence: Callable[[str], float], least: float = 0.0) -> str:
+    """The kind slower than a prior of this speed, m/s, with the most evidence for its tracks; "" if none has so much.
 
-    A prior that is wide beside the region leaves slow targets without a track, so that no speed of theirs is known.
+    A prior that is wide beside the region leaves slow targets without a track, or makes many of false alarms, so that
+    no speed of theirs is known. The prior itself has `least`.
     """
     found = {kind: evidence(kind) for kind, priors in TARGETS.items() if 2.0 * priors.speed < speed}
     best = max(found, key=lambda kind: found[kind], default="")
-    return best if best and found[best] > 0 else ""
+    return best if best and found[best] > least else ""
 
 
 def evidence_in(tracker: Any, steps: Iterable[object]) -> float:
@@ -72,10 +74,20 @@ def evidence_in(tracker: Any, steps: Iterable[object]) -> float:
     Tracks that ended count, and what a track scored before it began anew under its number: else one sharp turn near
     the end would count against a kind all that it had explained.
     """
-    scores = dict[tuple[int, float], float]()
+    lives = defaultdict[int, list[tuple[float, float, float]]](list)
     for _ in steps:
-        scores |= {(track.track_id, track.started): float(track.score) for track in tracker.tracks if track.confirmed}
-    return sum(scores.values())
+        for track in tracker.tracks:
+            if track.confirmed:
+                lives[track.track_id].append((track.started, track.time, float(track.score)))
+    total = 0.0
+    for life in lives.values():
+        began, _, score = life[-1]
+        total += score
+        for started, time, score in reversed(life):
+            # from where it began anew on, its plots are of its new score
+            if time < began:
+                began, total = started, total + score
+    return total
 
 
 def evidence_of(tracker: Any, scene: Scene) -> float:

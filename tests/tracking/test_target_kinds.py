@@ -56,6 +56,27 @@ def test_where_nothing_is_tracked_the_end_says_which_slower_targets_would_be(tmp
     assert "2 confirmed tracks" in told and "slower" not in told
 
 
+def test_short_tracks_of_false_alarms_say_so(tmp_path, capsys):
+    """One drone in a region of four kilometres, a scan in ten seconds: a prior of 300 m/s joins what is nothing."""
+    times, view = 10.0 * np.arange(40), [[0, 6000], [-np.pi, np.pi], [-0.05, 1.5]]
+    path = np.column_stack([5.0 * times - 1000.0, 200.0 * np.sin(times / 120.0), np.full(40, 120.0)])
+    radars = [
+        Radar3D(position=place, noise=[5.0, 3e-3, 3e-3], false_alarm_rate=3.0, field_of_view=view)
+        for place in ([-1600.0, -1000.0, 0.0], [1400.0, 1200.0, 0.0])
+    ]
+    region = [[-2e3, 2e3], [-2e3, 2e3], [0, 400]]
+    rng = np.random.default_rng(3)
+    observe(radars, times, [np.zeros(1, int)] * 40, list(path[:, None]), rng, region=region).save(tmp_path / "one.npz")
+    words = [str(tmp_path / "one.npz"), "-o", str(tmp_path / "tracks.csv")]
+    assert track.main(words) == 0
+    told = capsys.readouterr().out
+    slower = told.partition("tracks are short: targets look slower than assumed: --targets ")[2].split("\n")[0]
+    assert TARGETS[slower].speed < 20.0
+    assert track.main([*words, "--targets", slower]) == 0
+    told = capsys.readouterr().out
+    assert ": 1 confirmed track" in told and "slower" not in told
+
+
 def test_auto_tells_aircraft_from_boats():
     assert target_kind("auto", harbour(1), NearestNeighbourTracker.for_scene).speed <= TARGETS["ship"].speed
     aircraft = simulation.simulate("three-radar", 1, scans=8)

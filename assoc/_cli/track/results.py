@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from assoc.tracking.offline.plots import PlotTracks
 
 
+# confirmed tracks of fewer scans on average may be of false alarms
+_SHORT = 10
+
+
 class Tracked(NamedTuple):
     """Tracks of a scene or of plots, and how many of all scans were tracked."""
 
@@ -37,7 +41,7 @@ class Tracked(NamedTuple):
     """Files that they lack."""
     finish: Callable[[], object] | None = None
     """Writes the rest of tracks that were written as they ended."""
-    again: Callable[[str], float] | None = None
+    again: Callable[[str | None], float] | None = None
     """Score of the tracks that the first scans give with targets of another kind; None where the kind was given."""
     tall: bool = False
     """Whether a description of radars leaves open how high targets are."""
@@ -155,7 +159,8 @@ def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float,
 
     tracker, rows = found.tracker, found.table
     name = "stdout" if output == STDOUT else printable(output)
-    print_lines(f"{name}: {len(rows.confirmed_ids())} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
+    count = len(rows.confirmed_ids())
+    print_lines(f"{name}: {count} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
     each = 1e3 * elapsed / max(found.num_tracked, 1)
     # several trackers never need the solver, or only for the rest of their own search
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
@@ -170,11 +175,13 @@ def _print_counts(output: str, found: Tracked, elapsed: float, compiling: float,
         print_lines(note)
     if health is not None and health.speed and not check:
         print_lines(health.speed)
-    elif found.again is not None and not rows.confirmed_ids():
-        slower = slower_kind(float(np.max(tracker.settings.initiation.speed)), found.again)
+    elif found.again is not None and len(rows) < _SHORT * max(count, 1):
+        least = found.again(None) if count else 0.0
+        slower = slower_kind(float(np.max(tracker.settings.initiation.speed)), found.again, least)
         if slower:
-            print_lines(f"no track: targets look slower than assumed: --targets {slower}")
-        elif note is not None and found.tall:
+            what = "tracks are short" if count else "no track"
+            print_lines(f"{what}: targets look slower than assumed: --targets {slower}")
+        elif note is not None and found.tall and not count:
             print_lines("no track: where targets are low, 'heights = [lowest, highest]' in the description says so")
 
 
