@@ -12,6 +12,7 @@ from assoc.sensors.base import wrap_angle
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
+from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.prequential import trusted
 from tests.sizes import sample
 from tests.tracking.learning import REGION, TARGETS, group, planar, radars, scene_of, tracked, with_returns
@@ -185,6 +186,21 @@ def test_biases_and_clocks_are_found_and_taken_out():
     assert found[0]["azimuth"] - found[1]["azimuth"] == pytest.approx(0.01, abs=0.003)
     assert found[2]["time"] == pytest.approx(1.0, abs=0.2) and found[0]["time"] == pytest.approx(0.0, abs=0.2)
     assert "azimuth" in tracker.health.sensors[0].verdict and "s late" in tracker.health.sensors[2].verdict
+
+
+def test_biases_that_drift_are_followed_and_stay_where_nothing_is_measured():
+    """Ten metres a scan, of noise of 30 m: without lag; afterwards no farther than the damped drift goes, then back."""
+    rng, sensors = np.random.default_rng(4), radars()[:1]
+    biases, information = Biases.none(sensors), np.diag([30.0**-2, 0.0, 0.0, 0.0])
+    for k in range(60):
+        seen = 10.0 * k + rng.normal(0.0, 30.0)
+        biases = biases.after(sensors, information, information[:, 0] * (seen - biases.used[0]))
+    # a memory of ten scans that knows no drift is 100 m behind
+    assert biases.used[0] == pytest.approx(600.0, abs=40.0)
+    for _ in range(100):
+        biases = biases.after(sensors, 0.0 * information, 0.0 * information[:, 0])
+        assert 0.0 <= biases.used[0] < 1100.0
+    assert biases.used[0] < 700.0
 
 
 def test_a_sensor_that_is_off_misses_nothing():
