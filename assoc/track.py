@@ -9,6 +9,8 @@ import copy
 import itertools
 import math
 import os
+import shlex
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
@@ -19,7 +21,7 @@ from assoc._cli.biases import print_biases
 from assoc._cli.lines import print_lines
 from assoc._cli.messages import messages
 from assoc._cli.options import Given, Parser
-from assoc._cli.program import Program
+from assoc._cli.program import Program, command, prepare_streams
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.signals import EarlyEnd
 from assoc._cli.track.options import (
@@ -38,6 +40,7 @@ from assoc._cli.track.results import Judged, Tracked, write_and_print
 from assoc._files.output import is_stream
 from assoc._files.reading import kind_of
 from assoc._system.compile_time import compile_seconds
+from assoc._text.plain import printable
 from assoc.errors import InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
@@ -51,6 +54,32 @@ if TYPE_CHECKING:
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
+
+
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as the whole process."""
+    prepare_streams()
+    program, words = _program(arguments)
+    return program.start(words)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    program, words = _program(arguments)
+    return program.main(words)
+
+
+def _program(arguments: Sequence[str] | None) -> tuple[Program, list[str]]:
+    """Return the called program and its words: `assoc.live` for ``--live``, its former name."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if "--live" not in words:
+        return Program("assoc.track", _track, _EARLY_END.on_signals), words
+    from assoc.live import PROGRAM
+
+    words.remove("--live")
+    called = printable(f"{command('live')} {shlex.join(words)}")
+    print(f"assoc.track: warning: --live is a program of its own now: {called}", file=sys.stderr, flush=True)
+    return PROGRAM, words
 
 
 def _track(words: list[str]) -> None:
@@ -313,9 +342,6 @@ def parser() -> Parser:
     """Return the parser with all options."""
     return with_further(track_parser())
 
-
-PROGRAM = Program("assoc.track", _track, _EARLY_END.on_signals)
-start, main = PROGRAM.start, PROGRAM.main
 
 if __name__ == "__main__":
     raise SystemExit(start())

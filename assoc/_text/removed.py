@@ -56,7 +56,6 @@ REMOVED: dict[str, str] = {
     "assoc.registration.OnlineRegistration": "trackers find biases by themselves while they track, with adapt=True",
     "Tracker.registration": "see Tracker.health, which tells the biases that measurements are corrected for",
     "register(drift)": "trackers follow biases that drift by themselves, with adapt=True",
-    "assoc.track --live": "use assoc live, a program of its own with these options",
     "assoc.track --jobs": _ONE_PROCESS,
     "assoc.track --scheduler": _ONE_PROCESS,
     "assoc.sweep --plot": "write --heatmap FILE.png --convergence FILE.png",
