@@ -1,5 +1,7 @@
 """Places of clutter that trackers find: farms, shores, turbines; not formations, nor ships at anchor."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -53,6 +55,12 @@ def test_density_of_clutter_by_place(alarms):
     # five in 50 x 50 m against one in 1000 x 1000 m
     assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
     assert not alone.used_and_found([sensor], there)[1][0].any()
+    # of many measurements all, with evidence for a place about them, and some in turn without
+    many = Scan(30, 30.0, (rng.uniform(10.0, 40.0, (200, 2)),))
+    assert patch.used_and_found([sensor], many)[0][0].all()
+    unsure = replace(patch, votes=tuple(0.0 * votes for votes in patch.votes))
+    weighed = np.count_nonzero(unsure.used_and_found([sensor], many)[1][0])
+    assert 40 < weighed <= 64
 
 
 def test_no_track_starts_in_a_closed_area():

@@ -31,8 +31,8 @@ from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
 from assoc.tracking.records.prequential import NEEDED
 
-_TURNS, _PLOTS = 10.0, 30_000
-"""Plots are kept for so many turns, and at most so many of a sensor: where a tenth comes in a turn, no place shows."""
+_TURNS, _PLOTS = 10.0, 16_000
+"""Plots are kept for so many turns, and at most so many of a sensor: with an eighth in one turn no place shows."""
 # of so many neighbours, and this many of a turn may be of targets; the density follows from so many others
 _LOOKED_AT, _TARGETS, _OTHERS = 64, 3, 6
 # a site so many standard deviations away adds less than floats can tell
@@ -50,6 +50,8 @@ YOUNG = float(math.ceil(-math.log2(1.0 - _SURE)) - 1)
 """With fewer turns before no place is sure: what is dense may be targets that fly together."""
 ONE_SAYS = 0.5 * NEEDED
 """Largest vote: no measurement alone shows that a place predicts better than tracks, it may be of a new target."""
+# where no place shows so many measurements of a scan are weighed; one shows by the nearest so many gains
+_WEIGHED, _GAINS = 64, 16
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
 # a plot is of a site if it lies where so many of a target's would; of the nearest so many sites
@@ -146,10 +148,16 @@ class ClutterMap:
         ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
         usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
         least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
+        # tracks know too little of the first turns
+        told = votes * (clocks >= YOUNG - 1.0)
         tree, near_by = self._trees[s], (_OTHERS / (least * usual)) ** (1.0 / d)
         # few places are dense: only there many neighbours are sought
         farther = np.asarray(tree.query(at, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
         dense = np.flatnonzero(farther < near_by)
+        if before >= YOUNG:
+            # where no place shows, as in crowds, some in turn tell whether one is there
+            some = (np.arange(len(dense)) + round(now)) % max(math.ceil(len(dense) / _WEIGHED), 1) == 0
+            dense = dense[some | _near_gains(at[dense], places, told, 2.0 * near_by, around)]
         if not len(dense):
             return result, result
         # among so many are enough others, whatever their turns; in eights, as numpy sums: zeros change nothing then
@@ -192,12 +200,12 @@ class ClutterMap:
             sure = (flicker_ratio(sites, clocks, P, now)[near] * within).sum(axis=1) > -NEEDED
             used[dense] = ((votes[near] * within).sum(axis=1) >= 0.0) & sure
             return np.where(used, result, 0.0), result
-        # tracks know too little of the first turns
-        told = votes * (clocks >= YOUNG - 1.0)
         if told[told > 0.0].sum() > NEEDED:
             about = np.asarray(tree.query(at[dense], min(_LOOKED_AT, len(places)))[1])
-            flickers = flicker_ratio(sites, clocks, P, None)
-            used[dense] = (told[about].sum(axis=1) > NEEDED) & (flickers[about].sum(axis=1) > 0.0)
+            shown = told[about].sum(axis=1) > NEEDED
+            if shown.any():
+                flickers = flicker_ratio(sites, clocks, P, None)
+                used[dense] = shown & (flickers[about].sum(axis=1) > 0.0)
         return np.where(used, result, 0.0), result
 
     def after(
@@ -294,6 +302,15 @@ def flicker_ratio(sites: Array, clocks: Array, probability: float, now: float | 
     target = hits * math.log(probability) + np.bincount(site, np.maximum(gap * math.log1p(-probability), _SILENT))
     flicker = betaln(hits + 1.0, missed + 1.0) + np.log(betainc(hits + 1.0, missed + 1.0, most) / most)
     return np.asarray(((flicker - target) / count)[row])
+
+
+def _near_gains(at: Array, places: Array, told: Array, apart: float, around: Any) -> Array:
+    """Whether the evidence of plots for a place, so near or nearer, might suffice, were there none against it; (n,)."""
+    gained = told > 0.0
+    if not len(at) or not gained.any():
+        return np.zeros(len(at), dtype=np.bool_)
+    near = np.asarray(_tree(places[gained], around).query(at, _GAINS, distance_upper_bound=apart)[1])
+    return np.asarray(np.append(told[gained], 0.0)[near].sum(axis=1) > NEEDED)
 
 
 def _nearer_of_turn(turn: Array) -> Array:
