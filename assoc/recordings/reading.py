@@ -146,7 +146,7 @@ class PlotReader:
         notes = Counter[str]()
         if left := not_read(found.header, columns_of):
             notes[f"columns not read ({left})"] = len(found.header) - len(columns_of)
-        clean, doubts, step = None, _Doubts(units, self.file, table), scale["time"]
+        clean, doubts, step = None, _Doubts(units, "range" in said, self.file, table), scale["time"]
         for rows in table.of_frames(found.content) if parquet else table.of_lines(found.content, found.done):
             doubts.see(rows)
             with np.errstate(over="ignore"):
@@ -244,10 +244,10 @@ def _frames(file: Path, at_once: int) -> _Found:
 
 
 class _Doubts:
-    """Warns of ranges, bearings and codes that are hardly in their units; refuses a file with few possible ranges."""
+    """Warns of ranges, bearings and codes that are hardly in their units; refuses ranges in metres without a unit."""
 
-    def __init__(self, units: Mapping[str, str], file: Path, table: TableRows) -> None:
-        self._units, self._file, self._table = units, file, table
+    def __init__(self, units: Mapping[str, str], stated: bool, file: Path, table: TableRows) -> None:
+        self._units, self._stated, self._file, self._table = units, stated, file, table
         self._count, self._farthest, self._least, self._most = 0, 0.0, math.inf, -math.inf
 
     def see(self, rows: Array) -> None:
@@ -258,14 +258,16 @@ class _Doubts:
         self._least = min(self._least, float(np.nanmin(bearings, initial=math.inf)))
         self._most = max(self._most, float(np.nanmax(bearings, initial=-math.inf)))
         known = rows[np.isfinite(rows[:, RANGE]), RANGE]
-        if len(known) >= _ENOUGH and np.median(known) * UNITS["range"][self._units["range"]] > _REACH:
+        far = len(known) >= _ENOUGH and np.median(known) * UNITS["range"][self._units["range"]] > _REACH
+        # radars that watch satellites see as far: if the file says so, it is so
+        if far and not self._stated:
             raise InvalidInputError(self._too_far())
 
     def _too_far(self) -> str:
         unit, metres = self._units["range"], self._farthest * UNITS["range"][self._units["range"]]
-        other = "another unit?" if unit == "m" else "metres? (name the column range_m, or set the unit of range to m)"
         column = f"{self._file}: column {self._table.names['range']!r}"
-        return f"{column}: {self._farthest:.6g} {unit} are {metres / 1000:,.0f} km: {other}"
+        told = "metres? (name the column range_m, or set the unit of range to m)"
+        return f"{column}: {self._farthest:.6g} {unit} are {metres / 1000:,.0f} km: {told}"
 
     def tell(self) -> None:
         """Warn, once all rows are seen."""

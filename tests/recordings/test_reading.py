@@ -171,6 +171,14 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path, text, message):
     assert len(str(error.value)) < 400
 
 
+@pytest.mark.parametrize(("unit", "far"), [("km", 2000), ("m", 2_000_000)])
+@pytest.mark.filterwarnings("ignore")
+def test_ranges_as_far_as_satellites_are_read_where_their_unit_is_stated(tmp_path, unit, far):
+    rows = "".join(f"{k},{far},{k},4,5\n" for k in range(20))
+    path = written(tmp_path, HEAD.replace("range", f"range_{unit}") + rows)
+    assert read_plots(path).measurements[:, 0] == pytest.approx(2e6)
+
+
 def test_what_is_written_is_read_back(tmp_path):
     recording = circling()
     write_plots(tmp_path / "out.csv", recording)
