@@ -127,7 +127,7 @@ def _solve(
         if step and (np.abs(change) < 1e-3 * np.sqrt(np.diagonal(inverse))).all():
             break
     # the sandwich estimator holds even if the sensors' stated noise is wrong; between the slopes at the estimate, which
-    # weights that depend on the fit make flatter than the information: with it deviations were 9 % too small
+    # weights that depend on the fit make flatter than the information: deviations by that would be too small
     slope = sums.slope + prior
     if np.linalg.eigvalsh(problem.spreads[:, None] * slope * problem.spreads).min() > 0.0:
         inverse = np.linalg.inv(slope)
