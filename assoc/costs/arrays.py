@@ -132,11 +132,13 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
     index = (np.arange(len(z)) - start[owner] + 1).astype(np.int32)
     ends = zip(start.tolist(), start[1:].tolist(), sensors.dim.tolist(), sensors.code.tolist(), strict=False)
     for (low, high, dim, code), measured in zip(ends, scan.measurements, strict=True):
-        z[low:high, :dim] = measured[:, :dim]
-        if code == BEARING:
-            azimuth = math.pi - np.mod(math.pi - measured[:, 0], 2 * math.pi)
-            order = np.argsort(azimuth, kind="stable")
-            z[low:high, 0], index[low:high] = azimuth[order], order + 1
+        if code != BEARING:
+            z[low:high, :dim] = measured[:, :dim]
+            continue
+        azimuth = math.pi - np.mod(math.pi - measured[:, 0], 2 * math.pi)
+        order = np.argsort(azimuth, kind="stable")
+        z[low:high, :dim], index[low:high] = measured[order], order + 1
+        z[low:high, 0] = azimuth[order]
     centre, spread, information = convert(sensors, z, owner, reach, least)
     return ScanArrays(z, owner, start, centre, spread, information), index
 
