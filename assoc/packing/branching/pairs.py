@@ -155,7 +155,7 @@ def _try(
     trials: Trials,
     which: tuple[Any, bool],
     effort: Effort,
-) -> Any:
+) -> tuple[int, float]:
     """Try one side of a pair; how it ended, and the bound from the multipliers (but for rounding)."""
     pair, joined = which
     count = answer(cols, allowed, pair, joined, trials.side)
@@ -211,7 +211,7 @@ def decide(
 
 
 @lean_inner_njit
-def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> Any:
+def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> tuple[int, int]:
     """Return two rows that some columns have together and others do not; -1, -1 if there are none.
 
     Without such a pair columns that share a row are equal, and the lightest of each kind can be taken.
@@ -279,7 +279,7 @@ def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, co
 @lean_inner_njit
 def part_certain(
     program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
-) -> Any:
+) -> tuple[int, int]:
     """Choose the certain pair that costs the most to have apart; return as `decide`.
 
     -1 if every pair is decided: columns with one of its rows have the other one, too.

@@ -142,7 +142,7 @@ def _fill_pivots(pricing: Pricing, count: int, least: float) -> None:
 
 
 @lean_inner_njit
-def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
+def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> tuple[int, float]:
     """The variable that first limits the step of the multipliers, and the step; -1 if none does.
 
     Fills ``entries`` with the row of the tableau, of the listed columns and the slacks.
@@ -254,7 +254,7 @@ def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float
 
 # Non-negative floats have the same order as their bits read as integers. Compilers vectorise the minimum of integers
 # without branches; for floats they may not, because of NaN.
-@lean_inner_njit
+@inner_njit
 def position_of_smallest(bits: NDArray[np.int64], count: int) -> int:
     """Index of the smallest of the first ``count`` numbers, given as their bits; ``count`` if that is 0."""
     least = np.int64(2**63 - 1)
@@ -266,7 +266,7 @@ def position_of_smallest(bits: NDArray[np.int64], count: int) -> int:
     return index
 
 
-@lean_inner_njit
+@inner_njit
 def position_of_largest(bits: NDArray[np.int64], count: int) -> int:
     """Index of the largest of the first ``count`` numbers, given as their bits; -1 if all are 0."""
     most = np.int64(0)

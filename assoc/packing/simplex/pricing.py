@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import lean_inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._types import Floats
 from assoc.packing.simplex.program import Allowed, Program
 
@@ -56,7 +56,7 @@ def new_pricing(program: Program) -> Pricing:
     )  # fmt: skip
 
 
-@lean_inner_njit
+@inner_njit
 def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
     """List the allowed columns."""
     codes, columns, positions = pricing.codes, pricing.column, pricing.position
