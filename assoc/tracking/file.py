@@ -218,8 +218,8 @@ def _clutter(settings: TrackerSettings, model: ClutterMap, saved: Saved) -> Clut
         saved.require(np.isfinite(value).all(), name, "finite numbers")
     good = saved["clock"].shape == model.clock.shape and (saved["clock"] >= 0).all()
     saved.require(good, "clock", f"turns of {len(model.clock)} sensors")
-    for s, places in enumerate(model.places):
-        count, width = len(saved[f"places.{s}"]), places.shape[1]
+    for s, own in enumerate(model.plots):
+        count, width = len(saved[f"places.{s}"]), own.places.shape[1]
         saved.require(saved[f"places.{s}"].shape[1] == width, f"places.{s}", f"rows of {width} components")
         part = settings.sensors[s].position_part
         # in units of the noise; what turns is searched for in a circle, the squares of the rest must be numbers

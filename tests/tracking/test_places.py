@@ -55,12 +55,31 @@ def test_density_of_clutter_by_place(alarms):
     # five in 50 x 50 m against one in 1000 x 1000 m
     assert inside == pytest.approx(np.log(2000.0), abs=0.7) and outside == 0.0
     assert not alone.used_and_found([sensor], there)[1][0].any()
-    # of many measurements all, with evidence for a place about them, and some in turn without
+    # of many measurements all, with evidence for a place about them, and some at times without, if plots are many
     many = Scan(30, 30.0, (rng.uniform(10.0, 40.0, (200, 2)),))
     assert patch.used_and_found([sensor], many)[0][0].all()
-    unsure = replace(patch, votes=tuple(0.0 * votes for votes in patch.votes))
-    weighed = np.count_nonzero(unsure.used_and_found([sensor], many)[1][0])
-    assert 40 < weighed <= 64
+    unsure = replace(patch, plots=tuple(replace(own, votes=0.0 * own.votes) for own in patch.plots))
+    weighed = [
+        np.count_nonzero(replace(unsure, clock=np.array([turn])).used_and_found([sensor], many)[1][0])
+        for turn in range(30, 36)
+    ]
+    assert weighed == [200] * 6 if alarms == 1 else 40 < weighed[0] <= 64 and not any(weighed[1:])
+
+
+def test_what_stands_is_weighed_among_many():
+    """A point with a plot in every turn, among 200 that move, wherever in the crowd others are weighed."""
+    sensor = PositionSensor(
+        position=np.zeros(3), noise=[1.0, 1.0], false_alarm_rate=1.0, field_of_view=[[0.0, 1e3], [0.0, 1e3]]
+    )
+    rng, known, visits = np.random.default_rng(6), ClutterMap.empty([sensor]), []
+    for k in range(49):
+        plots = np.concatenate([[[400.0, 300.0]] + rng.normal(size=(1, 2)), rng.uniform(0.0, 600.0, (200, 2))])
+        weighed = known.used_and_found([sensor], Scan(k, float(k), (plots,)))[1][0] > 0.0
+        if k > 20 and weighed.any():
+            visits.append((weighed[0], np.count_nonzero(weighed), plots[weighed][1:, 0].max() < 400.0))
+        known = known.after([sensor], Scan(k, float(k), (plots,)), np.ones(1))
+    stands, count, elsewhere = zip(*visits, strict=True)
+    assert len(visits) == 5 and all(stands) and max(count) < 70 and any(elsewhere)
 
 
 def test_no_track_starts_in_a_closed_area():
@@ -114,7 +133,7 @@ def test_plots_are_of_the_point_they_come_back_to(middle):
         z[:, 1] = wrap_angle(z[:, 1])
         known = known.after([sensor], Scan(k, float(k), (z,)), np.ones(1))
         truth += seen.tolist()
-    pairs = set(zip(known.sites[0].tolist(), truth, strict=True))
+    pairs = set(zip(known.plots[0].sites.tolist(), truth, strict=True))
     assert len(pairs) == len({site for site, _ in pairs}) == len({point for _, point in pairs}) == 6
 
 

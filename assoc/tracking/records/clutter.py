@@ -20,7 +20,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,6 +28,7 @@ from scipy.special import betainc, betaln, gammaincinv
 from assoc._types import Array
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
+from assoc.tracking.records.neighbours import Cells, cells_of, near
 from assoc.tracking.records.prequential import NEEDED
 
 _TURNS, _PLOTS = 10.0, 16_000
@@ -50,67 +50,234 @@ YOUNG = float(math.ceil(-math.log2(1.0 - _SURE)) - 1)
 """With fewer turns before no place is sure: what is dense may be targets that fly together."""
 ONE_SAYS = 0.5 * NEEDED
 """Largest vote: no measurement alone shows that a place predicts better than tracks, it may be of a new target."""
-# where no place shows so many measurements of a scan are weighed; one shows by the nearest so many gains
-_WEIGHED, _GAINS = 64, 16
+# where no place shows so many measurements are weighed in one of so many turns, and as many about sites with so many
+# plots: what moves seldom has such
+_WEIGHED, _EVERY, _STANDS = 64, 6, 4
+# as evidence count so many of the plots about one
+_MOST = 256
+# multiples of it, without the whole, come near to all numbers from 0 to 1 soon
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # returns of one point are no denser than noise lets them be
 _NEAREST = 1.0
-# a plot is of a site if it lies where so many of a target's would; of the nearest so many sites
-_OWN, _SITES = 0.99, 8
+# a plot is of a site if it lies where so many of a target's would; of so many sites at most
+_OWN, _SITES = 0.99, 16
 # a target falls silent for longer, or is hidden, once in a hundred turns
 _SILENT = -math.log(100.0)
+# what is saved of each sensor
+_SAVED = ("places", "clocks", "votes", "sites")
 
 
-Points = tuple[Array, Array, Array, Array]
+@dataclass(frozen=True, eq=False)
+class Plots:
+    """The last plots of a sensor, in the order in which they came."""
+
+    places: Array
+    """In units of the noise, azimuths from 0 to a full turn; (n, d)."""
+    clocks: Array
+    """Turns of the sensor when they came; (n,)."""
+    votes: Array
+    """Evidence of each plot that its place predicted it better than tracks did; (n,)."""
+    sites: Array
+    """Number of the point to which each plot came back, from 0 without gaps; (n,)."""
+    around: Array
+    """After how many units each component comes back, 0: never; (d,)."""
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The places, to be searched for neighbours."""
+        return _tree(self.places, self.around)
+
+    @cached_property
+    def points(self) -> tuple[Array, Array]:
+        """Of each site how many plots, and their mean."""
+        sites, places, period = self.sites, self.places, self.around
+        count = np.bincount(sites)
+        first = np.zeros(len(count), dtype=np.int64)
+        first[sites[::-1]] = np.arange(len(sites))[::-1]
+        mean, later = places[first], np.flatnonzero(first[sites] != np.arange(len(sites)))
+        own = sites[later]
+        off = _off(places[later], mean[own], period)
+        mean += np.stack([np.bincount(own, column, len(count)) for column in off.T], axis=1) / count[:, None]
+        turning = period > 0.0
+        # twice: what is hardly below 0 comes to a full turn
+        mean[:, turning] = np.mod(np.mod(mean[:, turning], period[turning]), period[turning])
+        return count, mean
+
+    @cached_property
+    def told(self) -> Array:
+        """The votes, without those of the first turns, of which tracks know too little; (n,)."""
+        return np.where(self.clocks >= YOUNG - 1.0, self.votes, 0.0)
+
+    @cached_property
+    def _cells(self) -> dict[float, Cells]:
+        """Of all plots by a side, and of those that are evident by minus a side: they are asked for again."""
+        return {}
+
+    def with_fresh(self, at: Array, votes: Array, clock: float) -> Plots:
+        """These and plots at such places with such votes, now; without those that are too old or too many."""
+        clocks = np.concatenate([self.clocks, np.full(len(at), clock)])
+        last = slice(max(int(np.searchsorted(clocks, clock - _TURNS)), len(clocks) - _PLOTS), None)
+        pairs = (self.places, at), (self.votes, votes), (self.sites, self._found_at(at))
+        places, said, sites = (np.concatenate(pair)[last] for pair in pairs)
+        return Plots(places, clocks[last], said, _without_gaps(sites), self.around)
+
+    def _found_at(self, at: Array) -> Array:
+        """Sites of the plots ``at`` in a scan, given those of all before: numbers, the same or new ones, (n,).
+
+        No two of a scan are of one; those that more plots came back to are likelier, as tables of a Chinese restaurant
+        are.
+        """
+        d, none = at.shape[1], int(self.sites.max(initial=-1)) + 1
+        fresh = none + np.arange(len(at))
+        if not none or not len(at):
+            return fresh
+        count, mean = self.points
+        gate = 2.0 * gammaincinv(0.5 * d, _OWN)
+        found, square, some = near(cells_of(mean, self.around, math.sqrt(2.0 * gate)), at, _SITES)
+        who, which = np.nonzero(np.arange(_SITES) < some[:, None])
+        site, square = found[who, which], square[who, which]
+        spread = 1.0 + 1.0 / count[site]
+        within = np.flatnonzero(square <= gate * spread)
+        who, site, spread = who[within], site[within], spread[within]
+        fit = square[within] / spread + d * np.log(spread) - 2.0 * np.log(count[site])
+        order, free = np.argsort(fit, kind="stable"), np.ones(none, dtype=np.bool_)
+        for one, its in zip(who[order].tolist(), site[order].tolist(), strict=True):
+            if fresh[one] >= none and free[its]:
+                free[its] = False
+                fresh[one] = its
+        return fresh
+
+    def densities(self, sensor: Sensor, at: Array, now: float, visit: float) -> tuple[Array, Array]:
+        """See `ClutterMap.used_and_found`: of places ``at`` in this turn; the visit is for `_to_weigh`."""
+        places, clocks, sites = self.places, self.clocks, self.sites
+        n, part = len(at), sensor.position_part
+        result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        before = int(min(round(now), _TURNS))
+        age, turns = np.rint(now - clocks), max(before, 1)
+        # plots are kept in order; where few turns are left of them, as in crowds, no place can be sure
+        known = np.count_nonzero(np.diff(age)) + 1
+        if len(places) <= _OTHERS or not n or known - (age[-1] == 0.0) < _NEEDED[before]:
+            return result, result
+        d = part.dim
+        # volume of a ball of radius 1, and false alarms there in these turns
+        ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
+        usual = part.false_alarm_rate / part.volume * float(np.prod(_units(sensor))) * turns * ball
+        least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
+        near_by = (_OTHERS / (least * usual)) ** (1.0 / d)
+        # few places are dense: only there many neighbours are sought
+        dense = self._to_weigh(at, near_by, visit if before > YOUNG else None)
+        if not len(dense):
+            return result, result
+        apart, about = (np.asarray(a) for a in self.tree.query(at[dense], min(_LOOKED_AT, len(places))))
+        # among so many are enough others, whatever their turns; in eights, as numpy sums: zeros change nothing then
+        most = 8 * math.ceil((known * _TARGETS + _OTHERS) / 8.0)
+        close = about[:, :most]
+        turn = age[close]
+        nearer = _nearer_of_turn(turn)
+        others = np.cumsum(nearer >= _TARGETS, axis=1)
+        last = np.argmax(others == _OTHERS, axis=1)
+        within = np.arange(close.shape[1]) <= last[:, None]
+        hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
+        often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
+        if not len(often):
+            return result, result
+        dense, apart, about, close, within, last = (a[often] for a in (dense, apart, about, close, within, last))
+        radius = np.maximum(apart[np.arange(len(dense)), last], _NEAREST)
+        # the volume of an ellipsoid as they lie: many places are flat
+        off = _off(places[close], at[dense, None], self.around)
+        spread = (off * (within / (last[:, None] + 1.0))[:, :, None]).swapaxes(1, 2) @ off * (d + 2.0)
+        size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
+        ratio = (last + 1) / (size * usual)
+        denser = np.flatnonzero(ratio > least)
+        if not len(denser):
+            return result, result
+        dense, apart, about, close, within, ratio = (a[denser] for a in (dense, apart, about, close, within, ratio))
+        standing = self._of_sites(at[dense], apart, about) * ball / usual
+        result[dense] = np.log(np.maximum(np.maximum(ratio, standing), 1.0))
+        P, told = sensor.detection_probability, self.told
+        if before < YOUNG:
+            # of what is about the place, nothing: targets that fly alone are predicted well, and close by
+            sure = (flicker_ratio(sites, clocks, P, now)[close] * within).sum(axis=1) > -NEEDED
+            used[dense] = ((self.votes[close] * within).sum(axis=1) >= 0.0) & sure
+            return np.where(used, result, 0.0), result
+        if told[told > 0.0].sum() > NEEDED:
+            shown = told[about].sum(axis=1) > NEEDED
+            if shown.any():
+                flickers = flicker_ratio(sites, clocks, P, None)
+                used[dense] = shown & (flickers[about].sum(axis=1) > 0.0)
+        return np.where(used, result, 0.0), result
+
+    def _of_sites(self, at: Array, apart: Array, about: Array) -> Array:
+        """Densities ``at`` places of the sites of the plots ``about`` them, so far apart: those far off add nothing."""
+        adds = apart < _FAR
+        some = 8 * math.ceil(np.count_nonzero(adds, axis=1).max() / 8.0)
+        adds, about = adds[:, :some], about[:, :some]
+        count, middle = self.points
+        square = (_off(middle[self.sites[about]], at[:, None], self.around) ** 2).sum(axis=2)
+        spread = 1.0 + 1.0 / count[self.sites[about]]
+        each = np.exp(-0.5 * square / spread) * (2.0 * math.pi * spread) ** (-0.5 * at.shape[1])
+        return np.where(adds, each, 0.0).sum(axis=1)
+
+    def _to_weigh(self, at: Array, near_by: float, visit: float | None) -> Array:
+        """Rows of ``at`` about which plots are dense: enough of them are nearer than this.
+
+        In crowds, of many places and many plots in a turn, those with evidence for a place. Whether one shows elsewhere
+        some tell at a visit (0 to 1): those about what stands, and others side by side, from this share of all on;
+        below 0 there is none. Without a number all are weighed.
+        """
+        if near_by not in self._cells:
+            self._cells[near_by] = cells_of(self.places, self.around, near_by)
+        dense = np.flatnonzero(near(self._cells[near_by], at, _OTHERS + 1)[2] > _OTHERS)
+        if len(dense) <= _WEIGHED or len(self.places) <= _WEIGHED * _TURNS or visit is None:
+            return dense
+        weighed = self._evident(at[dense], 2.0 * near_by)
+        if visit >= 0.0:
+            count, mean = self.points
+            stands = near(cells_of(mean[count >= _STANDS], self.around, _GATE), at[dense], 1)[2] > 0
+            order = np.argsort(at[dense, 0], kind="stable")
+            weighed[np.flatnonzero(stands)[:_WEIGHED]] = True
+            weighed[order[np.arange(_WEIGHED) + int(visit * len(dense)) - len(dense)]] = True
+        return dense[weighed]
+
+    def _evident(self, at: Array, apart: float) -> Array:
+        """Whether a plot so near, or nearer, has gained, and all that are as near to it together, surely; (n,)."""
+        if -apart not in self._cells:
+            places, told = (known[self.told != 0.0] for known in (self.places, self.told))
+            gained = places[told > 0.0]
+            found, _, count = near(cells_of(places, self.around, apart), gained, _MOST)
+            sums = np.where(np.arange(_MOST) < count[:, None], told[found] if len(told) else 0.0, 0.0).sum(axis=1)
+            self._cells[-apart] = cells_of(gained[sums > NEEDED], self.around, apart)
+        return np.asarray(near(self._cells[-apart], at, 1)[2] > 0)
 
 
 @dataclass(frozen=True, eq=False)
 class ClutterMap:
     """The last plots of S sensors."""
 
-    places: tuple[Array, ...]
-    """In units of the noise, azimuths from 0 to a full turn; (n_s, d_s) each."""
-    clocks: tuple[Array, ...]
-    """Turns of the sensor when they came; (n_s,) each."""
+    plots: tuple[Plots, ...]
+    """Those of each sensor."""
     clock: Array
     """Turns of each sensor so far, (S,)."""
-    votes: tuple[Array, ...]
-    """Evidence of each plot that its place predicted it better than tracks did; (n_s,) each."""
-    sites: tuple[Array, ...]
-    """Number of the point to which each plot came back, (n_s,) each."""
-
-    around: tuple[Any, ...]
-    """After how many units each component comes back, 0: never; (d_s,) each."""
-
-    @cached_property
-    def _trees(self) -> tuple[cKDTree, ...]:
-        return tuple(map(_tree, self.places, self.around))
-
-    @cached_property
-    def _points(self) -> tuple[Points, ...]:
-        """`_middles` of each sensor's sites."""
-        return tuple(map(_middles, self.sites, self.places, self.around))
 
     @staticmethod
     def empty(sensors: Sequence[Sensor]) -> ClutterMap:
         """No plots."""
-        none = [np.zeros((0, sensor.position_part.dim)) for sensor in sensors]
-        nothing = tuple(np.zeros(0) for _ in sensors)
-        around = tuple(map(_around, sensors))
-        return ClutterMap(tuple(none), nothing, np.zeros(len(sensors)), nothing, nothing, around)
+        none, nothing = np.zeros(0), np.zeros(0, dtype=np.int64)
+        plots = (Plots(np.zeros((0, s.position_part.dim)), none, none, nothing, _around(s)) for s in sensors)
+        return ClutterMap(tuple(plots), np.zeros(len(sensors)))
 
     def arrays(self) -> dict[str, Array]:
         """Everything as plain arrays."""
-        found = {f"places.{s}": array for s, array in enumerate(self.places)}
-        for name, arrays in (("clocks", self.clocks), ("votes", self.votes), ("sites", self.sites)):
-            found |= {f"{name}.{s}": array for s, array in enumerate(arrays)}
+        found = {f"{name}.{s}": getattr(own, name) for name in _SAVED for s, own in enumerate(self.plots)}
         return found | {"clock": self.clock}
 
     def restored(self, arrays: Mapping[str, Array]) -> ClutterMap:
         """The map, of as many sensors as this one, from the `arrays` of another."""
-        sensors = range(len(self.places))
-        names = ("places", "clocks", "votes", "sites")
-        places, clocks, votes, sites = (tuple(arrays[f"{name}.{s}"] for s in sensors) for name in names)
-        return ClutterMap(places, clocks, arrays["clock"], votes, sites, self.around)
+        plots = []
+        for s, own in enumerate(self.plots):
+            places, clocks, votes, sites = (arrays[f"{name}.{s}"] for name in _SAVED)
+            plots.append(Plots(places, clocks, votes, np.unique(sites, return_inverse=True)[1], own.around))
+        return ClutterMap(tuple(plots), arrays["clock"])
 
     def used_and_found(
         self, sensors: Sequence[Sensor], scan: Scan, elsewhere: Sequence[Array] | None = None
@@ -127,86 +294,12 @@ class ClutterMap:
                 # what reports by itself, and does not look, returns no clutter of a place
                 found.append((np.zeros(len(at)), np.zeros(len(at))))
             else:
-                found.append(self._densities(sensor, s, at))
+                now = float(self.clock[s])
+                visits, since = divmod(round(now) + 2 * s, _EVERY)
+                visit = visits * _GOLDEN % 1.0 if since == 0 else -1.0
+                found.append(self.plots[s].densities(sensor, at, now, visit))
         used, every = zip(*found, strict=True)
         return used, every
-
-    def _densities(self, sensor: Sensor, s: int, at: Array) -> tuple[Array, Array]:
-        """See `used_and_found`: of these places ``at``."""
-        places, clocks, votes, sites = (known[s] for known in (self.places, self.clocks, self.votes, self.sites))
-        now = float(self.clock[s])
-        n, part = len(at), sensor.position_part
-        result, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        before = int(min(round(now), _TURNS))
-        age, turns = np.rint(now - clocks), max(before, 1)
-        # plots are kept in order; where few turns are left of them, as in crowds, no place can be sure
-        known = np.count_nonzero(np.diff(age)) + 1
-        if len(places) <= _OTHERS or not n or known - (age[-1] == 0.0) < _NEEDED[before]:
-            return result, result
-        units, d, around = _units(sensor), part.dim, self.around[s]
-        # volume of a ball of radius 1, and false alarms there in these turns
-        ball = math.pi ** (d / 2.0) / math.gamma(d / 2.0 + 1.0)
-        usual = part.false_alarm_rate / part.volume * float(np.prod(units)) * turns * ball
-        least = max(_LEAST, _IN_GATE * turns / (_GATE**d * usual))
-        # tracks know too little of the first turns
-        told = votes * (clocks >= YOUNG - 1.0)
-        tree, near_by = self._trees[s], (_OTHERS / (least * usual)) ** (1.0 / d)
-        # few places are dense: only there many neighbours are sought
-        farther = np.asarray(tree.query(at, [_OTHERS + 1], distance_upper_bound=near_by)[0])[:, 0]
-        dense = np.flatnonzero(farther < near_by)
-        if before >= YOUNG:
-            # where no place shows, as in crowds, some in turn tell whether one is there
-            some = (np.arange(len(dense)) + round(now)) % max(math.ceil(len(dense) / _WEIGHED), 1) == 0
-            dense = dense[some | _near_gains(at[dense], places, told, 2.0 * near_by, around)]
-        if not len(dense):
-            return result, result
-        # among so many are enough others, whatever their turns; in eights, as numpy sums: zeros change nothing then
-        most = min(8 * math.ceil((known * _TARGETS + _OTHERS) / 8.0), len(places))
-        distance, near = (np.asarray(array) for array in tree.query(at[dense], most))
-        turn = age[near]
-        nearer = _nearer_of_turn(turn)
-        others = np.cumsum(nearer >= _TARGETS, axis=1)
-        last = np.argmax(others == _OTHERS, axis=1)
-        within = np.arange(near.shape[1]) <= last[:, None]
-        hits = ((nearer == 0) & within & (turn > 0)).sum(axis=1)
-        often = np.flatnonzero((others[:, -1] >= _OTHERS) & (hits >= _NEEDED[before]))
-        if not len(often):
-            return result, result
-        dense, distance, near, within, last = (array[often] for array in (dense, distance, near, within, last))
-        radius = np.maximum(distance[np.arange(len(dense)), last], _NEAREST)
-        # the volume of an ellipsoid as they lie: many places are flat
-        off = _off(places[near], at[dense, None], around)
-        spread = (off * (within / (last[:, None] + 1.0))[:, :, None]).swapaxes(1, 2) @ off * (d + 2.0)
-        size = np.minimum(np.sqrt(np.linalg.det(spread + _NEAREST**2 * np.eye(d))), radius**d)
-        ratio = (last + 1) / (size * usual)
-        denser = np.flatnonzero(ratio > least)
-        if not len(denser):
-            return result, result
-        dense, near, within, ratio = (array[denser] for array in (dense, near, within, ratio))
-        # or of the sites there: those far away add nothing
-        _, row, count, middle = self._points[s]
-        found = tree.query(at[dense], min(_LOOKED_AT, len(places)), distance_upper_bound=_FAR)
-        apart, about = (np.asarray(array) for array in found)
-        some = 8 * math.ceil(np.count_nonzero(np.isfinite(apart), axis=1).max() / 8.0)
-        apart, about = apart[:, :some], np.minimum(about[:, :some], len(places) - 1)
-        square = (_off(middle[row[about]], at[dense, None], around) ** 2).sum(axis=2)
-        spread = 1.0 + 1.0 / count[row[about]]
-        each = np.exp(-0.5 * square / spread) * (2.0 * math.pi * spread) ** (-0.5 * d)
-        standing = np.where(np.isfinite(apart), each, 0.0).sum(axis=1) * ball / usual
-        result[dense] = np.log(np.maximum(np.maximum(ratio, standing), 1.0))
-        P = sensor.detection_probability
-        if before < YOUNG:
-            # of what is about the place, nothing: targets that fly alone are predicted well, and near by
-            sure = (flicker_ratio(sites, clocks, P, now)[near] * within).sum(axis=1) > -NEEDED
-            used[dense] = ((votes[near] * within).sum(axis=1) >= 0.0) & sure
-            return np.where(used, result, 0.0), result
-        if told[told > 0.0].sum() > NEEDED:
-            about = np.asarray(tree.query(at[dense], min(_LOOKED_AT, len(places)))[1])
-            shown = told[about].sum(axis=1) > NEEDED
-            if shown.any():
-                flickers = flicker_ratio(sites, clocks, P, None)
-                used[dense] = shown & (flickers[about].sum(axis=1) > 0.0)
-        return np.where(used, result, 0.0), result
 
     def after(
         self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None
@@ -215,72 +308,35 @@ class ClutterMap:
 
         `votes` (n_s,) are those of its plots. Sensors that did not look have no turns to compare: they keep none.
         """
-        kept: list[tuple[Array, ...]] = []
+        kept = []
         votes = [np.zeros(len(z)) for z in scan.measurements] if votes is None else votes
-        for s, sensor in enumerate(sensors):
-            fresh = np.arange(len(votes[s]) if turns[s] > 0.0 else 0)
-            when = np.concatenate([self.clocks[s], np.full(len(fresh), self.clock[s])])
-            last = slice(max(int(np.searchsorted(when, self.clock[s] - _TURNS)), len(when) - _PLOTS), None)
-            at = _places(sensor, scan.measurements[s][fresh])
-            own = self._found_at(s, at)
-            pairs = (self.places[s], at), (self.votes[s], votes[s][fresh]), (self.sites[s], own)
-            places, said, sites = (np.concatenate(pair)[last] for pair in pairs)
-            kept.append((places, when[last], said, sites))
-        places_of_all, clocks, votes_of_all, sites_of_all = zip(*kept, strict=True)
-        return ClutterMap(places_of_all, clocks, self.clock + turns, votes_of_all, sites_of_all, self.around)
-
-    def _found_at(self, s: int, at: Array) -> Array:
-        """Sites of the sensor's plots ``at`` in a scan, given those of all before: numbers, the same or new ones, (n,).
-
-        No two of a scan are of one; those that more plots came back to are likelier, as tables of a Chinese restaurant
-        are.
-        """
-        d, around, sites = at.shape[1], self.around[s], self.sites[s]
-        none = float(sites.max(initial=0.0)) + 1.0
-        fresh = none + np.arange(len(at))
-        if not len(sites) or not len(at):
-            return fresh
-        number, _, count, mean = self._points[s]
-        gate = 2.0 * gammaincinv(0.5 * d, _OWN)
-        tree, most = _tree(mean, around), [*range(1, min(_SITES, len(number)) + 1)]
-        apart, near = (np.asarray(found) for found in tree.query(at, most, distance_upper_bound=math.sqrt(2.0 * gate)))
-        who, which = np.nonzero(np.isfinite(apart))
-        site, spread = near[who, which], 1.0 + 1.0 / count[near[who, which]]
-        square = apart[who, which] ** 2 / spread
-        fit = square + d * np.log(spread) - 2.0 * np.log(count[site])
-        free = np.ones(len(number), dtype=np.bool_)
-        for k in np.argsort(fit, kind="stable").tolist():
-            if square[k] <= gate and fresh[who[k]] >= none and free[site[k]]:
-                free[site[k]] = False
-                fresh[who[k]] = number[site[k]]
-        return fresh
+        for s, (own, sensor) in enumerate(zip(self.plots, sensors, strict=True)):
+            some = slice(None if turns[s] > 0.0 else 0)
+            at = _places(sensor, scan.measurements[s][some])
+            kept.append(own.with_fresh(at, votes[s][some], float(self.clock[s])))
+        return ClutterMap(tuple(kept), self.clock + turns)
 
 
 def _units(sensor: Sensor) -> Array:
     return np.sqrt(np.diagonal(sensor.position_part.covariance))
 
 
-def _around(sensor: Sensor) -> Any:
+def _around(sensor: Sensor) -> Array:
     """After how many units each component comes back, 0: never."""
     angular = sensor.position_part.angular
     pairs = zip(_units(sensor), angular, strict=False)
-    return [(2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in pairs][: sensor.position_part.dim]
+    found = [(2.0 * math.pi + 1e-9) / unit if turning else 0.0 for unit, turning in pairs]
+    return np.array(found[: sensor.position_part.dim])
 
 
-def _tree(places: Array, around: Any) -> cKDTree:
+def _tree(places: Array, around: Array) -> cKDTree:
     """Searched for neighbours; made in half the time, and hardly slower, for not being balanced."""
     return cKDTree(places, boxsize=around, balanced_tree=False, compact_nodes=False)
 
 
-def _middles(sites: Array, places: Array, around: Any) -> Points:
-    """Of each site its number; the row of each plot among these; and of each site how many plots, and their mean."""
-    number, first, row, count = np.unique(sites, return_index=True, return_inverse=True, return_counts=True)
-    off, period = _off(places, places[first][row], around), np.array(around)
-    mean = places[first] + np.stack([np.bincount(row, column) for column in off.T], axis=1) / count[:, None]
-    turning = period > 0.0
-    # twice: what is hardly below 0 comes to a full turn
-    mean[:, turning] = np.mod(np.mod(mean[:, turning], period[turning]), period[turning])
-    return number, row, count, mean
+def _without_gaps(sites: Array) -> Array:
+    """The same numbers of sites, from 0."""
+    return np.asarray(np.cumsum(np.bincount(sites) > 0)[sites] - 1)
 
 
 def flicker_ratio(sites: Array, clocks: Array, probability: float, now: float | None) -> Array:
@@ -304,15 +360,6 @@ def flicker_ratio(sites: Array, clocks: Array, probability: float, now: float | 
     return np.asarray(((flicker - target) / count)[row])
 
 
-def _near_gains(at: Array, places: Array, told: Array, apart: float, around: Any) -> Array:
-    """Whether the evidence of plots for a place, so near or nearer, might suffice, were there none against it; (n,)."""
-    gained = told > 0.0
-    if not len(at) or not gained.any():
-        return np.zeros(len(at), dtype=np.bool_)
-    near = np.asarray(_tree(places[gained], around).query(at, _GAINS, distance_upper_bound=apart)[1])
-    return np.asarray(np.append(told[gained], 0.0)[near].sum(axis=1) > NEEDED)
-
-
 def _nearer_of_turn(turn: Array) -> Array:
     """How many before each in its row are of the same turn, of neighbours by their distances (K, n)."""
     nearer = np.zeros(turn.shape, dtype=np.int64)
@@ -322,10 +369,10 @@ def _nearer_of_turn(turn: Array) -> Array:
     return nearer
 
 
-def _off(one: Array, other: Array, around: Any) -> Array:
+def _off(one: Array, other: Array, around: Array) -> Array:
     """Differences of places, the short way round."""
-    off, period = one - other, np.array(around)
-    return np.asarray(off - period * np.rint(off / np.where(period > 0.0, period, np.inf)))
+    off = one - other
+    return np.asarray(off - around * np.rint(off / np.where(around > 0.0, around, np.inf)))
 
 
 def _places(sensor: Sensor, measured: Array) -> Array:
