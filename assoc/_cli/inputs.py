@@ -1,15 +1,16 @@
-"""Input that programs read before their options: TOML files, and users' modules."""
+"""Input that programs read before their options: TOML files, and users' modules; several of its errors at once."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
 from assoc._files.reading import read_bytes
 from assoc._text.plain import one_line
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocError, InvalidInputError
 
 _LARGEST = 1_000_000
 
@@ -46,3 +47,10 @@ def import_modules(names: str | None) -> None:
             raise InvalidInputError(f"--import: {name} cannot be imported ({error})") from None
         except Exception as error:  # a user's module may raise anything
             raise InvalidInputError(f"--import: {name} cannot be imported ({type(error).__name__}: {error})") from None
+
+
+def with_others(errors: Sequence[AssocError]) -> AssocError:
+    """The first of several errors, which brings the others along, each a line of its own."""
+    for other in [*dict.fromkeys(map(str, errors))][1:]:
+        errors[0].add_note(other)
+    return errors[0]

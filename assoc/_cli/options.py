@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from typing import Any, NoReturn
 
-from assoc._cli.inputs import read_toml
+from assoc._cli.inputs import read_toml, with_others
 from assoc._cli.lines import HelpFormatter
 from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
 from assoc._files.output import STDOUT, check_writable, is_stream
@@ -114,10 +114,10 @@ class Given(dict[str, Any]):
         `new_folder`.
         """
         read = [path for path in inputs if path]
-        for path in read:
-            # said first: a wrong name explains most other errors
-            if path != STDOUT and not os.path.lexists(path):
-                raise InvalidInputError(f"{path}: no such file")
+        # said first: wrong names explain most other errors
+        absent = [path for path in read if path != STDOUT and not os.path.lexists(path)]
+        if absent:
+            raise with_others([InvalidInputError(f"{path}: no such file") for path in absent])
         taken = {_real_path(path) for path in (*read, *reserved) if path}
         outputs = [*self.some(self.outputs).values(), *also]
         for path in outputs:

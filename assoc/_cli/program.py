@@ -101,13 +101,6 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
     return DONE
 
 
-def with_others(errors: Sequence[AssocError]) -> AssocError:
-    """The first of several errors, which brings the others along, each a line of its own."""
-    for other in [*dict.fromkeys(map(str, errors))][1:]:
-        errors[0].add_note(other)
-    return errors[0]
-
-
 def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
     """Write the outputs that are asked for (not None); if one fails the others are written, then it raises."""
     errors: list[AssocError] = []

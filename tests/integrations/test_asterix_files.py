@@ -202,15 +202,39 @@ def test_garbage_is_not_tried_in_all_editions_for_ever(tmp_path, monkeypatch):
     assert took[1] - took[0] < 1.1 * 300 * 12_000
 
 
+def test_tracks_of_edition_0_17(tmp_path):
+    """By hand: 010, 070, 040, 105 (24 bits), 100 (1/64 nmi), 060; 136, 180 (speed, heading); 080, 340, 380; 510, RE."""
+    record = bytes([0b10111111, 0b00110001, 0b01011001, 0b00100100, 1, 2])
+    record += (40_000 * 128).to_bytes(3, "big") + (100).to_bytes(2, "big")
+    record += round(47 / 180 * 2**23).to_bytes(3, "big") + round(-8 / 180 * 2**23).to_bytes(3, "big", signed=True)
+    record += (640).to_bytes(2, "big") + (-64).to_bytes(2, "big", signed=True) + (0o4521).to_bytes(2, "big")
+    record += (1400).to_bytes(2, "big") + (2**14 // 8).to_bytes(2, "big") + (2**14).to_bytes(2, "big")
+    # status of two parts, source and code of the last plot, two data blocks of Mode S and the address, a number
+    record += bytes([0b11, 0]) + bytes([0b10001000, 1, 2, 0, 7]) + bytes([0b11000000, 2, *range(16)])
+    record += bytes.fromhex("3c4591") + bytes([1, 0, 2]) + bytes([3, 9, 9])
+    (tmp_path / "old.ast").write_bytes(b"\x3e" + (2 * len(record) + 3).to_bytes(2, "big") + 2 * record)
+    notes = {}
+    row, again = read_records(tmp_path / "old.ast", notes)
+    assert row == again
+    assert notes["data blocks of category 062 read as of edition 0.17"] == 1
+    assert (row["sac"], row["sic"], row["time"], row["track"], row["mode3_oct"]) == (1, 2, 40_000, 100, "4521")
+    assert row["altitude_fl"] == 350
+    assert (row["latitude_deg"], row["longitude_deg"]) == pytest.approx((47, -8), abs=2e-5)
+    # an eighth of a nautical mile a second, to the east
+    found = (row["x_m"], row["y_m"], row["vx_m_s"], row["vy_m_s"])
+    assert found == pytest.approx((18_520, -1_852, 231.5, 0), abs=0.25)
+    [track, _] = read_tracks(tmp_path / "old.ast").to_dict("records")
+    assert (track["x"], track["address_hex"], track["confirmed"]) == (18_520, "3C4591", False)
+    # cut anywhere, it is no track
+    (tmp_path / "old.ast").write_bytes(b"\x3e" + (len(record) + 2).to_bytes(2, "big") + record[:-1])
+    with pytest.raises(InvalidInputError, match="1 data blocks of category 062 that cannot be decoded"):
+        read_records(tmp_path / "old.ast")
+
+
 def test_an_edition_that_is_not_known_is_refused_in_one_line(recorded, tmp_path, capsys):
-    """Tracks of edition 0.17 of category 062, by hand: 010, 070, 040, 105 (24 bits), 060, then 136; other places."""
-    blocks = []
-    for k in range(20):
-        record = bytes([0b10111011, 0b00100000, 1, 2])
-        record += ((40_000 + k) * 128).to_bytes(3, "big") + (100 + k).to_bytes(2, "big")
-        record += round(47 / 180 * 2**23).to_bytes(3, "big") + round(8 / 180 * 2**23).to_bytes(3, "big")
-        record += (0o4521).to_bytes(2, "big") + (1400).to_bytes(2, "big")
-        blocks.append(b"\x3e" + (len(record) * 2 + 3).to_bytes(2, "big") + record * 2)
+    """Records that begin as tracks, with an item that no edition has."""
+    record = bytes([0b10110001, 1, 1, 1, 0b10000000, 1, 2]) + bytes(8)
+    blocks = 20 * [b"\x3e" + (2 * len(record) + 3).to_bytes(2, "big") + 2 * record]
     (tmp_path / "old.ast").write_bytes(b"".join(blocks))
     assert asterix2csv.main([str(tmp_path / "old.ast")]) == 2
     told = capsys.readouterr()

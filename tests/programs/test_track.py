@@ -178,6 +178,12 @@ BAD = {
 }
 
 
+def test_all_missing_files_are_named_at_once(capsys):
+    assert track.main(["one.csv", "two.csv", "-o", "tracks.csv"]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert told == [f"assoc.track: error: {name}.csv: no such file" for name in ("one", "two")]
+
+
 @pytest.mark.parametrize("case", list(BAD))
 def test_bad_input_is_one_line_and_code_2(case, scene_file, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.inputs import with_others
 from assoc._cli.options import Given, flag_of
-from assoc._cli.program import with_others
 from assoc._cli.track.options import RADAR
 from assoc._files.reading import kind_of
 from assoc.errors import InvalidInputError, warn

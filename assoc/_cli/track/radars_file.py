@@ -8,8 +8,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from assoc._cli.inputs import read_toml
-from assoc._cli.program import with_others
+from assoc._cli.inputs import read_toml, with_others
 from assoc._cli.values import editions_of
 from assoc._files.reading import kind_of
 from assoc._text.near import did_you_mean

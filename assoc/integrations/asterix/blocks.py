@@ -15,6 +15,7 @@ from assoc._system.imports import check_extra, load_extra
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.frames import Block, data_blocks
 from assoc.integrations.asterix.items import plausible
+from assoc.integrations.asterix.old_tracks import EDITION, old_tracks
 
 CATEGORIES = (1, 2, 10, 20, 21, 34, 48, 62)
 """Categories that are read."""
@@ -32,11 +33,12 @@ def library() -> tuple[ModuleType, ModuleType]:
 
 @lru_cache(maxsize=64)
 def editions(category: int) -> dict[str, Any]:
-    """Classes of the package for a category by its editions, the newest first."""
+    """Classes of the package for a category by its editions, the newest first; None for that of `old_tracks`."""
     module, start = library()[1], f"Cat_{category:03d}_"
     found = {name.removeprefix(start).replace("_", "."): getattr(module, name) for name in dir(module)
              if re.fullmatch(rf"{start}\d+_\d+", name)}  # fmt: skip
-    return dict(sorted(found.items(), key=lambda entry: [-int(part) for part in entry[0].split(".")]))
+    known = dict(sorted(found.items(), key=lambda entry: [-int(part) for part in entry[0].split(".")]))
+    return known | ({EDITION: None} if category == 62 else {})
 
 
 def edition(category: int) -> Any:
@@ -137,6 +139,8 @@ def _source(content: bytes) -> bytes:
 
 def decoded(block: Block, name: str) -> list[Any] | None:
     """Records of a data block in an edition; None if they cannot be decoded."""
+    if editions(block.category)[name] is None:
+        return old_tracks(block.content, edition(block.category))
     kind, base = editions(block.category)[name].cv_uap, library()[0]
     content = base.Bits.from_bytes(block.content)
     found: Any
