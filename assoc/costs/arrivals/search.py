@@ -4,8 +4,9 @@ Growing tuples station by station would list all parts of what many stations hea
 sought are emissions instead, places and times that many arrival times agree with. For a cell of places each arrival
 time is an interval of times of emission; where intervals overlap, the gains of their stations bound what a target there
 can be worth. Cells that can hold none are given up, others are halved until they are as small as the gates. There
-each time at which most intervals overlap is where a fit starts. A cell whose intervals all agree with one emission is
-not halved: that, and parts of it, are all it can hold.
+each time at which most intervals overlap is where a fit starts. A cell where each station has at most one
+arrival time is not halved if these are one emission, or few: their parts are all it can hold. Arrival times that
+neighbouring cells share are fitted once.
 
 Of what few stations hear all parts are listed. Of many, an optimal association gives a target every arrival time that
 fits it and that no other target has. So an emission is listed without an arrival time, or with a worse one of that
@@ -46,6 +47,8 @@ from assoc.scene.scene import Scene
 _AT_ONCE = 4096
 # each halving leaves one cell that waits: more than there are halvings of four axes down to the least noise
 _WAITING = 1024
+# neighbouring cells hold the same arrival times: so many sets that were fitted are remembered
+_SETTLED = 16384
 _ROUNDS = 20
 # of so many stations all parts of what they hear are listed
 _FEW = 8
@@ -121,28 +124,74 @@ def _due(r: Receivers, s: int, at: Array) -> float:
 
 
 @inner_njit
-def _whole(r: Receivers, heard: Heard, edges: Array, begin: float, finish: float, row: Array, at: Array) -> float:
-    """Worth of all arrival times whose intervals reach into one of times, if they are one emission; else 0.
-
-    Then no station has two, and all agree with the emission at the position and time to which `at` (4,) moves: what
-    else they could be is parts of it. `row` is of them.
-    """
-    first, times, worth, count = heard.first, np.empty(len(row)), 0.0, 0
+def _lone(heard: Heard, edges: Array, begin: float, finish: float, row: Array) -> bool:
+    """Whether each station has at most one arrival time whose interval reaches into one of times; `row` is of them."""
+    first = heard.first
     for s in range(len(row)):
-        row[s], times[s] = -1, math.nan
+        row[s] = -1
         # of the first the interval is whole, of later ones what earlier ones leave
         length = edges[2 * first[s] + 1] - edges[2 * first[s]] if first[s] < first[s + 1] else 0.0
         for k in range(first[s], first[s + 1]):
             if edges[2 * k + 1] - length <= finish and edges[2 * k + 1] >= begin:
                 if row[s] >= 0:
-                    return 0.0
-                row[s], times[s] = k, heard.picks[k]
-                worth, count = worth + heard.gain[s], count + 1
+                    return False
+                row[s] = k
+    return True
+
+
+@inner_njit
+def _whole(r: Receivers, heard: Heard, row: Array, at: Array) -> float:
+    """Worth of arrival times `row` (S,), if they are one emission, to which `at` (4,) moves; else 0."""
+    times, worth, count = np.full(len(row), math.nan), 0.0, 0
+    for s in range(len(row)):
+        if row[s] >= 0:
+            times[s], worth, count = heard.picks[row[s]], worth + heard.gain[s], count + 1
     chi, _, at[3], at[0], at[1], at[2], _ = descend(r, times, (at[0], at[1], at[2]))
     for s in range(len(row)):
         if row[s] >= 0 and abs(times[s] - _due(r, s, at)) > heard.reach[s]:
             return 0.0
     return worth - 0.5 * chi if chi <= heard.joint[max(count - 3, 0)] else 0.0
+
+
+@inner_njit
+def _parts(r: Receivers, heard: Heard, base: float, row: Array, at: Array, rows: Array, places: Array) -> int:
+    """List in `rows` and `places` what arrival times `row` (S,) can be: an emission, or the largest parts that are.
+
+    Fits begin at `at`. Returns how many there are; -1 if of many arrival times not all are one emission.
+    """
+    part, spot, heard_by, found, enough = row.copy(), at.copy(), 0, 0, 4 if r.half[2] > 0.0 else 3
+    for s in range(len(row)):
+        heard_by += 1 if row[s] >= 0 else 0
+    if _whole(r, heard, part, spot) > base:
+        copy_to(rows[0], part)
+        copy_to(places[0], spot)
+        return 1
+    if heard_by > _FEW:
+        return -1
+    listed = np.empty(1 << heard_by, np.int64)
+    # sets of arrival times as bits, the larger ones first
+    for size in range(heard_by - 1, enough - 1, -1):
+        for bits in range(1 << heard_by):
+            count, k, worth = 0, 0, 0.0
+            for s in range(len(row)):
+                part[s] = -1
+                if row[s] >= 0:
+                    if bits >> k & 1:
+                        part[s], count, worth = row[s], count + 1, worth + heard.gain[s]
+                    k += 1
+            if count != size or worth <= base:
+                continue
+            inside = False
+            for m in range(found):
+                inside = inside or bits & listed[m] == bits
+            if inside:
+                continue
+            copy_to(spot, at)
+            if _whole(r, heard, part, spot) > base and found < len(rows) - 1:
+                copy_to(rows[found], part)
+                copy_to(places[found], spot)
+                listed[found], found = bits, found + 1
+    return found
 
 
 @inner_njit
@@ -167,6 +216,26 @@ def _intervals(r: Receivers, heard: Heard, cell: Array, edges: Array, steps: Arr
     return count
 
 
+@inner_njit
+def _slot(r: Receivers, row: Array, at: Array) -> int:
+    """Where it is remembered that these arrival times were fitted from a sixteenth of the region around `at`."""
+    slot = 0
+    for i in range(2):
+        slot = 4 * slot + min(max(int(2.0 + 2.0 * (at[i] - r.middle[i]) / r.half[i]), 0), 3)
+    for one in row:
+        slot = (31 * slot + one + 1) % _SETTLED
+    return slot
+
+
+@inner_njit
+def _same(one: Array, other: Array) -> bool:
+    """Whether two rows are equal."""
+    for s in range(len(one)):
+        if one[s] != other[s]:
+            return False
+    return True
+
+
 @njit
 def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: int) -> tuple[Array, Array, int]:
     """Emissions in the first `waiting` of the cells (C, 6), low and high of x, y and z; until there are many.
@@ -175,10 +244,12 @@ def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: i
     """
     picks, first, gain, reach = heard.picks, heard.first, heard.gain, heard.reach
     stations = len(gain)
-    most = _AT_ONCE + len(picks)
+    most = _AT_ONCE + len(picks) + (1 << _FEW)
     rows, places, found = np.empty((most, stations), np.int32), np.empty((most, 4)), 0
     edges, steps = np.empty(2 * len(picks)), np.empty(2 * len(picks))
-    row, at, spot = np.empty(stations, np.int32), np.empty(4), np.empty(4)
+    row, at = np.empty(stations, np.int32), np.empty(4)
+    # arrival times from which was fitted, and whose parts were listed
+    settled, listed_of = np.full((_SETTLED, stations), -2, np.int32), np.full((_SETTLED, stations), -2, np.int32)
     slowest, closest, enough = r.speed[0], reach[0], 4 if r.half[2] > 0.0 else 3
     for s in range(stations):
         slowest, closest = min(slowest, r.speed[s]), min(closest, reach[s])
@@ -215,17 +286,21 @@ def _emissions(r: Receivers, heard: Heard, base: float, cells: Array, waiting: i
                 row[s] = _nearest(picks, first[s], first[s + 1], due)
                 if row[s] >= 0 and abs(picks[row[s]] - due) > 2.0 * reach[s]:
                     row[s] = -1
+            slot = _slot(r, row, at)
+            if _same(settled[slot], row):
+                continue
+            copy_to(settled[slot], row)
             if _settle(r, heard, row, at) > base:
-                for s in range(stations):
-                    rows[found, s] = row[s]
-                places[found] = at
-                found += 1
-        if hopeful > 0 and not small:
-            copy_to(spot, at)
-            if _whole(r, heard, edges, begin, finish, row, spot) > base:
                 copy_to(rows[found], row)
-                copy_to(places[found], spot)
-                found, hopeful = found + 1, 0
+                copy_to(places[found], at)
+                found += 1
+        if hopeful > 0 and not small and _lone(heard, edges, begin, finish, row):
+            slot = _slot(r, row, at)
+            # what has been listed of these arrival times is all that the cell can hold
+            listed = 0 if _same(listed_of[slot], row) else _parts(r, heard, base, row, at, rows[found:], places[found:])
+            if listed >= 0:
+                copy_to(listed_of[slot], row)
+                found, hopeful = found + listed, 0
         if hopeful > 0 and not small:
             cells[waiting + 1] = cell
             cells[waiting, 2 * widest + 1] = at[widest]
