@@ -1,7 +1,8 @@
 """The only way to numba: kernels compiled at their first call, cached on disk, run without the GIL, never stale.
 
 On arguments of new types a kernel is loaded from the cache, interpreted if the call is small (interpreted.py), or
-compiled. Private names of numba are used only in numba_private.py; where they are missing kernels are plain numba.
+compiled. Private names of numba are used only in numba_private.py and kernels/lowering.py; where they are missing
+kernels are plain numba.
 """
 
 from __future__ import annotations
@@ -59,29 +60,18 @@ def njit(
         return _silent(function)
     if private is None:
         return _plain(function)
-    kernel = private.make(function, _may_wait, literal=literal, lean=literal)
+    kernel = private.make(function, _may_wait, literal=literal)
     compiled = _uninterrupted(kernel)
     kernel._compile_for_args = first_small(kernel, compiled, small, stand_in) if private.is_cached(kernel) else compiled
     return kernel
 
 
 def literal_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled.
-
-    It must be as `lean_inner_njit` asks.
-    """
+    """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled."""
     return njit(function, literal=True)
 
 
-def lean_inner_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel with `inner_njit` that counts no references to arrays, which takes longer than a small kernel.
-
-    It must not make or return arrays, nor call kernels that return some; views of its arguments it may take.
-    """
-    return inner_njit(function, lean=True)
-
-
-def inner_njit(function: Callable[..., Any], *, lean: bool = False) -> Any:
+def inner_njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel that only other kernels call, without the code that lets Python call it.
 
     That code unpacks and packs arrays: it is most of the code of a small kernel with many arrays.
@@ -89,7 +79,7 @@ def inner_njit(function: Callable[..., Any], *, lean: bool = False) -> Any:
     """
     if _CONFIG.DISABLE_JIT or private is None:
         return njit(function)
-    kernel = private.make(function, _may_wait, inner=True, lean=lean)
+    kernel = private.make(function, _may_wait, inner=True)
     silent = _silent(function)
     # the wrapper for calls from Python is missing, so no such code may be found
     kernel._insert = lambda *overload: None

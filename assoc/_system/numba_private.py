@@ -1,4 +1,4 @@
-"""All uses of numba's private names, in one file.
+"""All uses of numba's private names, but for how code is made of kernels (kernels/lowering.py).
 
 A kernel is a numba dispatcher with attributes of this package: its cache (`_KernelCache`), what it does on arguments of
 new types, and how it is called from other kernels. numba's modules and classes stay unchanged. Where one of the names
@@ -19,17 +19,31 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import caching, cgutils, codegen, compiler, extending, options, registry, types
+from numba.core import (
+    caching,
+    cgutils,
+    codegen,
+    compiler,
+    compiler_machinery,
+    extending,
+    options,
+    registry,
+    typed_passes,
+    types,
+)
 from numba.core.typing.typeof import typeof_impl
 from numba.np.random.generator_core import NumPyRandomGeneratorTypeModel
 
 from assoc._system import temporary
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
+from assoc._system.kernels.lowering import Lower
 
 # numba has no type annotations
 _CACHING: Any = caching
 _CODEGEN: Any = codegen
 _COMPILER: Any = compiler
+_MACHINERY: Any = compiler_machinery
+_PASSES: Any = typed_passes
 _CONFIG: Any = numba.config
 # numba 0.60 has it with an underscore
 _IN_TREE: Any = getattr(caching, "InTreeCacheLocator", None) or _CACHING._InTreeCacheLocator
@@ -45,12 +59,15 @@ COMPLETE = all(
         _CACHING.IndexDataCacheFile: "_load_index load",
         _IN_TREE: "from_function get_source_stamp get_disambiguator get_suitable_cache_subpath",
         registry.CPUDispatcher: "_compile_for_args _insert enable_caching get_call_template typeof_pyval",
-        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper _nrt",
+        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper",
         _CODEGEN.JITCPUCodegen: "magic_tuple",
         _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
         " enable_object_caching",
         _COMPILER.Compiler: "compile_extra",
         _COMPILER.Flags: "copy summary",
+        _COMPILER.CompilerBase: "define_pipelines",
+        _PASSES.NativeLowering: "lowering_class",
+        Lower: "incref loadvar getvar _alloca_var _find_singly_assigned_variable",
         types: "NumPyRandomGeneratorType NumPyRandomBitGeneratorType npy_rng",
     }.items()
     for name in names.split()
@@ -65,8 +82,6 @@ _FOLDER = "ASSOC_CACHE_DIR"
 # kernels are not called from C, nor inner ones from Python: the code for such calls is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _INNER = {"no_cpython_wrapper": True}
-# what makes no arrays need not count references to them either: in small kernels that takes longer than the rest
-_LEAN = {"_nrt": False}
 
 
 class NotCompiled(Exception):  # noqa: N818  (not an error)
@@ -79,15 +94,14 @@ def make(
     *,
     inner: bool = False,
     literal: bool = False,
-    lean: bool = False,
 ) -> Any:
     """Make a kernel, with a cache where there is a folder for one.
 
     ``may_wait`` returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
     ``inner``: only kernels call it. ``literal``: calls from kernels compile it anew for each literal number and each
-    width of whole numbers. ``lean``: it makes and returns no arrays, and counts no references to those it is given.
+    width of whole numbers.
     """
-    chosen = _OPTIONS | (_INNER if inner else {}) | (_LEAN if lean else {})
+    chosen = _OPTIONS | (_INNER if inner else {})
     kernel: Any = numba.njit(**chosen, pipeline_class=_InnerCompiler if inner else _Compiler)(function)
     if not literal:
         kernel.get_call_template = _called_with_common_types(kernel)
@@ -277,12 +291,32 @@ class _Inherited(_COMPILER.Flags):  # type: ignore[misc]
 _INHERITED: dict[str, _Inherited] = {}
 
 
+@_MACHINERY.register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(_PASSES.NativeLowering):  # type: ignore[misc]
+    """numba's last step, by this package's `Lower`."""
+
+    _name = "assoc_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        return Lower
+
+
 class _Compiler(_COMPILER.Compiler):  # type: ignore[misc]
-    """numba's compiler, whose tables find what a kernel calls by `_Inherited` options."""
+    """numba's compiler, whose tables find what a kernel calls by `_Inherited` options, and which lowers by `Lower`."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
+
+    def define_pipelines(self) -> Any:
+        pipelines = super().define_pipelines()
+        for pipeline in pipelines:
+            pipeline.passes = [
+                (_Lowering if one is _PASSES.NativeLowering else one, text) for one, text in pipeline.passes
+            ]
+            pipeline.finalize()
+        return pipelines
 
 
 class _InnerCompiler(_Compiler):

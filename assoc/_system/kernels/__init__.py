@@ -1,1 +1,1 @@
-"""Kernels that several rooms call."""
+"""Kernels that several rooms call, and how code is made of kernels (lowering.py)."""
