@@ -70,7 +70,8 @@ def link(
     """Link the points of consecutive frames that belong to the same particle.
 
     The sum of squared distances is least over all frames together, where a particle that ends and one that begins
-    cost ``search_range**2`` together (Crocker and Grier 1996, whose rule is that of trackpy). As each point has at most
+    cost at least ``search_range**2`` together (Crocker and Grier 1996, whose rule, just that, is trackpy's). Each
+    point has at most
     one next point and is the next of at most one, this is one assignment of two lists, solved with proof.
 
     Parameters
@@ -87,8 +88,10 @@ def link(
         the variance of a step along an axis times ``-log(q)``, where q is the share of frames in which particles are
         missing, so that links are skipped only as often as points are missing.
     start, end : float, optional
-        What a particle costs that begins or ends. By default both are half of ``search_range**2``, with memory half of
-        ``search_range**2`` and a skipped frame.
+        What a particle costs that begins or ends. By default, with memory, both are half of ``search_range**2`` and a
+        skipped frame; without it, half of ``search_range**2``, or more where the links say that an end and a beginning
+        are less likely than a step as long as the range: by how often there are any, and how dense points are.
+        With ``skip``, ``divisions`` or ``merges`` both are half of ``search_range**2``, as in trackpy.
     predict : bool, default False
         Whether points are sought where their particle's last steps (of the nearest particles, for one that begins)
         lead: for particles with velocities of their own.
@@ -127,14 +130,14 @@ def link(
     chosen, solution, costs = _linked(points, moved, costs, predict)
     numbers, lineage = numbered(points, chosen)
     links = Links([numbers[low:high] for low, high in pairwise(points.first)], solution)
-    links.particle, links.lineage, links.skip = np.empty_like(numbers), lineage, costs.skip_price
+    links.particle, links.lineage, links.skip = np.empty_like(numbers), lineage, costs.skip_price if memory else 0.0
     links.particle[order] = numbers
     return links
 
 
 def _linked(points: Points, moved: Array, costs: LinkCosts, predict: bool) -> tuple[Array, Solution, LinkCosts]:
     """The links (K, 2), the solution that they are of, and the costs as far as these are learnt."""
-    estimated = bool(costs.memory and costs.skip is None)
+    estimated = costs.learns_ends or (costs.memory > 0 and costs.skip is None)
     pairs = candidates(points, moved, costs.reach, costs.memory)
     # first how far particles move in a frame, from links of consecutive ones
     used = pairs.within(1) if estimated else pairs
@@ -144,7 +147,7 @@ def _linked(points: Points, moved: Array, costs: LinkCosts, predict: bool) -> tu
         chosen, before, settled = links_of(solution, lists, sources), costs, True
         if not (predict or estimated):
             break
-        costs, used = learnt(costs, used.of(chosen), points), pairs
+        costs, used = learnt(costs, used.of(chosen), points, len(used.gaps)), pairs
         if predict:
             faster = velocities(points, chosen, moved)
             settled = float(np.abs(faster - moved).max(initial=0.0)) <= 0.01 * costs.reach

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -74,9 +75,16 @@ class LinkCosts:
         """Of a skipped frame."""
         return self.learnt_skip if self.skip is None else self.skip
 
+    @property
+    def learns_ends(self) -> bool:
+        """Whether links say what ends and beginnings cost beyond the search range."""
+        given = (self.start, self.end, self.skip, self.divisions, self.merges)
+        return not self.memory and all(price is None for price in given)
+
     def of_end(self) -> tuple[float, float]:
         """Of a particle that begins, and of one that ends."""
-        half = 0.5 * ((1.0 + _INCLUSIVE) * self.reach**2 + (self.skip_price if self.memory else 0.0))
+        missed = self.skip_price if self.memory or self.learns_ends else 0.0
+        half = 0.5 * ((1.0 + _INCLUSIVE) * self.reach**2 + missed)
         return half if self.start is None else self.start, half if self.end is None else self.end
 
     def of_links(self, pairs: Pairs) -> Array:
@@ -116,17 +124,32 @@ def candidates(points: Points, moved: Array, reach: float, memory: int) -> Pairs
     return Pairs(np.concatenate(ends), np.concatenate(squares), np.concatenate(gaps))
 
 
-def learnt(costs: LinkCosts, links: Pairs, points: Points) -> LinkCosts:
-    """The prices that links suggest: missing points are as frequent as the frames that they skip."""
+def learnt(costs: LinkCosts, links: Pairs, points: Points, candidates: int) -> LinkCosts:
+    """The prices that links, of so many candidates, suggest: points are missing as often as links skip frames."""
     if not len(links.gaps):
         return costs
     spread = float(links.squares.mean())
+    if costs.learns_ends:
+        missed = max(_end_and_beginning(costs.reach, links, points, candidates) - costs.reach**2, 0.0)
+        return replace(costs, spread=spread, learnt_skip=missed)
     variance = spread / points.places.shape[1]
     # before any frame could be skipped, one of twenty is a guess that later rounds correct
     guessed = costs.spread == 0.0
     missing = 0.05 if guessed else (float((links.gaps - 1).sum()) + 0.5) / (float(links.gaps.sum()) + 1.0)
     skip = -2.0 * variance * np.log(missing) if costs.memory and costs.skip is None else 0.0
     return replace(costs, spread=spread, learnt_skip=float(skip))
+
+
+def _end_and_beginning(reach: float, links: Pairs, points: Points, candidates: int) -> float:
+    """From where on a squared step is less likely than an end and a beginning, one as frequent as the other."""
+    dim, count = points.places.shape[1], float(points.first[-2])
+    variance = max(float(links.squares.mean()) / dim, 1e-12 * reach**2)
+    ended = (count - len(links.gaps) + 0.5) / (count + 1.0)
+    # of points, as wrong candidates show it
+    density = (candidates - len(links.gaps) + 0.5) / (count + 1.0)
+    density /= math.pi ** (0.5 * dim) / math.gamma(0.5 * dim + 1.0) * reach**dim
+    step = math.log1p(-ended) - 0.5 * dim * math.log(2.0 * math.pi * variance)
+    return 2.0 * variance * (step - math.log(ended * ended * density))
 
 
 def velocities(points: Points, links: Array, moved: Array) -> Array:

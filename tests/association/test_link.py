@@ -168,6 +168,21 @@ def test_ends_may_be_dear_or_cheap():
     assert assoc.link(frames, 3.0, start=1.5, end=1.5).ids[1].tolist() == [1]
 
 
+def test_ends_cost_what_links_say():
+    """Beside a price of the range alone, that of trackpy, and one that makes all links that can be, as laptrack's."""
+    found = {}
+    for seed in range(4):
+        frames, truth = walks(200, 0.1, 0.05, seed)
+        for half in (None, 0.5 * 3.0**2, 1.05 * 3.0**2):
+            ids = assoc.link(frames, 3.0, start=half, end=half).ids
+            found.setdefault(half, []).append(recall_and_precision(ids, truth))
+    (recall, precision), range_alone, all_links = (np.mean(rows, axis=0) for rows in found.values())
+    assert recall > range_alone[0] and precision > all_links[1]
+    # of a range as wide as this an end and a beginning are likelier than a step to its edge
+    wide, as_range = assoc.link(frames, 6.0), assoc.link(frames, 6.0, start=18.0, end=18.0)
+    np.testing.assert_allclose(wide.solution.cost, as_range.solution.cost, rtol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("frames", "options", "words"),
     [

@@ -193,7 +193,7 @@ def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:
     compared = against_truth(scene, Trajectories(*tracks.arrays()))
     found, level = summarise(*compared, cutoff), ", horizontally" if compared[0].positions.shape[1] == 2 else ""
     print_lines(
-        f"against the truth (cutoff {cutoff:g} m{level}): root mean square GOSPA {found.gospa:.4g} m "
+        f"against the truth (cutoff {cutoff:g} m{level}): rms GOSPA {found.gospa:.4g} m "
         f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
         f"false {found.gospa_false:.4g}), {found.identity.switches} identity switches"
     )
