@@ -86,7 +86,7 @@ def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, capsys):
 
 @pytest.mark.parametrize("path", sorted(RESULTS.glob("*.json")), ids=lambda path: path.stem)
 def test_result_files_are_small_dated_and_name_their_sources(path):
-    assert path.stat().st_size < 150_000
+    assert path.stat().st_size < 200_000
     data = json.loads(path.read_text())
     assert data["experiment"] == path.stem
     assert path.stem in NAMES
