@@ -116,6 +116,10 @@ def noise_of(recording: Recording, turn: float) -> Noise:
     if len(left) < 3:
         return Noise(math.nan, math.nan, len(left))
     middle, off = np.array([*left]), np.array([*left.values()])
+    # where clutter is dense some line fits any plot: what has one neighbour in the turn before and after tells more
+    lone = (np.bincount(rows[:, 1], minlength=len(z)) == 1) & (np.bincount(rows[:, 0], minlength=len(z)) == 1)
+    if np.count_nonzero(lone[middle]) > 100:
+        middle, off = middle[lone[middle]], off[lone[middle]]
     along = off * np.conj(z[middle] / np.abs(z[middle]))
     angle = along.imag / np.abs(z[middle])
     return Noise(_deviation(along.real), _deviation(angle), len(left))

@@ -128,3 +128,14 @@ def test_turbines_are_no_flights(plots):
     moving = both.take(np.flatnonzero(~still))
     assert noise_of(moving, 5.0).range == pytest.approx(60.0, rel=0.3)
     assert [one.change for one in agreements([moving, plots[1]])] == [Change(), Change()]
+
+
+def test_noise_beside_clutter_that_is_dense(plots):
+    """Eight returns a turn from anywhere in a rain of four kilometres: some line fits each of them."""
+    rng, count = np.random.default_rng(2), 8 * 48
+    far, azimuth = rng.uniform(28e3, 32e3, count), rng.uniform(0.4, 0.53, count)
+    times = 5.0 * (np.repeat(np.arange(48), 8) + np.mod(np.pi / 2 - azimuth, 2 * np.pi) / (2 * np.pi))
+    rows = np.column_stack([np.append(plots[0].times, times), np.append(plots[0].ranges, far),
+                            np.append(plots[0].azimuths, azimuth)])  # fmt: skip
+    noise = noise_of(Recording(*rows[np.argsort(rows[:, 0], kind="stable")].T), 5.0)
+    assert noise.range == pytest.approx(60.0, rel=0.3) and noise.azimuth == pytest.approx(1e-3, rel=0.3)

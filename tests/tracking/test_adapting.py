@@ -8,6 +8,7 @@ import pytest
 from assoc.costs.views import BANDS, bands_of
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
+from assoc.sensors import Radar2D
 from assoc.sensors.base import wrap_angle
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
@@ -116,6 +117,35 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
     shown = shown_by(sensors, seen, prior, factors, factors)
+    assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
+
+
+def test_heights_that_transponders_say_are_no_noise_of_radars():
+    """All radars hear the same height, in steps that are finer than the noise declared for it."""
+    rng, T = np.random.default_rng(5), 20_000
+    sensors = [
+        Radar2D(
+            name=f"{k}",
+            position=[40e3 * k, -50e3, 0.0],
+            noise=[60.0, 1e-3, 30.0],
+            field_of_view=[[0.0, 2e5], [-np.pi, np.pi], [0.0, 2e4]],
+            detection_probability=0.9,
+            false_alarm_rate=1.0,
+        )
+        for k in range(2)
+    ]
+    where = rng.uniform([-10e3, -10e3, 3e3], [10e3, 10e3, 9e3], (T, 3))
+    covariance = np.diag([90.0, 60.0, 40.0]) ** 2
+    predicted = where + rng.normal(size=(T, 3)) * np.sqrt(np.diagonal(covariance))
+    seen = []
+    for sensor in sensors:
+        z = sensor.measure(where)
+        z[:, :2] += rng.normal(size=(T, 2)) * sensor.noise[:2]
+        z[:, 2] = 30.48 * np.round(z[:, 2] / 30.48)
+        seen.append(Seen(np.arange(T), z, predicted))
+    both = np.broadcast_to(covariance, (T, 1, 3, 3))
+    prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
+    shown = shown_by(sensors, seen, prior, np.ones(2), np.ones(2))
     assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
 
 

@@ -120,6 +120,8 @@ def shown_by(
     size = np.einsum("tmii->m", predicted.covariances)
     quiet = int(np.argmin(size))
     for s, (track, H, y) in enumerate(rows):
+        # heights are what a target's transponder says, to all radars the same: no noise of the sensor
+        own = [k for k, name in enumerate(parts[s].components[: parts[s].dim]) if name != "height"]
         alone = count[track] == 1
         beside = np.flatnonzero(~alone)
         if len(beside):
@@ -132,14 +134,14 @@ def shown_by(
                 shares[..., r] = _diagonal(gain, others[r]) if r != s else noise[s]
             known = _diagonal(gain, _BESIDE**2 * prior[t])
             rest = y[beside] - _times(gain, vectors[:, t].sum(axis=0) - vectors[s, t])
-            sums.add(shares, known, rest**2, np.ones(len(t)))
+            sums.add(shares[:, own], known[:, own], rest[:, own] ** 2, np.ones(len(t)))
         if alone.any():
             t, h = track[alone], H[alone]
             shares = np.zeros((*y[alone].shape, S))
             shares[..., s] = noise[s]
             rest = y[alone] - _times(h, predicted.offsets[t, quiet])
             known = _diagonal(h, predicted.covariances[t, quiet])
-            sums.add(shares, known, rest**2, weights[t, quiet])
+            sums.add(shares[:, own], known[:, own], rest[:, own] ** 2, weights[t, quiet])
     manoeuvres = _manoeuvres(parts, rows, predicted, np.maximum(noise, estimates), now)
     return Shown(sums.matrix, sums.right, sums.gain, manoeuvres, biases)
 
