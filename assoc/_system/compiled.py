@@ -60,18 +60,30 @@ def njit(
         return _silent(function)
     if private is None:
         return _plain(function)
-    kernel = private.make(function, _may_wait, literal=literal)
+    kernel = private.make(function, _may_wait, literal=literal, lean=literal)
     compiled = _uninterrupted(kernel)
     kernel._compile_for_args = first_small(kernel, compiled, small, stand_in) if private.is_cached(kernel) else compiled
     return kernel
 
 
 def literal_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled."""
+    """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled.
+
+    It must be as `lean_inner_njit` asks.
+    """
     return njit(function, literal=True)
 
 
-def inner_njit(function: Callable[..., Any]) -> Any:
+def lean_inner_njit(function: Callable[..., Any]) -> Any:
+    """Compile a kernel with `inner_njit` that counts no references to arrays, not even to views that it takes.
+
+    In a small kernel that takes longer than the rest. It must not make or return arrays, nor call kernels that return
+    some.
+    """
+    return inner_njit(function, lean=True)
+
+
+def inner_njit(function: Callable[..., Any], *, lean: bool = False) -> Any:
     """Compile a kernel that only other kernels call, without the code that lets Python call it.
 
     That code unpacks and packs arrays: it is most of the code of a small kernel with many arrays.
@@ -79,7 +91,7 @@ def inner_njit(function: Callable[..., Any]) -> Any:
     """
     if _CONFIG.DISABLE_JIT or private is None:
         return njit(function)
-    kernel = private.make(function, _may_wait, inner=True)
+    kernel = private.make(function, _may_wait, inner=True, lean=lean)
     silent = _silent(function)
     # the wrapper for calls from Python is missing, so no such code may be found
     kernel._insert = lambda *overload: None

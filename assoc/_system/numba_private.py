@@ -59,7 +59,7 @@ COMPLETE = all(
         _CACHING.IndexDataCacheFile: "_load_index load",
         _IN_TREE: "from_function get_source_stamp get_disambiguator get_suitable_cache_subpath",
         registry.CPUDispatcher: "_compile_for_args _insert enable_caching get_call_template typeof_pyval",
-        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper",
+        options.DefaultOptions: "no_cfunc_wrapper no_cpython_wrapper _nrt",
         _CODEGEN.JITCPUCodegen: "magic_tuple",
         _CODEGEN.JITCodeLibrary: "_optimize_final_module _finalize_final_module _get_module_for_linking"
         " enable_object_caching",
@@ -82,6 +82,8 @@ _FOLDER = "ASSOC_CACHE_DIR"
 # kernels are not called from C, nor inner ones from Python: the code for such calls is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _INNER = {"no_cpython_wrapper": True}
+# what makes no arrays counts no references, to views neither: in small kernels that takes longer than the rest
+_LEAN = {"_nrt": False}
 
 
 class NotCompiled(Exception):  # noqa: N818  (not an error)
@@ -94,14 +96,15 @@ def make(
     *,
     inner: bool = False,
     literal: bool = False,
+    lean: bool = False,
 ) -> Any:
     """Make a kernel, with a cache where there is a folder for one.
 
     ``may_wait`` returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
     ``inner``: only kernels call it. ``literal``: calls from kernels compile it anew for each literal number and each
-    width of whole numbers.
+    width of whole numbers. ``lean``: it makes and returns no arrays, so that it needs no counts of references at all.
     """
-    chosen = _OPTIONS | (_INNER if inner else {})
+    chosen = _OPTIONS | (_INNER if inner else {}) | (_LEAN if lean else {})
     kernel: Any = numba.njit(**chosen, pipeline_class=_InnerCompiler if inner else _Compiler)(function)
     if not literal:
         kernel.get_call_template = _called_with_common_types(kernel)

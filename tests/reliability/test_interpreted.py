@@ -2,12 +2,15 @@
 
 import ast
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core.errors import NumbaError
 
 import assoc
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import compiled_only, inner_njit, lean_inner_njit, njit
 from assoc.simulation import simulate
 from tests.running import printed
 from tests.sizes import sample
@@ -127,6 +130,35 @@ def test_inner_kernels_are_called_by_kernels_alone():
                 calls += [f"{name}, line {call.lineno}" for call in ast.walk(node) if isinstance(call, ast.Call)
                           and isinstance(call.func, ast.Name) and call.func.id in known]  # fmt: skip
     assert calls == []
+
+
+def test_lean_kernels_make_and_return_no_arrays():
+    # they count no references: an array that is returned would never be freed, or too early
+    kernels = all_kernels()
+    plain = {"None", "bool", "int", "float", "tuple", "Three"}
+    other = {node.name for node in kernels if not set(re.findall(r"\w+", ast.unparse(node.returns))) <= plain}
+    lean = [node for node in kernels if is_kernel(node, "lean_inner_njit") or is_kernel(node, "literal_njit")]
+    assert len(other) > 50 and len(lean) > 20
+    calls = [ast.unparse(one.func) for node in lean for one in ast.walk(node) if isinstance(one, ast.Call)]
+    assert not other & {*calls, *(node.name for node in lean)}
+    assert not [call for call in calls if call.startswith("np.")]
+
+
+@lean_inner_njit
+def _copied(x: np.ndarray) -> float:
+    y = x + 1.0
+    return y[0]
+
+
+@njit
+def _copies(x: np.ndarray) -> float:
+    return _copied(x)
+
+
+def test_lean_kernels_that_make_an_array_are_not_compiled():
+    # so what they hold are their callers' arrays, and views of them, which live as long as the call
+    with pytest.raises(NumbaError, match="NRT required but not enabled"), compiled_only():
+        _copies(np.zeros(3))
 
 
 @inner_njit

@@ -6,11 +6,11 @@ longer than compiling most kernels.
 
 from __future__ import annotations
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import lean_inner_njit
 from assoc._types import Array
 
 
-@inner_njit
+@lean_inner_njit
 def copy_to(target: Array, source: Array) -> None:
     """Copy an array to another one of the same length."""
     for i in range(target.size):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.copying import copy_to
 from assoc._types import Array, Floats
 
@@ -78,7 +78,7 @@ def sort_by(rows: Array, values: Array, begin: int, end: int) -> None:
         _insert(rows, values, begin, end)
 
 
-@inner_njit
+@lean_inner_njit
 def sort_part(values: Array, begin: int, end: int) -> None:
     """Sort a part of an array in place: by insertion, first of numbers far apart (Shell's way)."""
     gap = 1
@@ -94,7 +94,7 @@ def sort_part(values: Array, begin: int, end: int) -> None:
         gap = int(gap / 2.25)
 
 
-@inner_njit
+@lean_inner_njit
 def _insert(rows: Array, values: Array, begin: int, end: int) -> None:
     for i in range(begin + 1, end):
         moved, k = rows[i], i
@@ -104,7 +104,7 @@ def _insert(rows: Array, values: Array, begin: int, end: int) -> None:
         rows[k] = moved
 
 
-@inner_njit
+@lean_inner_njit
 def _merge(order: Array, left: Array, values: Array, begin: int, middle: int, end: int) -> None:
     """Merge two sorted runs of rows side by side, in place; `left` is working space."""
     # what is in its place already stays there

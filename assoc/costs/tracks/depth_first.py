@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, literal_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, literal_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
@@ -182,7 +182,7 @@ def _doubled(made: _Made) -> _Made:
     return more, more_rows, more_costs
 
 
-@inner_njit
+@lean_inner_njit
 def _of_track(tracks: Tracks, sensors: Sensors, near: Measured, t: int, space: _Space, made: _Made, count: int) -> int:
     """Write the tuples of a track after those that were made before; how many there are then, _FULL or _BAD."""
     track, rows, costs = made
@@ -230,14 +230,14 @@ def _of_track(tracks: Tracks, sensors: Sensors, near: Measured, t: int, space: _
     return count
 
 
-@inner_njit
+@lean_inner_njit
 def _version(space: _Space) -> int:
     """A new number."""
     space.versions[-1] += 1
     return space.versions[-1]
 
 
-@inner_njit
+@lean_inner_njit
 def _begin(tracks: Tracks, t: int, space: _Space) -> None:
     """Make the state of a track the first one."""
     _, m, n = tracks.means.shape
@@ -251,13 +251,13 @@ def _begin(tracks: Tracks, t: int, space: _Space) -> None:
                 space.covariances[0, j, i, k] = tracks.covariances[t, j, i, k]
 
 
-@inner_njit
+@lean_inner_njit
 def _side(s: int, at: int) -> int:
     """Which of the two places of sensor s is for a state: 1 if the sensor before has made it."""
     return 1 if at >= 2 * s - 1 else 0
 
 
-@inner_njit
+@lean_inner_njit
 def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> int:
     """Expect a measurement of sensor s, and queue those in the gate, ascending; how many, or _BAD."""
     at, d = space.at[s], sensors.sizes[s, 1]
@@ -288,7 +288,7 @@ def _look(sensors: Sensors, near: Measured, t: int, s: int, space: _Space) -> in
     return _queue(sensors, near, code, t, s, space)
 
 
-@inner_njit
+@lean_inner_njit
 def _expect(code: int, columns: Array, matrix: Array, mean: Array, h: Array) -> None:
     """Write the measurement of a linear sensor that is expected of a mean into h (d,)."""
     for a in range(len(h)):
@@ -331,7 +331,7 @@ def _mix(d: int, code: int, folding: float, s: int, at: int, space: _Space) -> b
     return bool(good)
 
 
-@inner_njit
+@lean_inner_njit
 def _queue(sensors: Sensors, near: Measured, code: int, t: int, s: int, space: _Space) -> int:
     """Queue the measurements of sensor s in the gate of what `_mix` has found, ascending; how many."""
     d, gate, axis = sensors.sizes[s, 1], sensors.gates[s], near.axes[s]
@@ -380,7 +380,7 @@ def _in_gate(
     return True
 
 
-@inner_njit
+@lean_inner_njit
 def _not_below(places: Array, axis: int, value: float, low: int, high: int) -> int:
     """The first of the rows from low to high, sorted along the axis, that is not below the value."""
     while low < high:
@@ -392,7 +392,7 @@ def _not_below(places: Array, axis: int, value: float, low: int, high: int) -> i
     return low
 
 
-@inner_njit
+@lean_inner_njit
 def _likelihood(sensors: Sensors, near: Measured, k: int, s: int, space: _Space) -> float:
     """Log-likelihood of a measurement under the partial tuple; residuals and shares of the components are left."""
     at, d = space.at[s], sensors.sizes[s, 1]
@@ -417,7 +417,7 @@ def _likelihood(sensors: Sensors, near: Measured, k: int, s: int, space: _Space)
     return highest + math.log(total)
 
 
-@inner_njit
+@lean_inner_njit
 def _correct(sensors: Sensors, s: int, likelihood: float, space: _Space) -> None:
     """Correct the state of a partial tuple by the measurement that `_likelihood` was last asked about."""
     at, d = space.at[s], sensors.sizes[s, 1]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import for_kernels, inner_njit, njit
+from assoc._system.compiled import for_kernels, inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.sorting import order_of, sort_part
 from assoc._types import Array
 from assoc.errors import LimitExceededError
@@ -92,7 +92,7 @@ def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, m
     return tracks[:count].copy(), found[:count].copy(), looked
 
 
-@inner_njit
+@lean_inner_njit
 def _first(along: Array, least: float, begin: int, end: int) -> int:
     """The first index of a sorted array's part begin .. end - 1 whose number is at least `least`; else end."""
     while begin < end:
@@ -104,7 +104,7 @@ def _first(along: Array, least: float, begin: int, end: int) -> int:
     return begin
 
 
-@inner_njit
+@lean_inner_njit
 def _ends(z: Array, i: int) -> tuple[float, float]:
     """The least and the largest number of a column."""
     least, most = z[0, i], z[0, i]
@@ -216,7 +216,7 @@ def _reach(covariance: Array, gate: float) -> Array:
     return reach
 
 
-@inner_njit
+@lean_inner_njit
 def _inside(h: Array, t: int, z: Array, m: int, reach: Array, turning: Array) -> bool:
     """Whether no residual of measurement m from row t is larger than its reach."""
     # by numbers of rows: numba counts references for each view of a row, which takes longer than the comparisons

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, literal_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, literal_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.codes import RADAR3D
@@ -63,7 +63,7 @@ def parts_of(rest: Array, B: int, d: int) -> tuple[Array, Array, Array, Array]:
     return rest[:v].reshape((B, d)), rest[v:S].reshape((B, d, d)), rest[S : S + B], rest[S + B :]
 
 
-@inner_njit
+@lean_inner_njit
 def multiply(F: Array, P: Array, out: Array) -> None:
     """Write F P into out; zeros of F cost nothing."""
     n = P.shape[0]
@@ -77,7 +77,7 @@ def multiply(F: Array, P: Array, out: Array) -> None:
                     out[i, j] += f * P[k, j]
 
 
-@inner_njit
+@lean_inner_njit
 def predict_one(m: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: Array, out: Array, W: Array) -> None:
     """`predict` for one target; W (n, n) is working space."""
     n = len(m)
@@ -226,7 +226,7 @@ def correct(
     return True, nis, log_det
 
 
-@inner_njit
+@lean_inner_njit
 def correct_mean(mean: Array, work: Array, v: Array, new_mean: Array) -> None:
     """Add the gain that `correct` has left times the residual."""
     for i in range(len(mean)):
@@ -236,7 +236,7 @@ def correct_mean(mean: Array, work: Array, v: Array, new_mean: Array) -> None:
         new_mean[i] = total
 
 
-@inner_njit
+@lean_inner_njit
 def elevation_of(h: Array, H: Array) -> float:
     """Elevation of an expected radar measurement h; its size where only range and azimuth are measured."""
     if len(h) == 3:
@@ -245,7 +245,7 @@ def elevation_of(h: Array, H: Array) -> float:
     return math.acos(min(1.0, 1.0 / (h[0] * math.hypot(H[1, 0], H[1, 1]))))
 
 
-@inner_njit
+@lean_inner_njit
 def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: float, out: Array) -> None:
     """Debias a radar residual v (range, azimuth and, of three, elevation) in place, write its covariance into out.
 
@@ -273,7 +273,7 @@ def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: flo
         out[1, 1] += tan * tan * (st * sp + st * bp + sp * bt)
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_at(code: int, position: Array, columns: Array, matrix: Array, m: Array, h: Array, J: Array) -> None:
     """Write the measurement expected of a mean into h (d,) and its derivatives by the columns into J (d, c)."""
     if code == LINEAR:
@@ -290,13 +290,13 @@ def linearise_at(code: int, position: Array, columns: Array, matrix: Array, m: A
         linearise(code, len(h), position, m[columns[0]], m[columns[1]], height, h, J)
 
 
-@inner_njit
+@lean_inner_njit
 def folding_of(code: int, matrix: Array) -> float:
     """Interval at which range rates fold, of a model as `unpack` gives it; 0: they do not."""
     return float(matrix[0, 0]) if code == RADAR3D and len(matrix) > 0 else 0.0
 
 
-@inner_njit
+@lean_inner_njit
 def blur(folding: float, P: Array, columns: Array, noise: Array, H: Array, R: Array) -> None:
     """Make a folded range rate say nothing where it is expected less exactly than to a third of the interval.
 

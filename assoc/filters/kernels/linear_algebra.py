@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, literal_njit, njit
+from assoc._system.compiled import lean_inner_njit, literal_njit, njit
 from assoc._types import Array
 
 
@@ -28,7 +28,7 @@ def factor(A: Array, n: int, L: Array) -> bool:
     return True
 
 
-@inner_njit
+@lean_inner_njit
 def solve_in_place(L: Array, n: int, b: Array) -> None:
     """Replace b (n,) by the solution of L L' x = b."""
     for i in range(n):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
@@ -99,7 +99,7 @@ def sigma_points(mean: Array, P: Array, scale: float, points: Array) -> int:
     return GOOD
 
 
-@inner_njit
+@lean_inner_njit
 def _draw(mean: Array, scale: float, factor: Array, points: Array) -> None:
     """Write the 2 n + 1 sigma points of one Gaussian; the factor of its covariance is lower triangular."""
     n = len(mean)
@@ -111,7 +111,7 @@ def _draw(mean: Array, scale: float, factor: Array, points: Array) -> None:
             points[1 + n + k, i] = mean[i] - step
 
 
-@inner_njit
+@lean_inner_njit
 def _regress(h: Array, weights: Array, F: Array, mu: Array, C: Array, extra: Array) -> None:
     """Weighted mean (d,) of measured sigma points (2 n + 1, d), their cross covariance (d, n), covariance (d, d).
 
@@ -264,7 +264,7 @@ def move_ensemble(members: Array, F: Array, shocks: Array, moved: Array, factors
                 out[b, s, i] = total
 
 
-@inner_njit
+@lean_inner_njit
 def _sample_moments(members: Array, h: Array, noise: Array, mu: Array, mean: Array, C: Array, S: Array) -> None:
     """Sample means (d,) and (n,) of measured members (N, d) and of members (N, n), covariances (n, d) and (d, d).
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Floats, Ints
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, PackingArrays
@@ -179,7 +179,7 @@ def hard_sweeps(packing: PackingArrays, duals: Floats, updated: Floats, sweeps: 
                     updated[row_cols[k]] -= least
 
 
-@inner_njit
+@lean_inner_njit
 def _gathered_sum(values: Floats, places: Ints, first: int, end: int) -> float:
     """Sum of ``values[places[first:end]]`` in four independent partial sums, which processors overlap."""
     a = b = c = d = 0.0
@@ -258,7 +258,7 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
     return visits
 
 
-@inner_njit
+@lean_inner_njit
 def _list_near(
     packing: PackingArrays, duals: Floats, reduced: Floats, c: int, limit: float, near: tuple[Ints, Ints, Ints]
 ) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.copying import copy_to
 from assoc._system.kernels.sorting import order_of
 from assoc.packing.branching.node import Work, allowed_at, branch, drop, keep_side, open_node, relax
@@ -65,7 +65,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
     return weight, count
 
 
-@inner_njit
+@lean_inner_njit
 def _by_values(work: Work, allowed: Allowed) -> bool:
     """Lower the keys by the LP's values, so that large values come first; whether all are whole numbers."""
     in_basis, values, active, key = work.basis.position, work.basis.values, allowed.active, work.key

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
@@ -63,7 +63,7 @@ def no_kept_bases(program: Program, elements: int = _ELEMENTS) -> KeptBases:
     )  # fmt: skip
 
 
-@inner_njit
+@lean_inner_njit
 def keep_basis(kept: KeptBases, basis: Basis) -> None:
     """Keep a copy of a basis."""
     count = kept.age.size
@@ -77,7 +77,7 @@ def keep_basis(kept: KeptBases, basis: Basis) -> None:
         kept.age[position] = basis.age[0]
 
 
-@inner_njit
+@lean_inner_njit
 def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> bool:
     """Copy the kept basis of the same variables, except multipliers and anchors, to ``basis``; False if there is none.
 
@@ -164,7 +164,7 @@ def knowing(work: Work, trials: Trials) -> Work:
     return work._replace(trials=work.trials._replace(gain=trials.gain, tried=trials.tried))
 
 
-@inner_njit
+@lean_inner_njit
 def drop(work: Work, num: int, bound: float, cut: float) -> int:
     """Drop the columns and the slack that no solution below the cut has; return the number of columns left.
 

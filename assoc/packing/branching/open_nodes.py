@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import lean_inner_njit
 from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.branching.root import Root
@@ -95,13 +95,13 @@ class OpenNodes:
         self.arrays = Stack(*(np.concatenate([array, np.zeros_like(array)]) for array in self.arrays))
 
 
-@inner_njit
+@lean_inner_njit
 def has_room(stack: Stack, top: int) -> bool:
     """Whether there is room to replace the node at ``top`` by two children."""
     return top + 2 < stack.first.size and stack.first[top] + 2 * stack.size[top] <= stack.arena.size
 
 
-@inner_njit
+@lean_inner_njit
 def take_node(stack: Stack, top: int, node: Allowed) -> int:
     """Load the node at ``top``; return its number of columns."""
     num = stack.size[top]
@@ -113,7 +113,7 @@ def take_node(stack: Stack, top: int, node: Allowed) -> int:
     return num
 
 
-@inner_njit
+@lean_inner_njit
 def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float) -> None:
     """Push a node above those below ``top``; its columns follow theirs."""
     position = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0

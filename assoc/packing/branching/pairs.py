@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats, Ints
 from assoc.packing.simplex.basis import Basis
@@ -74,7 +74,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
     )  # fmt: skip
 
 
-@inner_njit
+@lean_inner_njit
 def is_dropped(cols: Ints, j: int, row: int, other: int, joined: bool) -> bool:
     """Whether column j is forbidden where two rows are together (no column has only one) or apart (none has both)."""
     uses = 0
@@ -103,7 +103,7 @@ def answer(cols: Ints, allowed: Allowed, pair: tuple[int, int], joined: bool, si
     return count
 
 
-@inner_njit
+@lean_inner_njit
 def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
     """Find the most fractional pairs of rows of the LP's solution; return their number."""
     mass, pairs, values = trials.mass, trials.pairs, trials.values
@@ -146,7 +146,7 @@ def doubtful_pairs(cols: Ints, basis: Basis, trials: Trials) -> int:
     return count
 
 
-@inner_njit
+@lean_inner_njit
 def _try(
     program: Program,
     cols: Ints,
@@ -210,7 +210,7 @@ def decide(
     return pick, NEITHER
 
 
-@inner_njit
+@lean_inner_njit
 def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> tuple[int, int]:
     """Return two rows that some columns have together and others do not; -1, -1 if there are none.
 
@@ -234,7 +234,7 @@ def any_open_pair(cols: Ints, allowed: Allowed, counts: Ints) -> tuple[int, int]
     return -1, -1
 
 
-@inner_njit
+@lean_inner_njit
 def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, counts: Ints) -> int:
     """Find pairs that the whole-numbered LP solution has together, those in most other columns; return their number."""
     pairs, values = trials.pairs, trials.values
@@ -276,7 +276,7 @@ def certain_pairs(cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, co
     return found
 
 
-@inner_njit
+@lean_inner_njit
 def part_certain(
     program: Program, cols: Ints, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> tuple[int, int]:

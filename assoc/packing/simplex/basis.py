@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.copying import copy_to
 from assoc._system.kernels.sorting import order_of
 from assoc._types import Floats
@@ -81,7 +81,7 @@ def copy_basis(source: Basis, target: Basis) -> None:
         getattr(target, name)[:] = getattr(source, name)
 
 
-@inner_njit
+@lean_inner_njit
 def copy_without_inverse(source: Basis, target: Basis) -> None:
     """Copy the variables of ``source``, their values, the edge weights and the multipliers to ``target``."""
     copy_to(target.variable, source.variable)
@@ -113,7 +113,7 @@ def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: B
     copy_to(basis.duals, duals)
 
 
-@inner_njit
+@lean_inner_njit
 def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
     """Coordinates of column j in the basis."""
     inverse, rows = basis.inverse, program.rows
@@ -124,7 +124,7 @@ def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
             column[i] += inverse[r, i]
 
 
-@inner_njit
+@lean_inner_njit
 def exchange(basis: Basis, p: int, column: Floats) -> None:
     """Pivot: the variable of these coordinates enters at position p. Updates the inverse, the norms, the values."""
     inverse, row, sums, norms, values = basis.inverse, basis.row, basis.sums, basis.norms, basis.values
@@ -160,7 +160,7 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
     basis.age[0] += 1
 
 
-@inner_njit
+@lean_inner_njit
 def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
     """Record that a variable has entered at position p."""
     num, size = program.weights.size, program.sides.size
@@ -278,7 +278,7 @@ def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], du
     return basis
 
 
-@inner_njit
+@lean_inner_njit
 def residual(program: Program, basis: Basis) -> float:
     """Largest violation of a row by the values of the basis."""
     num, size = program.weights.size, program.sides.size

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._system.kernels.copying import copy_to
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
@@ -65,7 +65,7 @@ def most_exchanges(program: Program) -> int:
     return _A_ROW * program.sides.size
 
 
-@inner_njit
+@lean_inner_njit
 def cost_tolerance(program: Program, allowed: Allowed) -> float:
     """Reduced costs this far below 0 count as 0."""
     scale = 0.0
@@ -74,7 +74,7 @@ def cost_tolerance(program: Program, allowed: Allowed) -> float:
     return _COST * max(scale, 1e-300)
 
 
-@inner_njit
+@lean_inner_njit
 def bound_of(program: Program, basis: Basis) -> float:
     """The bound of the multipliers, without a check of their feasibility."""
     sides, duals = program.sides, basis.duals
@@ -84,7 +84,7 @@ def bound_of(program: Program, basis: Basis) -> float:
     return bound
 
 
-@inner_njit
+@lean_inner_njit
 def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
     """Mark the positions whose variable may be above 0: allowed columns and slacks."""
     num, size = program.weights.size, program.sides.size
@@ -94,7 +94,7 @@ def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
         basis.free[i] = columns[code] if code < num else code < num + size and slack[code - num]
 
 
-@inner_njit
+@lean_inner_njit
 def leaving(basis: Basis) -> int:
     """The position whose variable is farthest outside its limits, measured along the edge; -1 if none is."""
     values, norms, free, scores = basis.values, basis.norms, basis.free, basis.pricing.ratios
@@ -108,7 +108,7 @@ def leaving(basis: Basis) -> int:
     return int(position_of_largest(basis.pricing.bits, values.size))
 
 
-@inner_njit
+@lean_inner_njit
 def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
     """Fill ``entries`` with the tableau row and ``reduced`` with the slacks' reduced costs; return their number."""
     row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_position, allowed.slack, basis.pricing
@@ -120,7 +120,7 @@ def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
     return int(count + row.size)
 
 
-@inner_njit
+@lean_inner_njit
 def _fill_ratios(pricing: Pricing, count: int, tolerance: float) -> None:
     """Fill ``ratios`` with the steps of the multipliers at which each reduced cost is below 0 by the tolerance."""
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
@@ -131,7 +131,7 @@ def _fill_ratios(pricing: Pricing, count: int, tolerance: float) -> None:
         ratios[a] = ratio if entries[a] > _ENTRY and ratio >= 0.0 else np.inf
 
 
-@inner_njit
+@lean_inner_njit
 def _fill_pivots(pricing: Pricing, count: int, least: float) -> None:
     """Fill ``ratios`` with the entries of the variables whose reduced costs reach 0 by then, and 0 for all others."""
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
@@ -141,7 +141,7 @@ def _fill_pivots(pricing: Pricing, count: int, least: float) -> None:
         ratios[a] = entries[a] if passed else 0.0
 
 
-@inner_njit
+@lean_inner_njit
 def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> tuple[int, float]:
     """The variable that first limits the step of the multipliers, and the step; -1 if none does.
 
@@ -162,7 +162,7 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     return chosen, step
 
 
-@inner_njit
+@lean_inner_njit
 def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: float, step: float) -> None:
     """Move the multipliers along the row of position p, and update the reduced costs."""
     pricing, row, duals = basis.pricing, basis.row, basis.duals

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._types import Floats
 from assoc.packing.simplex.program import Allowed, Program
 
@@ -84,7 +84,7 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
     pricing.listed[1] = extra
 
 
-@inner_njit
+@lean_inner_njit
 def sum_rows(terms: Floats, factor: float, pricing: Pricing, sums: Floats) -> None:
     """Fill ``sums``, by position, with the terms of the rows of each column, times a factor."""
     padded, codes, count = pricing.terms, pricing.codes, pricing.listed[0]
@@ -101,7 +101,7 @@ def sum_rows(terms: Floats, factor: float, pricing: Pricing, sums: Floats) -> No
         sums[position[e]] += padded[row[e]]
 
 
-@inner_njit
+@lean_inner_njit
 def price(program: Program, duals: Floats, position: NDArray[np.int32], pricing: Pricing) -> float:
     """Compute the reduced costs of the listed columns; return the least outside the basis."""
     reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import lean_inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import PackingArrays
@@ -53,7 +53,7 @@ def program_of(packing: PackingArrays) -> Program:
     return Program(packing.weights, start, packing.cols[used], np.ones(packing.slack.size), num_sensors)
 
 
-@inner_njit
+@lean_inner_njit
 def reduced_cost(program: Program, duals: Floats, j: int) -> float:
     """Weight of column j less the multipliers of its rows."""
     start, rows = program.start, program.rows

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import lean_inner_njit
 from assoc._system.kernels.copying import copy_to
 from assoc._types import Floats
 from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, copy_without_inverse, enter
@@ -68,7 +68,7 @@ def new_trial(program: Program, exchanges: int) -> Trial:
     )  # fmt: skip
 
 
-@inner_njit
+@lean_inner_njit
 def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) -> None:
     """Record the basis from which trials start, and what it allows."""
     pricing = trial.basis.pricing
@@ -81,7 +81,7 @@ def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) 
             trial.rows[i, r] = base.inverse[r, i]
 
 
-@inner_njit
+@lean_inner_njit
 def _tableau_row(trial: Trial, done: int, p: int) -> None:
     """Fill ``row`` with the inverse's row of position p, after the pivots done."""
     factors, shares, row = trial.factors, trial.shares, trial.basis.row
@@ -109,7 +109,7 @@ def _tableau_row(trial: Trial, done: int, p: int) -> None:
         factors[position] = 0.0
 
 
-@inner_njit
+@lean_inner_njit
 def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, variable: int) -> None:
     """Fill ``column`` with the coordinates of a variable in the basis, after the pivots done."""
     num, column, etas, pivots = program.weights.size, trial.basis.column, trial.etas, trial.pivots
@@ -126,7 +126,7 @@ def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, vari
                 column[i] += share * etas[k, i]
 
 
-@inner_njit
+@lean_inner_njit
 def _exchange(trial: Trial, done: int, p: int) -> None:
     """Pivot: the variable of ``column`` enters at position p. Updates the eta, the weights, the values."""
     basis, etas = trial.basis, trial.etas
@@ -145,7 +145,7 @@ def _exchange(trial: Trial, done: int, p: int) -> None:
     norms[p] = max(leaving_norm / (pivot * pivot), _LEAST)
 
 
-@inner_njit
+@lean_inner_njit
 def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effort: Effort) -> int:
     """Take some steps from the recorded optimal basis, after ``allowed`` has been restricted; return the status.
 

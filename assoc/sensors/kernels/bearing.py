@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import TURN, Information, Six, Three
 from assoc.sensors.radar import NEAREST
 
 
-@inner_njit
+@lean_inner_njit
 def measure_bearing(dim: int, dx: float, dy: float, dz: float, h: Array) -> None:
     """Write the azimuth (and elevation) of a position, relative to the sensor, into h."""
     h[0] = math.atan2(dy, dx)
@@ -18,7 +18,7 @@ def measure_bearing(dim: int, dx: float, dy: float, dz: float, h: Array) -> None
         h[1] = math.atan2(dz, math.hypot(dx, dy))
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_bearing(dim: int, dx: float, dy: float, dz: float, h: Array, H: Array) -> None:
     """Write the azimuth (and elevation) into h and the derivatives into H, which holds zeros."""
     flat = math.hypot(dx, dy)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit, lean_inner_njit, njit
 from assoc._types import Array
 from assoc.sensors.codes import BEARING, POSITION, RADAR2D, RADAR3D
 from assoc.sensors.kernels.bearing import add_bearing, linearise_bearing, measure_bearing
@@ -28,7 +28,7 @@ from assoc.sensors.kernels.records import TURN, Converted, Information, Six, Thr
 from assoc.sensors.radar import NEAREST
 
 
-@inner_njit
+@lean_inner_njit
 def linearise(code: int, dim: int, position: Array, x: float, y: float, z: float, h: Array, H: Array) -> None:
     """Write the noise-free measurement of a position into h (d,) and its derivatives into H (d, 3)."""
     H[:dim, :3] = 0.0
@@ -63,7 +63,7 @@ def measure(code: int, dim: int, position: Array, x: float, y: float, z: float, 
         h[2] = z
 
 
-@inner_njit
+@lean_inner_njit
 def measure_moving(position: Array, state: Array, columns: Array, h: Array) -> None:
     """Write range, azimuth, elevation and range rate of a state into h (4,).
 
@@ -80,7 +80,7 @@ def measure_moving(position: Array, state: Array, columns: Array, h: Array) -> N
     h[3] = along / max(h[0], NEAREST)
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_moving(position: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
     """Write range, azimuth, elevation and range rate into h (4,), and their derivatives by the columns into H (4, c).
 
@@ -98,7 +98,7 @@ def linearise_moving(position: Array, state: Array, columns: Array, h: Array, H:
     h[3] = linearise_range_rate(dx, dy, dz, (state[columns[axes]], state[columns[axes + 1]], vz), H, axes)
 
 
-@inner_njit
+@lean_inner_njit
 def wrap(code: int, v: Array) -> None:
     """Bring the azimuth of a residual (d,) into (-pi, pi]."""
     if code == BEARING:
@@ -107,7 +107,7 @@ def wrap(code: int, v: Array) -> None:
         v[1] -= TURN * math.ceil(v[1] / TURN - 0.5)
 
 
-@inner_njit
+@lean_inner_njit
 def fold(folding: float, v: Array) -> None:
     """Bring the range rate of a residual (4,) within half an interval; 0: it does not fold."""
     if folding > 0.0:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import Converted, Information, Six, Three
 
 
-@inner_njit
+@lean_inner_njit
 def measure_position(dim: int, x: float, y: float, z: float, h: Array) -> None:
     """Write x, y (and z) into h."""
     h[0], h[1] = x, y
@@ -15,7 +15,7 @@ def measure_position(dim: int, x: float, y: float, z: float, h: Array) -> None:
         h[2] = z
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_position(dim: int, x: float, y: float, z: float, h: Array, H: Array) -> None:
     """Write x, y (and z) into h, and ones into H, which holds zeros."""
     h[0], h[1] = x, y

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import inner_njit
+from assoc._system.compiled import inner_njit, lean_inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import TURN, Converted, Information, Six, Three
 from assoc.sensors.radar import NEAREST
@@ -13,7 +13,7 @@ START_REACH = 10.0
 """Squared Mahalanobis distance that a converted measurement covers where a search for a position starts."""
 
 
-@inner_njit
+@lean_inner_njit
 def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
     """Write range and azimuth of a position, relative to the radar, into h; return the ground range."""
     flat = math.hypot(dx, dy)
@@ -21,7 +21,7 @@ def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
     return flat
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array) -> Three:
     """Write range, azimuth and their derivatives; return the ground range, and it and the slant range above zero."""
     flat = measure_range_azimuth(dx, dy, dz, h)
@@ -32,7 +32,7 @@ def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array)
     return flat, ground, slant
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> None:
     """Write range, azimuth and elevation into h and their derivatives into H, which holds zeros."""
     flat, ground, slant = linearise_range_azimuth(dx, dy, dz, h, H)
@@ -42,7 +42,7 @@ def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> No
     H[2, 2] = ground / (slant * slant)
 
 
-@inner_njit
+@lean_inner_njit
 def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Array, columns: int) -> float:
     """Write the range rate's derivatives by position and, from `columns` on, by velocity into H[3]; return it."""
     slant = math.hypot(max(math.hypot(dx, dy), NEAREST), dz)

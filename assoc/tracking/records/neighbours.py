@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import lean_inner_njit, njit
 from assoc._types import Array
 
 # cells along an axis that does not come back; those so many away, or twice, are one
@@ -46,7 +46,7 @@ def near(cells: Cells, at: Array, most: int) -> tuple[Array, Array, Array]:
     return _near(cells, at, most)
 
 
-@inner_njit
+@lean_inner_njit
 def _steps(x: float, period: float, side: float, shift: int, parts: Array, row: int) -> int:
     """What the cell of a number, and those beside it, add to keys; how many they are."""
     count, here = _CELLS, int(math.floor(x / side)) & (_CELLS - 1) if period == 0.0 else 0
@@ -59,7 +59,7 @@ def _steps(x: float, period: float, side: float, shift: int, parts: Array, row: 
     return min(count, 3)
 
 
-@inner_njit
+@lean_inner_njit
 def _bin(key: int, bins: int) -> int:
     return ((key * _SPREAD) >> 40) & (bins - 1)
 
@@ -82,7 +82,7 @@ def _listed(places: Array, around: Array, side: float) -> tuple[Array, Array, Ar
     return first, following, keys
 
 
-@inner_njit
+@lean_inner_njit
 def _square(cells: Cells, k: int, at: Array, row: int) -> float:
     """Squared distance, the short way round."""
     total = 0.0
