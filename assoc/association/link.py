@@ -70,9 +70,8 @@ def link(
     """Link the points of consecutive frames that belong to the same particle.
 
     The sum of squared distances is least over all frames together, where a particle that ends and one that begins
-    cost at least ``search_range**2`` together (Crocker and Grier 1996, whose rule, just that, is trackpy's). Each
-    point has at most
-    one next point and is the next of at most one, this is one assignment of two lists, solved with proof.
+    cost at least ``search_range**2`` together (Crocker and Grier 1996 and trackpy: just that). As each point has at
+    most one next point and is the next of at most one, this is one assignment of two lists, solved with proof.
 
     Parameters
     ----------

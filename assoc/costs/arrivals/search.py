@@ -4,9 +4,9 @@ Growing tuples station by station would list all parts of what many stations hea
 sought are emissions instead, places and times that many arrival times agree with. For a cell of places each arrival
 time is an interval of times of emission; where intervals overlap, the gains of their stations bound what a target there
 can be worth. Cells that can hold none are given up, others are halved until they are as small as the gates. There
-each time at which most intervals overlap is where a fit starts. A cell where each station has at most one
-arrival time is not halved if these are one emission, or few: their parts are all it can hold. Arrival times that
-neighbouring cells share are fitted once.
+each time at which most intervals overlap is where a fit starts. A cell where each station has at most one arrival time
+is not halved if these are one emission, or few: their parts are all it can hold. Arrival times that neighbouring cells
+share are fitted once.
 
 Of what few stations hear all parts are listed. Of many, an optimal association gives a target every arrival time that
 fits it and that no other target has. So an emission is listed without an arrival time, or with a worse one of that
