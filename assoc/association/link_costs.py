@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -143,13 +144,13 @@ def learnt(costs: LinkCosts, links: Pairs, points: Points, candidates: int) -> L
 def _end_and_beginning(reach: float, links: Pairs, points: Points, candidates: int) -> float:
     """From where on a squared step is less likely than an end and a beginning, one as frequent as the other."""
     dim, count = points.places.shape[1], float(points.first[-2])
-    variance = max(float(links.squares.mean()) / dim, 1e-12 * reach**2)
+    variance = max(float(links.squares.mean()) / dim, 1e-12 * reach**2, sys.float_info.min)
     ended = (count - len(links.gaps) + 0.5) / (count + 1.0)
-    # of points, as wrong candidates show it
-    density = (candidates - len(links.gaps) + 0.5) / (count + 1.0)
-    density /= math.pi ** (0.5 * dim) / math.gamma(0.5 * dim + 1.0) * reach**dim
+    # of points, as wrong candidates show it, in the ball within reach
+    ball = 0.5 * dim * math.log(math.pi) - math.lgamma(0.5 * dim + 1.0) + dim * math.log(reach)
+    density = math.log((candidates - len(links.gaps) + 0.5) / (count + 1.0)) - ball
     step = math.log1p(-ended) - 0.5 * dim * math.log(2.0 * math.pi * variance)
-    return 2.0 * variance * (step - math.log(ended * ended * density))
+    return 2.0 * variance * (step - 2.0 * math.log(ended) - density)
 
 
 def velocities(points: Points, links: Array, moved: Array) -> Array:

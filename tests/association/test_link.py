@@ -183,6 +183,13 @@ def test_ends_cost_what_links_say():
     np.testing.assert_allclose(wide.solution.cost, as_range.solution.cost, rtol=1e-8)
 
 
+@pytest.mark.parametrize(("scale", "dim"), [(1e-150, 2), (1e11, 3), (1e-12, 400), (1.0, 400)])
+def test_what_ends_cost_of_any_size(scale, dim):
+    frames = [scale * (np.arange(3)[:, None] + np.full(dim, 0.01 * k)) for k in range(4)]
+    ids = assoc.link(frames, scale * 0.5 * dim**0.5).ids
+    assert [one.tolist() for one in ids] == [[0, 1, 2]] * 4
+
+
 @pytest.mark.parametrize(
     ("frames", "options", "words"),
     [
