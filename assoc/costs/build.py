@@ -14,7 +14,7 @@ from assoc._types import Array
 from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, sensor_arrays, unmissed
 from assoc.costs.arrivals.fit import any_arrivals
-from assoc.costs.arrivals.search import grow_arrivals
+from assoc.costs.arrivals.tuples import grow_arrivals
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import fitting

@@ -1,6 +1,7 @@
 """Arrival times of which the time of emission is not known, beside sums over a dense grid of places and times."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,28 @@ def test_the_optimum_of_all_tuples_in_the_region_is_among_the_listed(density):
             tuple_costs(scene, 0, listed.tuples, target_density=density), listed.costs, rtol=0, atol=0.05
         )
     assert listed_all >= 38
+
+
+def test_parts_of_two_shots_at_once_are_listed():
+    """Beside all tuples in the region: what is heard of both within the time in which sound crosses it."""
+    useful = missing = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        sites = np.column_stack([rng.uniform(0, 1000, (7, 2)), np.zeros(7)])
+        shots = np.column_stack([rng.uniform(0, 1000, (2, 2)), np.zeros(2)])
+        emitted = rng.uniform(0, 0.5, 2)
+        sensors = [replace(microphones(1, noise=0.002)[0], position=site) for site in sites]
+        due = emitted + np.linalg.norm(sites[:, None] - shots, axis=2) / SPEED + rng.normal(0, 0.002, (7, 2))
+        scan = [times[rng.random(2) < 0.9, None] for times in due]
+        scene = Scene(sensors, [0.0], [scan], region=FIELD)
+        every = build_problem(scene, 0, all_tuples=True, gate_probability=1.0)
+        listed = {*map(tuple, build_problem(scene, 0, gate_probability=1.0).tuples.tolist())}
+        places = positions_and_covariances(scene, 0, every.tuples)[0]
+        good = ((places[:, :2] >= 0.0) & (places[:, :2] <= 1000.0)).all(axis=1) & (every.costs < 0.0)
+        good &= np.count_nonzero(every.tuples, axis=1) > 3
+        useful += np.count_nonzero(good)
+        missing += sum(tuple(one) not in listed for one in every.tuples[good].tolist())
+    assert missing < 0.03 * useful and useful > 400
 
 
 def test_twenty_stations():
