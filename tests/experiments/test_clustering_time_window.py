@@ -45,6 +45,7 @@ def test_the_baseline_follows_one_aircraft():
     assert tracker.mean[0] == pytest.approx([230 * 190 - 20e3, 1e5, 230.0, 0.0], rel=0.02, abs=10.0)
 
 
+@pytest.mark.slow
 def test_window_and_stamps_are_worth_what_is_claimed():
     recording = simulate_recording("rotating-radar", 5).recording
     groups = {

@@ -52,6 +52,7 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it(monke
         assert given == {tuple(usage.rpartition("]")[2].split())}, module
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_rows_are_run_small(capsys, tmp_path):
     assert len(commands.commands()) > 25 and sum(commands.commands().values()) > 110
     folder = "python -m experiments.papers.clustering_time_window.tables FOLDER"

@@ -28,6 +28,7 @@ def make(name, seed):
 """
 
 
+@pytest.mark.slow
 def test_all_trackers_follow_an_easy_scene(tmp_path):
     pytest.importorskip("stonesoup")
     (tmp_path / "scenes.py").write_text(FILE)

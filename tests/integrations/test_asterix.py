@@ -57,6 +57,7 @@ def test_plots_there_and_back(plots, file, tmp_path):
         np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
 
 
+@pytest.mark.slow
 def test_parts_of_a_file_are_the_whole(tmp_path):
     """Also with plots that come late, garbled altitudes at the borders, and another radar between."""
     made = simulate_recording("rotating-radar", 3, aircraft=6, duration=2000.0).recording

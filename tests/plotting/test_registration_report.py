@@ -21,6 +21,7 @@ def page(found, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_figures(page, found):
     figures = figures_of(page)
     assert [*figures] == [f"residuals-before-and-after-{i}" for i in range(3)]

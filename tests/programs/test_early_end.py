@@ -72,6 +72,7 @@ def test_what_is_finished_is_written(work, number, word):
     assert "interrupted" in (work / "o.csv").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
 def test_an_interrupt_does_not_reach_the_writing(work):
     """A disk that takes two seconds; there is no patience with what loads kernels."""

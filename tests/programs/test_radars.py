@@ -289,6 +289,7 @@ def test_nothing_is_right_that_was_compared_with_nothing(tmp_path, capsys):
     assert re.search(r"looks wrong:\n  north: noise: 4 m and 0.05 deg are declared, \d\d\.?\d? m and", said)
 
 
+@pytest.mark.slow
 def test_without_heights_low_targets_have_no_track_and_the_end_says_so(tmp_path, capsys):
     """A drone 1 km away, seen every 10 s: as high as 20 km it would be anywhere."""
     rng, place, rows = np.random.default_rng(3), np.array([-800.0, 900.0]), []

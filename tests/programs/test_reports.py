@@ -97,6 +97,7 @@ def test_opensky_and_plain_plots(tmp_path):
         read_positions(str(tmp_path / "xy.csv"))
 
 
+@pytest.mark.slow
 def test_a_radar_beside_ais(tmp_path, capsys):
     """AIS is the reference by which the radar's north is found; tracks have the ships' numbers."""
     file = described(tmp_path, north=1.5)

@@ -371,6 +371,7 @@ def test_gain_of_ranges(gain):
     assert np.abs(left).max() < 0.5 * np.abs(short).max()
 
 
+@pytest.mark.slow
 def test_residuals_are_those_of_the_noise_where_an_antenna_turns_twice_as_fast():
     """Its better fitting one of two plots would leave residuals, and deviations told, that are too small."""
     scenes = [simulate("rotating-radars", seed, turns="4,8", aircraft=20, duration=160.0) for seed in (3, 4, 5)]

@@ -43,6 +43,7 @@ def test_what_grows_is_seen():
     assert held("Python's objects", objects=lambda place: 100 * place) is False
 
 
+@pytest.mark.slow
 def test_a_leak_is_seen():
     watch, kept = Watch(1), []
     for number in range(1, 21):

@@ -55,6 +55,7 @@ def test_a_row_is_a_run_that_assign_gives_again(study, whole, scene):
         assert row["true_tuples"] == one.true_tuples and row["correct_tuples"] == one.correct_tuples
 
 
+@pytest.mark.slow
 def test_a_kill_at_any_moment_of_writing_leaves_whole_batches(study, whole, tmp_path):
     """Copies of the folder between all steps of SQLite while a batch is written: what a killed process leaves."""
     rows = rows_of(whole)

@@ -10,6 +10,7 @@ from assoc.sensors import Radar3D
 from assoc.tracking import TRACKERS
 from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.records.echoes import AZIMUTH, RANGE, Echoes
+from tests.sizes import sample
 from tests.tracking.stepping import stepped
 
 NOISE = np.array([25.0, 3e-3, 4e-3])
@@ -72,7 +73,7 @@ def test_echoes_are_found_and_not_shown(name, kind, monkeypatch):
     assert reported(scene, name)[1][25:].mean() > 8.5
 
 
-@pytest.mark.parametrize("name", ["multi-sensor", "mht"])
+@sample("name", ["multi-sensor", "mht"], every=2)
 def test_short_echoes_are_more_than_chance_brings(name):
     """Also where a tracker knows of a track by its second plot alone; without echoes there are as many as by chance."""
     counted = []

@@ -31,6 +31,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_rows_are_those_of_a_whole_table(here):
     """A report needs all tracks at once."""
     for words in (["-o", "t.csv"], ["-o", "whole.csv", "--report", "r.html"]):

@@ -19,6 +19,7 @@ from assoc.tracking.records.extents import SPREADS, Extents, binomial, gamma_poi
 from assoc.tracking.stages.extents import _scatter
 from assoc.tracking.stages.gathering import gather
 from assoc.tracking.step import check
+from tests.sizes import sample
 
 SENSOR = PositionSensor(
     position=np.zeros(3), noise=[8.0, 8.0], detection_probability=0.9, false_alarm_rate=5.0,
@@ -62,7 +63,7 @@ def followed(tracker, times, scans):
     return steps, tracks
 
 
-@pytest.mark.parametrize("name", ["multi-sensor", "mht", "joint-probabilistic", "nearest-neighbour", "mht-hypothesis"])
+@sample("name", ["multi-sensor", "mht", "joint-probabilistic", "nearest-neighbour", "mht-hypothesis"], every=2)
 def test_a_ship_with_several_plots_becomes_one_track(name):
     times, scans, places = harbour()
     tracker = made(name, extended=True)
@@ -101,7 +102,7 @@ def test_how_long_ships_are_is_told_and_a_saved_tracker_goes_on_alike(tmp_path):
             again.restore(tmp_path / "bad.npz")
 
 
-@pytest.mark.parametrize(("spacing", "seed"), [(25.0, 0), (25.0, 1), (40.0, 2), (60.0, 3)])
+@sample("spacing,seed", [(25.0, 0), (25.0, 1), (40.0, 2), (60.0, 3)], every=4)
 def test_targets_that_fly_close_together_stay_what_they_are(spacing, seed):
     grid = spacing * np.stack(np.meshgrid(np.arange(3.0), np.arange(2.0)), axis=-1).reshape(-1, 2)
     places = paths()[0][:, :1] + grid

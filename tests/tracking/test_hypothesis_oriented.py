@@ -92,6 +92,7 @@ def test_the_28_hypotheses_of_reids_example():
     assert sum(row.count(1) < 2 and row.count(2) < 2 for row in rows) == 28
 
 
+@pytest.mark.slow
 def test_targets_that_are_seldom_detected_are_confirmed_as_by_mht():
     """Of three scans, hardly one detects: what the best hypothesis leaves to false alarms is not decided yet."""
     scans = {HypothesisOrientedMHT: 0, TrackOrientedMHT: 0}

@@ -125,6 +125,7 @@ def dense_scans(rng):
         yield scan
 
 
+@pytest.mark.slow
 @sample("seed", [7, 2, 30], every=3)
 def test_confirmed_tracks_keep_their_ids_where_tentative_ones_turn_out_to_be_others(seed):
     """A late measurement may let a tentative track begin anew, or not any more: the confirmed one keeps its id."""

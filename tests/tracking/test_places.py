@@ -101,7 +101,7 @@ def test_targets_close_together_are_no_clutter(speed, spacing, noise):
     assert sum(track.reported for track in tracker.tracks) >= 11
 
 
-@pytest.mark.parametrize("spacing", [60.0, 45.0])
+@sample("spacing", [45.0, 60.0], every=2)
 def test_what_stands_is_no_place_though_its_tracks_predict_badly(spacing):
     """Ships at a pier, three or four sigma apart, by a filter that lets them manoeuvre: as often shown as without."""
     for seed in range(3):
@@ -169,6 +169,7 @@ def test_density_of_points_that_stand():
     assert found == pytest.approx(np.log(expected * sensor.volume / sensor.false_alarm_rate), abs=0.01)
 
 
+@pytest.mark.slow
 def test_turbines_that_flicker_are_clutter():
     """Twelve points that return a plot in a third of the turns, each its own: tracked without a map, not with one."""
     shown = []

@@ -44,6 +44,7 @@ def test_boats_in_a_small_region_get_tracks(targets):
     np.testing.assert_allclose(speeds, [2.0, 3.0], atol=0.7)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_tracked_the_end_says_which_slower_targets_would_be(tmp_path, capsys):
     harbour(scans=40).save(tmp_path / "harbour.npz")
     words = [str(tmp_path / "harbour.npz"), "-o", str(tmp_path / "tracks.csv")]
@@ -77,6 +78,7 @@ def test_short_tracks_of_false_alarms_say_so(tmp_path, capsys):
     assert ": 1 confirmed track" in told and "slower" not in told
 
 
+@pytest.mark.slow
 def test_auto_tells_aircraft_from_boats():
     assert target_kind("auto", harbour(1), NearestNeighbourTracker.for_scene).speed <= TARGETS["ship"].speed
     aircraft = simulation.simulate("three-radar", 1, scans=8)
