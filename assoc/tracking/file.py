@@ -31,7 +31,7 @@ from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import Starter, TrackerState
 
 FORMAT = "assoc.tracker"
-VERSION = 7
+VERSION = 8
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 

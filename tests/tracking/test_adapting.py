@@ -10,6 +10,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.sensors import Radar2D
 from assoc.sensors.base import wrap_angle
+from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
@@ -116,8 +117,10 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
         seen.append(Seen(np.arange(T), z, predicted))
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
-    shown = shown_by(sensors, seen, prior, factors, factors)
-    assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
+    shown = shown_by(sensors, seen, prior, factors, np.append(factors, 1.0))
+    # beside other sensors nothing is asked of predictions
+    known = count + (count == 1)
+    assert np.linalg.solve(shown.matrix[:known, :known], shown.right[:known]) == pytest.approx(1.0, abs=0.1)
 
 
 def test_heights_that_transponders_say_are_no_noise_of_radars():
@@ -145,8 +148,8 @@ def test_heights_that_transponders_say_are_no_noise_of_radars():
         seen.append(Seen(np.arange(T), z, predicted))
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
-    shown = shown_by(sensors, seen, prior, np.ones(2), np.ones(2))
-    assert np.linalg.solve(shown.matrix, shown.right) == pytest.approx(1.0, abs=0.1)
+    shown = shown_by(sensors, seen, prior, np.ones(2), np.ones(3))
+    assert np.linalg.solve(shown.matrix[:2, :2], shown.right[:2]) == pytest.approx(1.0, abs=0.1)
 
 
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():
@@ -243,6 +246,16 @@ def test_a_sensor_that_is_off_misses_nothing():
             tracker.step(4.0 * k, [z[:0] if k in off else z for z in scene.measurements[k]], sectors=sectors)
         shown.append(sum(track.reported for track in tracker.tracks))
     assert shown == [TARGETS, 0]
+
+
+def test_cautious_predictions_make_noise_no_smaller():
+    """Aircraft fly straighter than the filter expects, and radars see them one after the other."""
+    seen = []
+    for seed in range(2):
+        scene = simulate("rotating-radars", seed, turns="4,7,11", interval=1.0, aircraft=12)
+        told = [replace(sensor, noise=2.0 * sensor.noise) for sensor in scene.sensors]
+        seen += [sensor.noise.seen for sensor in tracked(scene, told).health.sensors]
+    assert np.mean(seen) == pytest.approx(0.5, abs=0.05)
 
 
 def wider_alarms(sensors, rate):

@@ -91,5 +91,5 @@ def test_a_tracker_saved_in_the_middle_of_a_scene_goes_on(kind, name, options, c
 def test_a_file_of_version_1_is_refused(tmp_path):
     tracker, path = TRACKERS["mht"].for_scene(scene("three-radar")), tmp_path / "state.npz"
     np.savez(path, format=np.array(FORMAT), version=np.array(1), settings=np.array("{}"))
-    with pytest.raises(InvalidInputError, match=r"state\.npz: has version 1 of 'assoc\.tracker', .* version 7 only"):
+    with pytest.raises(InvalidInputError, match=r"state\.npz: has version 1 of 'assoc\.tracker', .* version 8 only"):
         tracker.restore(path)

@@ -269,13 +269,12 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
     )
     velocities, moving = np.zeros((len(states), len(axes))), velocity_components(settings.filter.motion)
     velocities[:, : len(moving)] = states.mean[:, moving]
-    factors = estimates.found(declared)[:, NOISE]
     return shown_by(
         declared,
         seen,
         _predicted(states, axes, velocities, noises),
         estimates.used[:, NOISE],
-        factors,
+        estimates.factors,
         estimates.manoeuvres,
     )
 

@@ -2,7 +2,9 @@
 
 A sensor's measurement is compared with the position that the other sensors of the scan give; so the target's motion
 does not matter. Where there is no other, it is compared with the prediction of the filter's quietest model, by its
-probability. The variance of a residual is a sum of parts, each proportional to the variance of one sensor's noise.
+probability. Filters are cautious: they expect manoeuvres, and so predictions are better than they say; one factor of
+all their variances is estimated with the noise. The variance of a residual is a sum of parts, each proportional to the
+variance of one sensor's noise or of the prediction.
 
 How hard targets manoeuvre is asked of the predictions of all models together, with more process noise and with less: a
 measurement that fits none of them may be a false alarm, and is as likely by each.
@@ -59,9 +61,10 @@ class Shown(NamedTuple):
     """What residuals show."""
 
     matrix: Array
-    """Normal matrix of the factors of the noise's variances, relative to those in use, (S, S)."""
+    """Normal matrix of the factors of the noise's and, last, of predictions' variances, relative to those in use,
+    (S + 1, S + 1)."""
     right: Array
-    """Its right side, (S,)."""
+    """Its right side, (S + 1,)."""
     noise: Array
     """Gain of the evidence for each estimated factor, (S,)."""
     manoeuvres: Array
@@ -81,11 +84,11 @@ def shown_by(
     """What residuals of measurements say.
 
     The sensors are as declared, with P_d and false alarms in use; `noise` (S,) are the factors of the noise's variances
-    in use, `estimates` (S,) the estimated ones, and `now` is that of the process noise.
+    in use, `estimates` (S + 1,) the estimated ones and that of predictions, and `now` is that of the process noise.
     """
     T, _, n = predicted.offsets.shape
     S = len(sensors)
-    sums = _Sums(noise, estimates)
+    sums = _Sums(np.append(noise, 1.0), estimates)
     prior = np.linalg.inv(predicted.covariance)
     parts = [sensor.position_part for sensor in sensors]
     whites = [np.linalg.inv(np.linalg.cholesky(part.covariance)) for part in parts]
@@ -129,7 +132,7 @@ def shown_by(
             others = information[:, t].copy()
             others[s] = 0.0
             gain = h @ np.linalg.inv(_BESIDE * prior[t] + others.sum(axis=0))
-            shares = np.zeros((*y[beside].shape, S))
+            shares = np.zeros((*y[beside].shape, S + 1))
             for r in range(S):
                 shares[..., r] = _diagonal(gain, others[r]) if r != s else noise[s]
             known = _diagonal(gain, _BESIDE**2 * prior[t])
@@ -137,12 +140,12 @@ def shown_by(
             sums.add(shares[:, own], known[:, own], rest[:, own] ** 2, np.ones(len(t)))
         if alone.any():
             t, h = track[alone], H[alone]
-            shares = np.zeros((*y[alone].shape, S))
+            shares = np.zeros((*y[alone].shape, S + 1))
             shares[..., s] = noise[s]
+            shares[..., S] = _diagonal(h, predicted.covariances[t, quiet])
             rest = y[alone] - _times(h, predicted.offsets[t, quiet])
-            known = _diagonal(h, predicted.covariances[t, quiet])
-            sums.add(shares[:, own], known[:, own], rest[:, own] ** 2, weights[t, quiet])
-    manoeuvres = _manoeuvres(parts, rows, predicted, np.maximum(noise, estimates), now)
+            sums.add(shares[:, own], np.zeros_like(rest[:, own]), rest[:, own] ** 2, weights[t, quiet])
+    manoeuvres = _manoeuvres(parts, rows, predicted, np.maximum(noise, estimates[:-1]), now)
     return Shown(sums.matrix, sums.right, sums.gain, manoeuvres, biases)
 
 
@@ -229,20 +232,22 @@ def _around(rows: Array, matrices: Array) -> Array:
 
 
 class _Sums:
-    """Sums over residuals, with the factors of noise in use and as estimated, (S,) each."""
+    """Sums over residuals, with the factors of variances in use and as estimated, (S + 1,) each."""
 
     def __init__(self, now: Array, estimates: Array) -> None:
         S = len(now)
-        self.matrix, self.right, self.gain = np.zeros((S, S)), np.zeros(S), np.zeros(S)
+        self.matrix, self.right, self.gain = np.zeros((S, S)), np.zeros(S), np.zeros(S - 1)
         self._now, self._estimates = now, estimates
 
     def add(self, parts: Array, known: Array, squares: Array, weights: Array) -> None:
-        """Add squares (K, d), given the parts of their variances (K, d, S), and parts that are known (K, d)."""
+        """Add squares (K, d), given the parts of their variances (K, d, S + 1), and parts that are known (K, d)."""
         variance = parts.sum(axis=-1) + known
         squares = np.minimum(squares, _MOST * variance)
         share = (parts / variance[..., None]).reshape(-1, parts.shape[-1])
         weighted = share * np.repeat(0.5 * weights, parts.shape[1])[:, None]
         self.matrix += weighted.T @ share
         self.right += weighted.T @ ((squares - known) / variance).ravel()
-        either = [variance[..., None] + parts * (factor / self._now - 1.0) for factor in (self._estimates, 1.0)]
+        wide = variance + parts[..., -1] * (self._estimates[-1] - 1.0)
+        parts, now = parts[..., :-1], self._now[:-1]
+        either = [wide[..., None] + parts * (factor / now - 1.0) for factor in (self._estimates[:-1], 1.0)]
         self.gain += np.einsum("k,kds->s", weights, gain_of_variances(squares[..., None], *either))

@@ -1,9 +1,10 @@
 """Estimates of what is declared but may be wrong: noise, detection probabilities, false alarms, manoeuvres.
 
 All of them are sums that forget exponentially, over a prior at the declared values. The noise of S sensors is S factors
-of variances, x: the square of a residual has the mean g x with known g, so that weighted least squares finds them
-together, whoever is to blame (`assoc.tracking.adapting.residuals`). Of the process noise a few factors are tried.
-Each estimate is used while it predicts better than what was declared (`assoc.tracking.records.prequential`).
+of variances, x, and that of predictions one more: the square of a residual has the mean g x with known g, so that
+weighted least squares finds them together, whoever is to blame (`assoc.tracking.adapting.residuals`). Of the process
+noise a few factors are tried. Each estimate is used while it predicts better than what was declared
+(`assoc.tracking.records.prequential`).
 
 A track's detections and misses count once it is detected again later: what follows the last detection may be the
 target's end. Read backwards from the last detection, the earlier ones are independent of the choice.
@@ -30,7 +31,7 @@ FACTORS = 4.0 ** np.arange(-3, 5)
 """By which the variance of the process noise may be multiplied."""
 
 # the priors count as so many squared residuals, dwells on targets, and scans
-_RESIDUALS, _DWELLS, _SCANS = 50.0, 20.0, 5.0
+_RESIDUALS, _DWELLS, _SCANS = 10.0, 20.0, 5.0
 # and are forgotten like all else, but for this share
 _LEFT = 0.05
 # log odds of detection differ by so much from band to band of range, and from the sensor's
@@ -53,9 +54,9 @@ class Estimates(NamedTuple):
     """What S sensors and the targets have shown so far."""
 
     factors: Array
-    """Factors of the variances of the sensors' noise, (S,)."""
+    """Factors of the variances of the sensors' noise and, last, of predictions, (S + 1,)."""
     weights: Array
-    """Their information, relative to the factors in use, (S, S)."""
+    """Their information, relative to the factors in use, (S + 1, S + 1)."""
     hits: Array
     """Detections of tracks by bands of range, (S, B)."""
     dwells: Array
@@ -87,7 +88,7 @@ class Estimates(NamedTuple):
         S, used = len(sensors), declared_values(sensors)
         none, nothing = np.zeros((0, S)), np.zeros((S, BANDS))
         return Estimates(
-            np.ones(S), 0.5 * _RESIDUALS * np.eye(S), nothing, nothing, np.zeros(S), np.zeros(S),
+            np.ones(S + 1), 0.5 * _RESIDUALS * np.eye(S + 1), nothing, nothing, np.zeros(S), np.zeros(S),
             np.zeros(0, dtype=np.int64), none, none, used, np.repeat(used[:, DETECTION, None], BANDS, axis=1),
             np.zeros((S, 4)), np.zeros(len(FACTORS)),
         )  # fmt: skip
@@ -99,7 +100,7 @@ class Estimates(NamedTuple):
     def found_and_spreads(self, sensors: Sequence[Sensor]) -> tuple[Array, Array]:
         """Estimates as in `used`, and standard deviations of their logarithms (P_d: of ln(P / (1 - P))), (S, 3)."""
         found, dwells, alarms = self._found_of(sensors)
-        seen, of_factors = found[:, DETECTION], np.sqrt(np.diagonal(np.linalg.inv(self.weights)))
+        seen, of_factors = found[:, DETECTION], np.sqrt(np.diagonal(np.linalg.inv(self.weights)))[:-1]
         spreads = [of_factors, 1.0 / np.sqrt(dwells * seen * (1.0 - seen)), 1.0 / np.sqrt(alarms)]
         return found, np.stack(spreads, axis=1)
 
@@ -109,9 +110,7 @@ class Estimates(NamedTuple):
         left = np.maximum(1.0 - (1.0 - KEEP) * self.turns, _LEFT)
         dwells, alarms = self.dwells.sum(axis=1) + _DWELLS * left, self.alarms + _SCANS * left * rate
         seen = (self.hits.sum(axis=1) + _DWELLS * left * P) / dwells
-        # beside a filter's cautious predictions alone, noise looks smaller than it is
-        factors = self.factors if len(sensors) > 1 else np.maximum(self.factors, 1.0)
-        return np.stack([factors, seen, alarms / (self.turns + _SCANS * left)], axis=1), dwells, alarms
+        return np.stack([self.factors[:-1], seen, alarms / (self.turns + _SCANS * left)], axis=1), dwells, alarms
 
     def by_range(self, seen: Array) -> tuple[Array, Array]:
         """Detection probabilities by bands of range, (S, B), and the information about their log odds, (S, B, B).
@@ -142,9 +141,14 @@ class Estimates(NamedTuple):
         evidence[:, NOISE] += noise
         return self._replace(evidence=evidence, agility=self.agility + agility)
 
+    @property
+    def _variances(self) -> Array:
+        """Factors in use, in the order of `factors`: predictions are used as they are."""
+        return np.append(self.used[:, NOISE], 1.0)
+
     def weighed(self, matrix: Array, right: Array) -> Estimates:
         """Take in residuals by their normal equations, relative to the factors in use."""
-        weights, noise = self.weights + matrix, self.used[:, NOISE]
+        weights, noise = self.weights + matrix, self._variances
         factors = noise * np.linalg.solve(weights, self.weights @ (self.factors / noise) + right)
         return self._replace(weights=weights, factors=np.clip(factors, 1.0 / _LARGEST, _LARGEST))
 
@@ -183,8 +187,8 @@ class Estimates(NamedTuple):
     def forgotten(self, turns: Array) -> Estimates:
         """The sums after a scan in which each sensor made so many turns, (S,)."""
         mean, S = float(turns.mean()), len(turns)
-        kept, prior = KEEP**turns, (1.0 - KEEP**mean) * _LEFT * 0.5 * _RESIDUALS * np.eye(S)
-        fading = self._replace(weights=self.weights * KEEP**mean).weighed(prior, prior @ (1.0 / self.used[:, NOISE]))
+        kept, prior = KEEP**turns, (1.0 - KEEP**mean) * _LEFT * 0.5 * _RESIDUALS * np.eye(S + 1)
+        fading = self._replace(weights=self.weights * KEEP**mean).weighed(prior, prior @ (1.0 / self._variances))
         return fading._replace(
             hits=self.hits * kept[:, None], dwells=self.dwells * kept[:, None],
             alarms=self.alarms * kept, turns=self.turns * kept,
