@@ -60,6 +60,17 @@ def test_regions_bound_and_cover(unit, cuts, monkeypatch):
     assert closed >= 10
 
 
+def test_regions_grow_where_cuts_alone_have_shown_as_much(monkeypatch):
+    """An answer that reaches out shows no more than the cuts did, and less by the margin of rounding."""
+    monkeypatch.setattr(regions, "MANY", 1)
+    monkeypatch.setattr(tightening, "_REGION", 25)
+    packing = prepare(wide_gates(60, 18, 0.5)).packing
+    parts = split_components(packing, dual_bound(packing, levels=5), packing.origin.astype(np.int64))
+    component = with_greedy_cover(max(parts, key=lambda one: one.packing.num_rows))
+    close_by_regions(component, lambda part: search_to_the_end(part, 10**6, 0, Run(0)), Run(0))
+    assert component.closed
+
+
 def test_cuts_of_regions_raise_the_bound_above_the_linear_program(monkeypatch):
     """Bound and reduced costs hold for the optimum and its columns; most of the gap of the linear program is closed."""
     monkeypatch.setattr(tightening, "_REGION", 60)

@@ -77,7 +77,7 @@ def close_by_regions(component: Component, solve: Solve, run: Run) -> NDArray[np
         searched = _search(component, prices, inside, solve)
         component.proven = max(component.proven, min(searched.bound, weight))
         # searches that end early may show less than cuts did
-        in_vain = bool(prices.cuts) and searched.bound < prices.bound
+        in_vain = bool(prices.cuts) and searched.bound < prices.bound - component.tolerance
         if component.closed or searched.hard or in_vain:
             break
         if not searched.reaching.size:

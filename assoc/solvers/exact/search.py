@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
-from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
+from assoc.packing.bounds.dual_ascent import PASSES, certified_bound, dual_bound, hard_pass
 from assoc.packing.bounds.matched import matched
 from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.branching.compiling import compile_branching_ahead
@@ -43,6 +43,8 @@ _DENSE = 15
 _THIN = 4
 # rows from which a component may keep the gap that the caller allows, and is improved before it is bounded
 _VAST = 2000
+# passes of its first bound at each temperature: nearly the whole bound, long before a second of search is over
+_COARSE = 100
 
 
 @dataclass(slots=True, kw_only=True)
@@ -263,7 +265,7 @@ def _bound_better(component: Component, searches: _Searches) -> list[Component]:
     if deferred and component.packing.num_rows >= _VAST and run.methods.improver is not None:
         # the bound takes longer than the first iteration, which gains most
         run.methods.improver(component, run).iterate()
-    component.adopt_if_better(dual_bound(component.packing, run=run))
+    component.adopt_if_better(dual_bound(component.packing, passes=_COARSE if deferred else PASSES, run=run))
     return [component] if deferred else _by_regions(component, searches)
 
 
