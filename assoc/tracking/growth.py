@@ -162,6 +162,9 @@ class AtOnce(Growth):
 
     def with_births(self, s: int, offers: Offers, numbers: Array) -> Offers:
         """New targets, each with the state of its measurement."""
+        if not len(numbers):
+            self._begun = self._states[:0]
+            return offers
         self._begun, fit, positions, score = self._progress.settings.births.singles(s, self._progress.scan, numbers)
         when = np.full(len(score), self._progress.scan.time)
         return offers._replace(births=self._births(numbers[fit], s, np.lexsort(positions.T), when, score))
@@ -277,7 +280,8 @@ def _in_blocks(kept: Array, lengths: Sequence[int], sources: Sequence[Callable[[
         (places, sources[part](kept[places] - (ends[part] - lengths[part])))
         for part, places in blocks or [(0, np.zeros(0, dtype=np.int64))]
     )
-    return placed(len(kept), made)
+    # a single block has all rows in order
+    return placed(len(kept), made) if len(blocks) > 1 else next(made)[1]
 
 
 def growth_of(progress: Progress) -> AtOnce | InOrder:
@@ -297,6 +301,9 @@ class Scores:
 
     def after(self, now: Array, births: Births, begun: Array) -> Array:
         """Count a sensor: the scores `now` (T,) of the old tracks, and `begun` (N,) of births; their order by id."""
+        if not len(births.ids):
+            self.now, self.best = now, np.maximum(self.best, now) if self._at_once else self.best
+            return births.ids
         order = np.argsort(births.ids)
         self.track_id = np.append(self.track_id, births.ids[order])
         self.now = np.append(now, begun[order])
@@ -307,10 +314,12 @@ class Scores:
     def batch(self, states: Any, first: Array, last: Array) -> TrackBatch:
         """The tracks with these states at the end, and the times of their first and last measurements in the scan."""
         old = len(self._before)
-        known = self._before.scored(states[:old], self.now[:old] - self._before.score, last[:old])
-        new = TrackBatch.new(states[old:], self.track_id[old:], self.now[old:], last[old:])
+        # of both only the numbers and counts are used: the states already stand one after the other
+        known = self._before.scored(states, self.now[:old] - self._before.score, last[:old])
+        new = TrackBatch.new(states, self.track_id[old:], self.now[old:], last[old:])
         new.numbers[:, STARTED] = first[old:]
-        batch = TrackBatch.concatenate([known, new])
+        numbers, counts = np.concatenate([known.numbers, new.numbers]), np.concatenate([known.counts, new.counts])
+        batch = TrackBatch(states, numbers, counts)
         if self._at_once:
             batch.numbers[:, BEST] = self.best
         return batch

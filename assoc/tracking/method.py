@@ -65,9 +65,10 @@ class Method(ABC):
         tracks = association.tracks.confirm(settings.life_cycle, new_targets_at(progress, association.tracks))
         now = decision(scan.index, scan.time, association.assigned, tracks.track_id[tracks.confirmed])
         gone = to_delete(progress, tracks)
+        kept = tracks[~gone] if gone.any() else tracks
         ended = np.sort(tracks.track_id[gone & tracks.confirmed])
         step = Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
-        return progress.with_state(tracks=tracks[~gone], method_state=association.method_state)._replace(step=step)
+        return progress.with_state(tracks=kept, method_state=association.method_state)._replace(step=step)
 
     def detected(self, state: TrackerState, step: Step) -> Array:
         """Probability with which each sensor has detected each track in a step, (T, S)."""

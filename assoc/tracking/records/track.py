@@ -218,7 +218,7 @@ def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
 def rows_of_ids(ids: Array, wanted: Array) -> Array:
     """Rows of some ids (K,) among those of T tracks, ascending (T,); T where there is none."""
     rows = np.searchsorted(ids, wanted)
-    return np.where(np.append(ids, -1)[rows] == wanted, rows, len(ids))
+    return np.where(ids.take(rows, mode="clip") == wanted, rows, len(ids)) if len(ids) else rows
 
 
 def among(ids: Array, others: Array) -> Array:
@@ -241,9 +241,7 @@ def taken_by(ids: Array, assigned: Sequence[Array]) -> Array:
 def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: Array) -> Decision:
     """Make a decision from track ids and the ids of confirmed tracks."""
     ids = tuple(np.asarray(array, dtype=np.int64) for array in assigned)
-    every = np.concatenate(ids)
-    confirmed = among(every, confirmed_ids) & (every > 0)
-    return Decision(scan, time, ids, tuple(np.split(confirmed, np.cumsum([len(array) for array in ids])[:-1])))
+    return Decision(scan, time, ids, tuple(among(array, confirmed_ids) & (array > 0) for array in ids))
 
 
 def renamed(step: Step, ids: Array, names: Array) -> Step:

@@ -75,10 +75,12 @@ def _near(progress: Progress, tracks: TrackBatch) -> tuple[Array, Array]:
     gate = float(chi_square_quantiles(_TOGETHER, len(axes))[len(axes)])
     # twice the larger covariance is no less than the sum
     wide = Expected(np.ascontiguousarray(mean), 2.0 * covariance)
-    pairs = np.stack(near_pairs(wide, wide.mean, (False,) * len(axes), gate), axis=1)
+    first, second = near_pairs(wide, wide.mean, (False,) * len(axes), gate)
+    if len(first) <= len(mean):
+        # each is near itself alone
+        return first[:0], second[:0]
+    pairs = np.stack([first, second], axis=1)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    if not len(pairs):
-        return pairs[:, 0], pairs[:, 1]
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     lower = tracks.track_id[pairs[:, 0]] < tracks.track_id[pairs[:, 1]]
     first, second = np.where(lower[:, None], pairs, pairs[:, ::-1]).T
