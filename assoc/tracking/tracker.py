@@ -194,13 +194,14 @@ class Tracker:
     def health(self) -> Health | None:
         """What was declared of sensors and targets against what was seen so far; None of a tracker without `adapt`."""
         found, echoes, extents = self.state.estimates, self.state.echoes, self.state.extents
-        if found is None or echoes is None:
+        if found is None or echoes is None or self.state.clutter is None:
             return None
         flown = speed_of_tracks(self.settings, self.state.tracks, at_most=True)
         speed, known = self.settings.initiation.speed, (self.state.unresolved, self.state.biases)
         shown = np.unique(self.state.tracks.track_id[self.state.tracks.confirmed])
         lengths = () if extents is None else extents.of(shown).lengths.tolist()
-        return health(self.sensors, found, speed, echoes.found, flown, *known, lengths)
+        places = self.state.clutter.returned(self.sensors).tolist()
+        return health(self.sensors, found, speed, echoes.found, flown, *known, lengths, places)
 
     @property
     def solver_calls(self) -> int:

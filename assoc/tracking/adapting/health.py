@@ -92,6 +92,8 @@ class SensorHealth:
     """Within what two targets give one plot, though nobody said so."""
     biases: str = ""
     """What measurements, and the clock, are corrected for."""
+    places: float = 0.0
+    """Plots a scan that come from places of clutter, as wind farms and shores are: no part of the false alarms."""
 
     @property
     def verdict(self) -> str:
@@ -103,6 +105,8 @@ class SensorHealth:
             *([self._ranges] if any(band.differs for _, band in self.by_range) else []),
             *([f"{alarms.seen:.3g} false alarms a scan, declared {alarms.declared:.3g}"] if alarms.differs else []),
         ]
+        if self.places > _SMALL * alarms.seen:
+            found.append(f"{self.places:.3g} more a scan from places of clutter, which tracks are kept from")
         if any(self.ghosts):
             found.append(f"ghosts: {self.ghosts[0]} tracks by side lobes, {self.ghosts[1]} by multipath, not shown")
         if self.biases:
@@ -179,12 +183,14 @@ def health(
     unresolved: Unresolved,
     biases: Biases | None,
     lengths: Sequence[float] = (),
+    places: Sequence[float] | None = None,
 ) -> Health:
     """Compare estimates with what was declared of these sensors.
 
     `speed`, m/s, is that of `assoc.tracking.Initiation`, `flown` that of the tracks, 0 where none is known;
     `ghosts` (S, 2) are tracks that were echoes (`assoc.tracking.records.echoes`), `unresolved` says what was learnt of
-    resolutions, `biases` what measurements are corrected for; `lengths` (m) are those of targets with several plots.
+    resolutions, `biases` what measurements are corrected for; `lengths` (m) are those of targets with several plots,
+    `places` (S,) plots a scan from places of clutter.
     """
     values, spreads = estimates.found_and_spreads(sensors)
     declared, (by_range, weights) = declared_values(sensors), estimates.by_range(values[:, DETECTION])
@@ -210,6 +216,7 @@ def health(
                 hidden,
                 _merges(s, sensor, unresolved),
                 "" if biases is None or not biases.used.any() else _off(sensor, biases.of(sensors)[s]),
+                0.0 if places is None else places[s],
             )
         )
     manoeuvres = _quantity(1.0, *estimates.agile, NOISE)

@@ -61,7 +61,11 @@ def use_estimates(progress: Progress) -> Progress:
     # in doubt nothing is taken from scores yet
     densities = tuple(found * (turns >= YOUNG) for found, turns in zip(densities, clutter.clock, strict=True))
     shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
-    densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
+    # outside of places the density is that in use, also where fewer false alarms than declared are
+    densities = tuple(
+        np.where(found > 0.0, np.maximum(found - more, 0.0), 0.0)
+        for found, more in zip(densities, shift.tolist(), strict=True)
+    )
     dense = tuple(found > 0.0 for found in densities)
     if settings.by_range is not None:
         bands = map(bands_of_measured, progress.settings.sensors, progress.scan.measurements)

@@ -147,7 +147,7 @@ class Plots:
                 fresh[one] = its
         return fresh
 
-    def densities(self, sensor: Sensor, at: Array, now: float, visit: float) -> tuple[Array, Array]:
+    def densities(self, sensor: Sensor, at: Array, now: float, visit: float | None) -> tuple[Array, Array]:
         """See `ClutterMap.used_and_found`: of places ``at`` in this turn; the visit is for `_to_weigh`."""
         places, clocks, sites = self.places, self.clocks, self.sites
         n, part = len(at), sensor.position_part
@@ -300,6 +300,15 @@ class ClutterMap:
                 found.append(self.plots[s].densities(sensor, at, now, visit))
         used, every = zip(*found, strict=True)
         return used, every
+
+    def returned(self, sensors: Sequence[Sensor]) -> Array:
+        """Plots a turn of the last turns that came from places in use, (S,); 0 in the first turns."""
+        found = np.zeros(len(sensors))
+        for s, (sensor, own, now) in enumerate(zip(sensors, self.plots, self.clock.tolist(), strict=True)):
+            if now > YOUNG:
+                dense = own.densities(sensor, own.places, now, None)[0] > 0.0
+                found[s] = np.count_nonzero(dense) / min(now, _TURNS)
+        return found
 
     def after(
         self, sensors: Sequence[Sensor], scan: Scan, turns: Array, votes: Sequence[Array] | None = None

@@ -31,7 +31,7 @@ FACTORS = 4.0 ** np.arange(-3, 5)
 """By which the variance of the process noise may be multiplied."""
 
 # the priors count as so many squared residuals, dwells on targets, and scans
-_RESIDUALS, _DWELLS, _SCANS = 10.0, 20.0, 5.0
+_RESIDUALS, _DWELLS, _SCANS = 10.0, 20.0, 3.0
 # and are forgotten like all else, but for this share
 _LEFT = 0.05
 # log odds of detection differ by so much from band to band of range, and from the sensor's
