@@ -8,12 +8,13 @@ import pytest
 from assoc.costs.views import BANDS, bands_of
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
-from assoc.sensors import Radar2D
+from assoc.sensors import PositionSensor, Radar2D
 from assoc.sensors.base import wrap_angle
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
 from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
+from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.estimates import KEEP
 from assoc.tracking.records.prequential import trusted
@@ -115,7 +116,7 @@ def test_factors_of_variances_are_found_without_a_tracker(count):
     seen = []
     for sensor, factor in zip(sensors, factors, strict=True):
         z = sensor.measure(where) + rng.normal(size=(T, 3)) * sensor.noise * np.sqrt(factor)
-        seen.append(Seen(np.arange(T), z, predicted))
+        seen.append(Seen(np.arange(T), z, predicted, np.zeros(T)))
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
     shown = shown_by(sensors, seen, prior, factors, np.append(factors, 1.0))
@@ -146,11 +147,32 @@ def test_heights_that_transponders_say_are_no_noise_of_radars():
         z = sensor.measure(where)
         z[:, :2] += rng.normal(size=(T, 2)) * sensor.noise[:2]
         z[:, 2] = 30.48 * np.round(z[:, 2] / 30.48)
-        seen.append(Seen(np.arange(T), z, predicted))
+        seen.append(Seen(np.arange(T), z, predicted, np.zeros(T)))
     both = np.broadcast_to(covariance, (T, 1, 3, 3))
     prior = Predicted(both[:, 0], np.zeros((T, 1, 3)), both, np.ones((T, 1)), np.zeros((T, 3)), np.zeros((1, 3, 3)))
     shown = shown_by(sensors, seen, prior, np.ones(2), np.ones(3))
     assert np.linalg.solve(shown.matrix[:2, :2], shown.right[:2]) == pytest.approx(1.0, abs=0.1)
+
+
+@sample("seed", [3, 5, 7], every=3)
+def test_wrong_associations_are_no_manoeuvres(seed):
+    """Of targets that fly straight, are often missed, and whose plots lie as near to each other's tracks."""
+    rng, view = np.random.default_rng(seed), [[-40e3, 40e3]] * 2
+    sensor = PositionSensor(
+        position=np.zeros(3),
+        noise=[80.0] * 2,
+        detection_probability=0.8,
+        false_alarm_rate=2.0,
+        field_of_view=view,
+    )
+    start, heading = rng.uniform(-15e3, 15e3, (16, 2)), rng.uniform(-np.pi, np.pi, 16)
+    velocity = 200.0 * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    tracker = TRACKERS["multi-sensor"]([sensor], two_speeds(dimensions=2), adapt=True)
+    for k in range(30):
+        seen = (start + 4.0 * (k - 15) * velocity)[rng.random(16) < 0.5]
+        seen += rng.normal(0.0, 80.0, seen.shape)
+        tracker.step(4.0 * k, [np.concatenate([seen, rng.uniform(-40e3, 40e3, (rng.poisson(2.0), 2))])])
+        assert tracker.state.estimates.manoeuvres <= 1.0
 
 
 def test_tracks_that_share_the_plots_of_more_targets_teach_nothing():

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.special import gammaincinv
 
 from assoc._types import Array
 from assoc.costs.tracks.gating import near_pairs
@@ -18,8 +19,9 @@ from assoc.filters.measurement import periods_of
 from assoc.registration.correction import corrected_measurements
 from assoc.scene.own_times import FULL_TURN
 from assoc.scene.scan import Scan
+from assoc.sensors import Sensor
 from assoc.tracking.adapting.in_use import in_use
-from assoc.tracking.adapting.residuals import Predicted, Seen, Shown, shown_by
+from assoc.tracking.adapting.residuals import AROUND, GATE, Predicted, Seen, Shown, shown_by
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.biases import CLOCK
 from assoc.tracking.records.clutter import ONE_SAYS, YOUNG
@@ -27,10 +29,13 @@ from assoc.tracking.records.estimates import ALARMS, NOISE, declared_values
 from assoc.tracking.records.initiation import velocity_components
 from assoc.tracking.records.track import among, taken_by
 from assoc.tracking.records.track_batch import TrackBatch
+from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.coverage import densities_at, dwells
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
 _WIDER, _FALSE = 4.0, 0.05
+# plots of other targets there may be where none is in this scan
+_UNSEEN = 0.1
 # residuals of so many tracks are weighed in a scan
 _MOST = 64
 
@@ -263,7 +268,7 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
         position = np.zeros((len(track), 3))
         if len(track):
             position[:, : len(axes)] = at.mean[:, axes]
-        seen.append(Seen(track, z[number], position))
+        seen.append(Seen(track, z[number], position, _others(settings, at, settings.sensors[s].position_part, z)))
     declared = progress.work.settings.sensors
     filter, dt = progress.work.settings.filter, progress.elapsed
     models = filter.filters if isinstance(filter, InteractingMultipleModel) else (filter,)
@@ -281,6 +286,22 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
         estimates.factors,
         estimates.manoeuvres,
     )
+
+
+def _others(settings: TrackerSettings, states: Any, part: Sensor, z: Array) -> Array:
+    """See `Seen`, of states that each have one of the measurements: all but that, and those that are seldom there.
+
+    Where targets return several plots, others are mostly their own.
+    """
+    if settings.extended or not len(states.mean):
+        return np.zeros(len(states.mean))
+    z, gate = np.ascontiguousarray(z[:, : part.dim]), float(2.0 * AROUND**2 * gammaincinv(0.5 * part.dim, GATE))
+    expected = settings.filter.expected(states, part)
+    track, near = near_pairs(expected, z, periods_of(part), gate)
+    off = part.residual(z[near], expected.mean[track])
+    square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[track], off)
+    found = np.bincount(track[square <= gate], minlength=len(states.mean))
+    return np.maximum(found - 1.0, _UNSEEN)
 
 
 def _predicted(states: Any, axes: list[int], velocities: Array, noises: Array) -> Predicted:

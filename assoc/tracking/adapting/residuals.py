@@ -7,7 +7,8 @@ all their variances is estimated with the noise. The variance of a residual is a
 variance of one sensor's noise or of the prediction.
 
 How hard targets manoeuvre is asked of the predictions of all models together, with more process noise and with less: a
-measurement that fits none of them may be a false alarm, and is as likely by each.
+measurement that fits none of them may be a false alarm or of another target, and is as likely by each: else a few wrong
+associations would widen the gates, and bring more of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaincinv
 
 from assoc._types import Array
 from assoc.sensors import Sensor
@@ -27,6 +29,8 @@ from assoc.tracking.records.prequential import gain_of_variances
 _BESIDE = 0.01
 # squares beyond so many variances are taken for wrong associations
 _MOST = 10.0
+# the density of other plots is that in so many times the radius of the gate in which a track's are
+AROUND, GATE = 3.0, 0.99
 
 
 class Seen(NamedTuple):
@@ -38,6 +42,8 @@ class Seen(NamedTuple):
     """(K, d)."""
     predicted: Array
     """Predicted positions at the measurements' times, (K, 3)."""
+    others: Array
+    """How many plots of other targets may lie within `AROUND` times the radius of the gate, (K,)."""
 
 
 class Predicted(NamedTuple):
@@ -96,7 +102,7 @@ def shown_by(
     # linearised at the prediction, then at the position that all measurements give
     for last in (False, True):
         rows, information, vectors = [], np.zeros((S, T, n, n)), np.zeros((S, T, n))
-        for s, (part, white, (track, z, position)) in enumerate(zip(parts, whites, seen, strict=True)):
+        for s, (part, white, (track, z, position, _)) in enumerate(zip(parts, whites, seen, strict=True)):
             position = position + shift[track]
             H = white @ part.jacobian(position)[:, :, :n]
             # relative to the prediction
@@ -145,7 +151,7 @@ def shown_by(
             shares[..., S] = _diagonal(h, predicted.covariances[t, quiet])
             rest = y[alone] - _times(h, predicted.offsets[t, quiet])
             sums.add(shares[:, own], np.zeros_like(rest[:, own]), rest[:, own] ** 2, weights[t, quiet])
-    manoeuvres = _manoeuvres(parts, rows, predicted, np.maximum(noise, estimates[:-1]), now)
+    manoeuvres = _manoeuvres(parts, seen, rows, predicted, np.maximum(noise, estimates[:-1]), now)
     return Shown(sums.matrix, sums.right, sums.gain, manoeuvres, biases)
 
 
@@ -178,25 +184,34 @@ def _biases(
 
 
 def _manoeuvres(
-    parts: Sequence[Sensor], rows: Sequence[tuple[Array, Array, Array]], predicted: Predicted, noise: Array, now: float
+    parts: Sequence[Sensor],
+    seen: Sequence[Seen],
+    rows: Sequence[tuple[Array, Array, Array]],
+    predicted: Predicted,
+    noise: Array,
+    now: float,
 ) -> Array:
     """See `Shown`; `rows` are tracks, Jacobians and measurements relative to the prediction, in units of noise."""
     gain, free = np.zeros(len(FACTORS)), np.ones(len(predicted.offsets), dtype=np.bool_)
-    for part, (track, H, y), factor in zip(parts, rows, noise.tolist(), strict=True):
+    for part, own, (track, H, y), factor in zip(parts, seen, rows, noise.tolist(), strict=True):
         # one measurement of each track: several are not independent
         first = free[track]
         free[track] = False
         if first.any():
-            P, units = part.detection_probability, math.sqrt(np.linalg.det(part.covariance))
-            other = (1.0 - P) / P * part.false_alarm_rate / part.volume * units
-            gain += _of_factors(predicted, track[first], H[first], y[first], factor, now, other)
+            # the density of false alarms, and of plots of other targets
+            P, units, d = part.detection_probability, math.sqrt(np.linalg.det(part.covariance)), part.dim
+            gate = np.linalg.det(_around(H, predicted.covariance[track]) + factor * np.eye(d))
+            radius = AROUND * math.sqrt(2.0 * math.pi * gammaincinv(0.5 * d, GATE))
+            volume = radius**d / math.gamma(0.5 * d + 1.0) * np.sqrt(gate)
+            other = (1.0 - P) / P * (part.false_alarm_rate / part.volume * units + own.others / volume)
+            gain += _of_factors(predicted, track[first], H[first], y[first], factor, now, other[first])
     return gain
 
 
 def _of_factors(
-    predicted: Predicted, track: Array, H: Array, y: Array, noise: float, now: float, other: float
+    predicted: Predicted, track: Array, H: Array, y: Array, noise: float, now: float, other: Array
 ) -> Array:
-    """Log likelihoods of measurements by the process noise, see `Shown`; `other` is the density of false ones."""
+    """Log likelihoods of measurements by the process noise, see `Shown`; `other` are densities of other ones."""
     scale, d = scales(FACTORS[:, None], np.einsum("mii->m", predicted.noises)[None]), y.shape[1]
     change = scale - scales(np.array([[now]]), np.einsum("mii->m", predicted.noises)[None])
     spread = _around(H[:, None], predicted.covariances[track]) + noise * np.eye(d)
@@ -205,7 +220,7 @@ def _of_factors(
     off = y[:, None] - (H[:, None] @ predicted.offsets[track][..., None])[..., 0]
     square = np.einsum("kmi,kgmij,kmj->kgm", off, np.linalg.inv(total), off)
     density = np.exp(-0.5 * square) / np.sqrt(np.linalg.det(2.0 * np.pi * total))
-    fit = np.log((density * predicted.weights[track][:, None]).sum(axis=2) + other).sum(axis=0)
+    fit = np.log((density * predicted.weights[track][:, None]).sum(axis=2) + other[:, None]).sum(axis=0)
     return np.asarray(fit - fit[FACTORS == 1.0])
 
 
