@@ -35,7 +35,7 @@ from assoc.tracking.stages.coverage import densities_at, dwells
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
 _WIDER, _FALSE = 4.0, 0.05
 # plots of other targets there may be where none is in this scan
-_UNSEEN = 0.1
+_UNSEEN = 0.05
 # residuals of so many tracks are weighed in a scan
 _MOST = 64
 
