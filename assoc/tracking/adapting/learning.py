@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from assoc._types import Array
 from assoc.costs.tracks.gating import near_pairs
@@ -21,7 +20,7 @@ from assoc.scene.own_times import FULL_TURN
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
 from assoc.tracking.adapting.in_use import in_use
-from assoc.tracking.adapting.residuals import AROUND, GATE, Predicted, Seen, Shown, shown_by
+from assoc.tracking.adapting.residuals import Predicted, Seen, Shown, shown_by
 from assoc.tracking.progress import Progress
 from assoc.tracking.records.biases import CLOCK
 from assoc.tracking.records.clutter import ONE_SAYS, YOUNG
@@ -34,8 +33,8 @@ from assoc.tracking.stages.coverage import densities_at, dwells
 
 # a measurement that missed the gate is sought in one this many times as wide, if so few false alarms are expected there
 _WIDER, _FALSE = 4.0, 0.05
-# plots of other targets there may be where none is in this scan
-_UNSEEN = 0.05
+# with fewer detections a track may be of several targets
+_SETTLED = 5
 # residuals of so many tracks are weighed in a scan
 _MOST = 64
 
@@ -66,11 +65,7 @@ def use_estimates(progress: Progress) -> Progress:
     # in doubt nothing is taken from scores yet
     densities = tuple(found * (turns >= YOUNG) for found, turns in zip(densities, clutter.clock, strict=True))
     shift = np.log(estimates.used[:, ALARMS] / declared_values(progress.settings.sensors)[:, ALARMS])
-    # outside of places the density is that in use, also where fewer false alarms than declared are
-    densities = tuple(
-        np.where(found > 0.0, np.maximum(found - more, 0.0), 0.0)
-        for found, more in zip(densities, shift.tolist(), strict=True)
-    )
+    densities = tuple(np.maximum(found - more, 0.0) for found, more in zip(densities, shift.tolist(), strict=True))
     dense = tuple(found > 0.0 for found in densities)
     if settings.by_range is not None:
         bands = map(bands_of_measured, progress.settings.sensors, progress.scan.measurements)
@@ -268,7 +263,11 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
         position = np.zeros((len(track), 3))
         if len(track):
             position[:, : len(axes)] = at.mean[:, axes]
-        seen.append(Seen(track, z[number], position, _others(settings, at, settings.sensors[s].position_part, z)))
+        free = np.ones(len(z), dtype=np.bool_)
+        free[rows[rows[:, s] > 0, s] - 1] = False
+        nearest = _nearest(settings, at, settings.sensors[s].position_part, z[free])
+        nearest[late.hits[fresh[track]] >= _SETTLED] = np.inf
+        seen.append(Seen(track, z[number], position, nearest))
     declared = progress.work.settings.sensors
     filter, dt = progress.work.settings.filter, progress.elapsed
     models = filter.filters if isinstance(filter, InteractingMultipleModel) else (filter,)
@@ -288,20 +287,14 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
     )
 
 
-def _others(settings: TrackerSettings, states: Any, part: Sensor, z: Array) -> Array:
-    """See `Seen`, of states that each have one of the measurements: all but that, and those that are seldom there.
-
-    Where targets return several plots, others are mostly their own.
-    """
-    if settings.extended or not len(states.mean):
-        return np.zeros(len(states.mean))
-    z, gate = np.ascontiguousarray(z[:, : part.dim]), float(2.0 * AROUND**2 * gammaincinv(0.5 * part.dim, GATE))
+def _nearest(settings: TrackerSettings, states: Any, part: Sensor, free: Array) -> Array:
+    """See `Seen`, given those of no track; where targets return several plots these are mostly their own."""
+    if settings.extended or not len(free):
+        return np.full(len(states.mean), np.inf)
     expected = settings.filter.expected(states, part)
-    track, near = near_pairs(expected, z, periods_of(part), gate)
-    off = part.residual(z[near], expected.mean[track])
-    square = np.einsum("ki,kij,kj->k", off, np.linalg.inv(expected.covariance)[track], off)
-    found = np.bincount(track[square <= gate], minlength=len(states.mean))
-    return np.maximum(found - 1.0, _UNSEEN)
+    off = part.residual(np.ascontiguousarray(free[:, : part.dim])[None], expected.mean[:, None])
+    square = np.einsum("kni,kij,knj->kn", off, np.linalg.inv(expected.covariance), off)
+    return np.asarray(square.min(axis=1))
 
 
 def _predicted(states: Any, axes: list[int], velocities: Array, noises: Array) -> Predicted:

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from assoc._types import Array
 from assoc.sensors import Sensor
@@ -29,8 +28,6 @@ from assoc.tracking.records.prequential import gain_of_variances
 _BESIDE = 0.01
 # squares beyond so many variances are taken for wrong associations
 _MOST = 10.0
-# the density of other plots is that in so many times the radius of the gate in which a track's are
-AROUND, GATE = 3.0, 0.99
 
 
 class Seen(NamedTuple):
@@ -42,8 +39,9 @@ class Seen(NamedTuple):
     """(K, d)."""
     predicted: Array
     """Predicted positions at the measurements' times, (K, 3)."""
-    others: Array
-    """How many plots of other targets may lie within `AROUND` times the radius of the gate, (K,)."""
+    nearest: Array
+    """Squared distance of the nearest measurement of no track, in units of the prediction's variance, (K,); inf where
+    the track is surely of one target."""
 
 
 class Predicted(NamedTuple):
@@ -201,9 +199,8 @@ def _manoeuvres(
             # the density of false alarms, and of plots of other targets
             P, units, d = part.detection_probability, math.sqrt(np.linalg.det(part.covariance)), part.dim
             gate = np.linalg.det(_around(H, predicted.covariance[track]) + factor * np.eye(d))
-            radius = AROUND * math.sqrt(2.0 * math.pi * gammaincinv(0.5 * d, GATE))
-            volume = radius**d / math.gamma(0.5 * d + 1.0) * np.sqrt(gate)
-            other = (1.0 - P) / P * (part.false_alarm_rate / part.volume * units + own.others / volume)
+            volume = (math.pi * own.nearest) ** (0.5 * d) / math.gamma(0.5 * d + 1.0) * np.sqrt(gate)
+            other = (1.0 - P) / P * (part.false_alarm_rate / part.volume * units + 1.0 / volume)
             gain += _of_factors(predicted, track[first], H[first], y[first], factor, now, other[first])
     return gain
 

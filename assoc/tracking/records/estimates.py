@@ -198,8 +198,8 @@ class Estimates(NamedTuple):
     def settled(self, sensors: Sequence[Sensor]) -> Estimates:
         """The estimates with what is to be used from now on."""
         found, declared, before = self.found(sensors), declared_values(sensors), self.used
-        # less noise than declared does no harm
-        found[:, NOISE] = np.maximum(found[:, NOISE], 1.0)
+        # less noise, and fewer false alarms, than declared do no harm; where they come from some places are more
+        found[:, [NOISE, ALARMS]] = np.maximum(found[:, [NOISE, ALARMS]], declared[:, [NOISE, ALARMS]])
         chosen = np.where(trusted(self.evidence[:, :RANGES], before != declared), found, declared)
         used = np.where((chosen != declared) & ~_moved(_scales(chosen), _scales(before)), before, chosen)
         # all bands of a sensor, or none
