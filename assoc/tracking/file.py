@@ -256,8 +256,7 @@ def _echoes(model: Echoes, saved: Saved) -> Echoes:
         shape = np.shape(value)
         shape = (pairs, *shape[1:]) if name in ("ids", "kinds", "counts") else shape
         shape = (len(saved[name]),) if name == "hidden" else shape
-        good = saved[name].shape == shape and np.isfinite(saved[name]).all()
-        good = good and (name == "plot_evidence" or bool((saved[name] >= 0).all()))
+        good = saved[name].shape == shape and np.isfinite(saved[name]).all() and (saved[name] >= 0).all()
         saved.require(good, name, f"numbers >= 0 of the shape {shape}")
     saved.require((np.diff(saved["hidden"]) > 0).all(), "hidden", "ids that ascend")
     saved.require((saved["kinds"] < np.shape(model.found)).all(), "kinds", "a sensor, and 0 or 1")

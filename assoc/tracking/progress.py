@@ -93,17 +93,6 @@ class Gathered(NamedTuple):
     """By what covariances are larger than after updates with the sensors' noise, (E, n, n)."""
 
 
-class EchoPlots(NamedTuple):
-    """How much denser than false alarms n plots of a sensor are by what is known before the scan."""
-
-    echoes: Array
-    """If each confirmed track that is detected has one plot by side lobes, (n,)."""
-    tracks: Array
-    """By tracks, (n,)."""
-    looks: int
-    """How many confirmed tracks are detected."""
-
-
 class Progress(NamedTuple):
     """A step under way."""
 
@@ -130,7 +119,6 @@ class Progress(NamedTuple):
     """Plots of targets with an extent."""
     shared: Shared | None = None
     """Tracks that may be unresolved in this scan; see `assoc.tracking.stages.unresolved`."""
-    echo_plots: tuple[EchoPlots, ...] = ()
     association: Association | None = None
     step: Step | None = None
 

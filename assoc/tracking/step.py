@@ -31,7 +31,6 @@ from assoc.tracking.records.track import Step
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.stages.checking import checked_measurements, checked_time
 from assoc.tracking.stages.coverage import count_out_of_view, keep_pace
-from assoc.tracking.stages.echo_plots import count_echoes, expect_echoes
 from assoc.tracking.stages.echoes import hide_echoes
 from assoc.tracking.stages.extents import weigh_extents
 from assoc.tracking.stages.gathering import gather, plot_by_plot, with_widths
@@ -55,13 +54,12 @@ def stages_of(settings: TrackerSettings) -> list[Stage]:
         *([take_over] if starting else [share]),
         predict,
         *([remember_tracks] if settings.adapt else []),
-        *([expect_echoes] if settings.adapt and not starting else []),
         count_out_of_view,
         associate,
         live,
         *([within_heights] if settings.height is not None else []),
         *([end_ghosts, grow_starter] if starting else []),
-        *([hide_echoes, count_echoes] if settings.adapt and not starting else []),
+        *([hide_echoes] if settings.adapt and not starting else []),
         *([weigh_extents] if settings.extended and not starting else []),
         *([learn] if settings.adapt else []),
         *([remember_identities] if settings.identity is not None else []),

@@ -52,20 +52,12 @@ class Echoes(NamedTuple):
     """Tracks that were shown."""
     found: Array
     """Tracks that were hidden so far, by sensor and kind, (S, 2)."""
-    plots: Array
-    """Plots by side lobes of confirmed tracks, forgotten like all that is learnt, (S,)."""
-    looks: Array
-    """Detections of confirmed tracks, summed over scans, (S,)."""
-    plot_evidence: Array
-    """Logarithm of how much better they predicted plots of no track than false alarms alone, (S,)."""
-    trusted: Array
-    """Whether they are in use, 0 or 1, (S,)."""
 
     @staticmethod
     def none(sensors: int) -> Echoes:
         """No pair."""
         ids, nothing = np.zeros((0, 2), dtype=np.int64), np.zeros((sensors, 2))
-        return Echoes(ids, ids, np.zeros((0, 6)), ids[:, 0], nothing, nothing, 0.0, nothing, *(np.zeros(sensors),) * 4)
+        return Echoes(ids, ids, np.zeros((0, 6)), ids[:, 0], nothing, nothing, 0.0, nothing)
 
     def of(self, rows: Array) -> Echoes:
         """Select pairs."""
@@ -77,11 +69,6 @@ class Echoes(NamedTuple):
         for i, name in zip(ids.tolist(), names.tolist(), strict=True):
             now[self.ids == i] = name
         return self._replace(ids=now)
-
-    @property
-    def per_target(self) -> Array:
-        """Plots by side lobes of a target in a scan, (S,)."""
-        return np.asarray((_BEFORE[0] + self.plots) / (_BEFORE[1] + self.looks))
 
     @property
     def seen(self) -> Array:
@@ -98,11 +85,7 @@ class Echoes(NamedTuple):
         target = betaln(_LOOKS * P + hits, _LOOKS * (1.0 - P) + misses) - betaln(_LOOKS * P, _LOOKS * (1.0 - P))
         # one that was hidden may have been a target
         known = (self.seen + np.maximum(self.found - 1.0, 0.0))[tuple(self.kinds.T)]
-        # what returns a share of the looks has returned these plots
-        sources = (
-            (self.per_target * self.trusted)[self.kinds[:, 0]] * (self.kinds[:, 1] == RANGE) * sum(_ECHO) / _ECHO[0]
-        )
-        prior = np.log(np.maximum((_BEFORE[0] + known) / (_BEFORE[1] + self.targets), sources))
+        prior = np.log((_BEFORE[0] + known) / (_BEFORE[1] + self.targets))
         # a target that is there by chance stays the more seldom the longer; one that keeps station does as an echo does
         tied = -np.log(_STATION + chance / np.maximum(hits, 1.0)) - 0.5 * np.maximum(square - hits, 0.0)
         return np.asarray(prior + tied + echo - target + strays * np.log(_STRAY))

@@ -123,7 +123,7 @@ def _begun(progress: Progress, echoes: Echoes, tracks: TrackBatch, plots: Array,
         once, new_hits = 2.0 * _APART * density, tracks.hits[young[sparse][fresh[young[sparse]]]]
         reach = 1.0 if axis == RANGE else 1.0 - ((z[theirs, RANGE] - low[RANGE]) / width[RANGE]).mean()
         expected[s, axis] += ((once * reach) ** np.where(new_hits > 1, 1.0, 2.0)).sum()
-        first, second = near(values, ours[sparse], theirs, _APART * spread[axis], sensor.angular[axis])
+        first, second = _near(values, ours[sparse], theirs, _APART * spread[axis], sensor.angular[axis])
         if not len(first):
             continue
         chance = np.full(len(first), math.sqrt(2.0 * math.pi) * density)
@@ -167,7 +167,7 @@ def _windows(values: Array, first: Array, second: Array, reach: float, angle: bo
     return order, low, np.searchsorted(ordered, middle + reach) - low
 
 
-def near(values: Array, first: Array, second: Array, reach: float, angle: bool) -> tuple[Array, Array]:
+def _near(values: Array, first: Array, second: Array, reach: float, angle: bool) -> tuple[Array, Array]:
     """Pairs of plots, given by their numbers, that are near in one component."""
     order, low, count = _windows(values, first, second, reach, angle)
     row = np.repeat(np.tile(np.arange(len(first)), len(low)), count.ravel())
