@@ -13,7 +13,9 @@ from assoc.sensors.base import wrap_angle
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation
 from assoc.tracking.adapting.in_use import in_use
+from assoc.tracking.adapting.learning import _nearest
 from assoc.tracking.adapting.residuals import Predicted, Seen, shown_by
+from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.records.biases import Biases
 from assoc.tracking.records.estimates import ALARMS, KEEP
 from assoc.tracking.records.prequential import trusted
@@ -292,6 +294,18 @@ def test_fewer_false_alarms_than_declared_are_found_and_everything_else_is_still
         assert inside(sensor.detection_probability, 0.7)
     # told, but not used: where false alarms come from some places only, they are more there
     assert (tracker.state.estimates.used[:, ALARMS] == 10.0).all()
+
+
+def test_a_plot_of_nobody_may_lie_exactly_where_a_track_is_expected():
+    """The density of others is large then, and finite."""
+    sensor = PositionSensor(position=np.zeros(3), noise=[10.0] * 2, detection_probability=0.9, false_alarm_rate=1.0,
+                            field_of_view=[[-1e4, 1e4]] * 2)  # fmt: skip
+    tracker = TRACKERS["multi-sensor"]([sensor], two_speeds(dimensions=2), adapt=True)
+    tracker.step(0.0, [np.array([[0.0, 0.0], [5e3, 50.0]])])
+    states = tracker.state.tracks.states
+    there = tracker.settings.filter.expected(states, sensor).mean
+    off = _nearest(tracker.settings, states, sensor, np.append(there[:1], there[1:] + 30.0, axis=0))
+    assert 0.0 < off[0] < 1e-9 < off[1] < np.inf
 
 
 KINDS = {

@@ -86,10 +86,8 @@ def test_beside_a_track_whose_echo_it_may_be_false_alarms_count():
     def scans(farther):
         radar = Radar2D(position=np.zeros(3), noise=[20.0, 2e-3], detection_probability=0.9, false_alarm_rate=80.0,
                         field_of_view=[[0.0, 30e3], [-np.pi, np.pi]])  # fmt: skip
-        one, rng = (
-            MultiSensorTracker([radar], two_speeds(10.0, 2), adapt=True, region=6.0 * REGION),
-            np.random.default_rng(0),
-        )
+        one = MultiSensorTracker([radar], two_speeds(10.0, 2), adapt=True, region=6.0 * REGION)
+        rng = np.random.default_rng(0)
         for k in range(20):
             away = 8e3 + 200.0 * k
             plots = [[away, 0.5], [away + farther, 1.5]][: 1 + (k >= 6)]

@@ -263,10 +263,12 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
         position = np.zeros((len(track), 3))
         if len(track):
             position[:, : len(axes)] = at.mean[:, axes]
-        free = np.ones(len(z), dtype=np.bool_)
+        nearest, free = np.full(len(track), np.inf), np.ones(len(z), dtype=np.bool_)
         free[rows[rows[:, s] > 0, s] - 1] = False
-        nearest = _nearest(settings, at, settings.sensors[s].position_part, z[free])
-        nearest[late.hits[fresh[track]] >= _SETTLED] = np.inf
+        young = np.flatnonzero(late.hits[fresh[track]] < _SETTLED)
+        # where targets return several plots those of no track are mostly their own
+        if len(young) and free.any() and not settings.extended:
+            nearest[young] = _nearest(settings, at[young], settings.sensors[s].position_part, z[free])
         seen.append(Seen(track, z[number], position, nearest))
     declared = progress.work.settings.sensors
     filter, dt = progress.work.settings.filter, progress.elapsed
@@ -288,13 +290,12 @@ def _residuals(progress: Progress, tracks: TrackBatch, late: TrackBatch, rows: A
 
 
 def _nearest(settings: TrackerSettings, states: Any, part: Sensor, free: Array) -> Array:
-    """See `Seen`, given those of no track; where targets return several plots these are mostly their own."""
-    if settings.extended or not len(free):
-        return np.full(len(states.mean), np.inf)
+    """See `Seen`, given the measurements of no track (n, d), of which there is one."""
     expected = settings.filter.expected(states, part)
     off = part.residual(np.ascontiguousarray(free[:, : part.dim])[None], expected.mean[:, None])
     square = np.einsum("kni,kij,knj->kn", off, np.linalg.inv(expected.covariance), off)
-    return np.asarray(square.min(axis=1))
+    # one may lie exactly where a track is expected
+    return np.asarray(np.maximum(square.min(axis=1), np.finfo(float).eps))
 
 
 def _predicted(states: Any, axes: list[int], velocities: Array, noises: Array) -> Predicted:

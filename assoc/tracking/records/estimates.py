@@ -198,7 +198,8 @@ class Estimates(NamedTuple):
     def settled(self, sensors: Sequence[Sensor]) -> Estimates:
         """The estimates with what is to be used from now on."""
         found, declared, before = self.found(sensors), declared_values(sensors), self.used
-        # less noise, and fewer false alarms, than declared do no harm; where they come from some places are more
+        # that too much noise, or too many false alarms, are declared does little harm; and false alarms are not even:
+        # fewer on average may be more near some targets
         found[:, [NOISE, ALARMS]] = np.maximum(found[:, [NOISE, ALARMS]], declared[:, [NOISE, ALARMS]])
         chosen = np.where(trusted(self.evidence[:, :RANGES], before != declared), found, declared)
         used = np.where((chosen != declared) & ~_moved(_scales(chosen), _scales(before)), before, chosen)
